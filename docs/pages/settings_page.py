@@ -47,12 +47,14 @@ def _row(key: Key) -> list[str]:
     """Return the cells of a setting; the last is empty where preset mambo does not use it."""
     quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
     meaning = plain(key.description)
-    if not one_norm.uses(key.path):
+    if quadratic.unmet(key.path) == "without [height]":
+        meaning = f"With [height] only. {meaning}"
+    elif not one_norm.uses(key.path):
         meaning = f"Quadratic cost only. {meaning}"
     value = ""
     if quadratic.uses(key.path):
         value = spell(quadratic.value(key.path))
-    else:
+    elif one_norm.uses(key.path):
         meaning = f"1-norm only. {meaning}"
     default = spell(Settings().value(key.path))
     return [

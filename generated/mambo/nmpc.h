@@ -248,6 +248,12 @@ nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits);
  * NMPC_LIMIT_BRAKING, NMPC_LIMIT_FENCE and NMPC_LIMIT_TILT, added; 0 for none. `self` must not be null. */
 unsigned int nmpc_limits_active(const nmpc_t *self);
 
+/* Return the next set-point of a yaw loop on the shortest way from `previous_rad` to `wanted_rad`, at most
+ * `most_change_rad` further, within +/- NMPC_YAW_RANGE_RAD. A yaw loop that is given a large step at once takes thrust
+ * from roll, pitch and height. Returns `previous_rad` if another argument is NaN or out of range, or the change is not
+ * more than 0; and 0 if `previous_rad` is NaN or out of range. */
+nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad);
+
 /* Version of the generator and digest of the settings, to identify what a binary was built from. */
 const char *nmpc_version(void);
 

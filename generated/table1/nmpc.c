@@ -793,6 +793,42 @@ int nmpc_is_saturated(const nmpc_t *self)
            || (reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
 }
 
+nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
+{
+    const nmpc_real_t turn_rad = 6.2831855f;
+    nmpc_sum_t change_rad;
+    nmpc_sum_t next_rad;
+
+    if (within(previous_rad, NMPC_YAW_RANGE_RAD) == 0) {
+        return (nmpc_real_t)0;
+    }
+    if ((within(wanted_rad, NMPC_YAW_RANGE_RAD) == 0) || !(most_change_rad > (nmpc_real_t)0)) {
+        return previous_rad;
+    }
+
+    /* The shortest way: less whole turns. */
+    change_rad = (nmpc_sum_t)wanted_rad - previous_rad;
+    change_rad = change_rad - ((((change_rad * 0.15915494f) + NMPC_ROUNDING) - NMPC_ROUNDING) * turn_rad);
+    if (change_rad > most_change_rad) {
+        change_rad = most_change_rad;
+    } else if (change_rad < -most_change_rad) {
+        change_rad = -most_change_rad;
+    } else {
+        /* The heading is reached. */
+    }
+    next_rad = previous_rad + change_rad;
+    if (next_rad > NMPC_YAW_RANGE_RAD) {
+        next_rad = next_rad - turn_rad;
+    } else if (next_rad < -NMPC_YAW_RANGE_RAD) {
+        next_rad = next_rad + turn_rad;
+    } else {
+        /* The heading is within its range. */
+    }
+    /* Rounding aside this changes nothing: it tells a proof by intervals how large the heading is. */
+    return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
+                                                         : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));
+}
+
 const char *nmpc_version(void)
 {
     return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;

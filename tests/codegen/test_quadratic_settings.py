@@ -16,6 +16,11 @@ USED = {
     norm: [key for key in KEYS.values() if Settings.model_validate(nested(values)).uses(key.path)]
     for norm, values in (("1-norm", LAGS), ("quadratic", QUADRATIC))
 }
+HEIGHT = {path for path in KEYS if path.startswith("height.")} | {
+    "limits.fence.floor_m",
+    "limits.fence.ceiling_m",
+}
+"""The keys that only a controller with a height uses."""
 
 
 def faults_of(values: Values) -> list[str]:
@@ -36,7 +41,8 @@ def other_value(key: Key) -> str | float:
 def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
     """Every key is used by one norm at least; some by both."""
     paths = {norm: {key.path for key in keys} for norm, keys in USED.items()}
-    assert paths["1-norm"] | paths["quadratic"] == set(KEYS)
+    assert paths["1-norm"] | paths["quadratic"] == set(KEYS) - HEIGHT
+    assert {key for key in KEYS if settings_with_height().uses(key)} == paths["quadratic"] | HEIGHT
     assert {"horizon.update_period_s", "model.roll_lag_s", "damping.roll_rate_feedback_s", "cost.norm"} <= (
         paths["1-norm"] & paths["quadratic"]
     )
@@ -49,7 +55,7 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
     """Each key of the other norm alone, with its value and what to do; its default may stand there."""
     base = {"1-norm": LAGS, "quadratic": QUADRATIC}[norm]
     printed = "model.position_update"  # which admits no lag, as a quadratic cost wants one
-    others = [key for key in KEYS.values() if key not in USED[norm] and key.path != printed]
+    others = [key for key in KEYS.values() if key not in USED[norm] and key.path not in {printed, *HEIGHT}]
     for key in others:
         value = other_value(key)
         spelling = spell(value) if key.low is None else value
@@ -58,6 +64,59 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
         default = Settings().value(key.path)
         settings = controller_toml.parse(toml({**base, key.path: default}), "with the default")
         assert settings == controller_toml.parse(toml(base), "without it")
+
+
+def settings_with_height() -> Settings:
+    """Return the simplest settings with a height, an empty section."""
+    return controller_toml.parse(f"{toml(QUADRATIC)}[height]\n", "slow.toml")
+
+
+def test_the_presence_of_a_section_gives_the_height() -> None:
+    """An empty section has the defaults, is written with all keys, and has another digest than none."""
+    settings, level = settings_with_height(), controller_toml.parse(toml(QUADRATIC), "level.toml")
+    assert level.height is None
+    assert settings.height is not None
+    assert settings.height.thrust_min_m_s2 == Settings().value("height.thrust_min_m_s2")
+    assert controller_toml.parse(controller_toml.to_toml(settings), "written") == settings
+    assert "[height]" not in controller_toml.to_toml(level)
+    assert settings.digest != level.digest
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        (
+            {"cost.norm": "1-norm", "height.lag_s": 0.05},
+            'cost.norm = "1-norm" must be "quadratic" with [height]',
+        ),
+        (
+            {"limits.fence.ceiling_m": 2.0},
+            "limits.fence.ceiling_m = 2.0 has no effect without [height]; leave it out",
+        ),
+        (
+            {"height.lag_s": 0.05, "limits.fence.floor_m": 1.0, "limits.fence.ceiling_m": 0.5},
+            "limits.fence.ceiling_m = 0.5 must be more than 1.0 (limits.fence.floor_m)",
+        ),
+        (
+            {"height.climb_m_s": 5.0},
+            "height.climb_m_s = 5.0 must be at most 2.715, which the drone can brake in time with "
+            "height.thrust_min_m_s2 and this law",
+        ),
+        (
+            {"height.descent_m_s": 2.0},
+            "height.descent_m_s = 2.0 must be at most 1.427, which the drone can brake in time with "
+            "height.thrust_max_m_s2 and this law",
+        ),
+        (
+            {"height.thrust_max_m_s2": 60.0},
+            "height.thrust_max_m_s2 = 60.0 must be at most 50.0 (ranges.thrust_acceleration_max_m_s2)",
+        ),
+    ],
+)
+def test_heights_at_odds_with_other_keys_are_refused(values: Values, fault: str) -> None:
+    """Another norm, walls without or across, speeds that cannot be braked, a thrust out of range."""
+    base = QUADRATIC | ({} if values.get("cost.norm") else {"horizon.ramp_s": 0.4})
+    assert faults_of(base | values) == [f"slow.toml: {fault}"]
 
 
 def test_keys_without_effect_are_all_named() -> None:

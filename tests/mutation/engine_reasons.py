@@ -153,6 +153,47 @@ REASONS: Final[Mapping[Key, str]] = {
         "for (k = 1; k <= simulation->mocap_delay_ticks; k++) {",
         "1 -> 0",
     ): "the first tick writes that entry",
+    (
+        "world.h",
+        "for (k = 0; k < (DELAY_TICKS_MAX + 1); k++) {",
+        "0 -> 1",
+    ): "the first tick writes that entry",
+    **{
+        ("world.h", "for (k = 0; k < (DELAY_TICKS_MAX + 1); k++) {", change): _BESIDE
+        for change in ("< -> <=", "1 -> 2")
+    },
+    (
+        "world.h",
+        "wire->sent[k][i] = first[i];",
+        "index + 1",
+    ): "the first tick writes the first entry; and beside the array, which no flight shows",
+    **{
+        (
+            "loop.c",
+            "const real_t touching = choose(flight->landing & (truth_now->position_m[2] >= <real>), "
+            "splat(<real>), splat(<real>));",
+            change,
+        ): "any number but 0 is the floor"
+        for change in ("negative", "next number")
+    },
+    **{
+        ("loop.c", "flying->given_n = splat(<real>);", change): "the first update sets it"
+        for change in ("left out", "zero -> one")
+    },
+    (
+        "loop.c",
+        "flying->capped = splat(<real>);",
+        "left out",
+    ): "what memory holds then is negative: no thrust counts as capped",
+    **{
+        (
+            "loop.c",
+            "flying->capped = choose(magnitude(given_n - wanted_n) > simulation->capped_n, splat(<real>), "
+            "flying->capped);",
+            change,
+        ): "any positive number is a capped thrust, and no difference equals its limit in every bit"
+        for change in ("> -> >=", "next number")
+    },
     **{
         ("first_order.h", "for (i = 0; i < 3; i++) {", change): _BESIDE
         for change in ("< -> <= #1", "3 -> 4 #1")

@@ -49,6 +49,7 @@ from tests.support.faults import (
     faulty_controller,
     faulty_flight,
 )
+from tests.support.heights import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
 from tests.support.tools import toolchain
@@ -75,22 +76,29 @@ def digests(path: Path) -> Iterator[str]:
     """Yield the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
     engine: Any = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES.values()]
+    lifted = [
+        flight_of(BATCHES[name], PERIOD_S)
+        for name in ("space", "flown in space", "truth", "take-off", "late thrust", "flown take-off")
+    ]
     settings = ONE_NORM
     traces = (
         fly_compiled(engine, flight, controller)
         for flight, controller in (
             *((flight, pd_controller(name, flight)) for name in PD_NAMES for flight in flights),
             *((flight, CompiledController(settings, flight.flights)) for flight in flights[:2]),
+            *((flight, CompiledController(height_settings(), flight.flights)) for flight in lifted),
         )
     )
     for trace in traces:
         yield from (trace.digest(index) for index in range(trace.flights))
     for fault in SHOWN:
         yield hashlib.sha256(injected(path, fault, any_inputs()).tobytes()).hexdigest()
-    faulty, adjusted = faulty_controller(settings, FAULTS, CHANGES, PATIENCE)
-    trace = fly_compiled(engine, faulty_flight(FAULTS), faulty)
-    yield from (trace.digest(index) for index in range(trace.flights))
-    yield from (str(adjusted.answers), str(engine.engine_fastest_lanes()))
+    for kind, changes in ((settings, CHANGES), (height_settings(), ())):
+        faulty, adjusted = faulty_controller(kind, FAULTS, changes, PATIENCE)
+        trace = fly_compiled(engine, faulty_flight(FAULTS), faulty)
+        yield from (trace.digest(index) for index in range(trace.flights))
+        yield str(adjusted.answers)
+    yield str(engine.engine_fastest_lanes())
     sensed = Flight(Hover(), duration_s=1.0, sensors=Sensors(derotated=True))
     draws = np.random.default_rng(1).standard_normal((TICKS, NOISES))
     for each in evaluated():

@@ -137,7 +137,7 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
             } else {
                 stock_shares(simulation, &seen, &row[25], row[27], row[28], state.memory, shares);
             }
-            commanded_speeds(simulation, shares, steady_rad_s);
+            (void)commanded_speeds(simulation, shares, steady_rad_s);
             integrate(simulation, flight, &around, row[32], &r, steady_rad_s, &state);
         }
         memcpy(row, &state, sizeof state);

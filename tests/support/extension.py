@@ -39,6 +39,7 @@ void nmpc_init(nmpc_t *);
 nmpc_status_t nmpc_reset(nmpc_t *, const nmpc_command_t *);
 nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
 const char *nmpc_version(void);
+nmpc_real_t nmpc_slew_heading(nmpc_real_t, nmpc_real_t, nmpc_real_t);
 int nmpc_self_test(nmpc_t *);
 unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
 void sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);

@@ -38,7 +38,8 @@ def _with_flights(
     step, and jump at times; the last flies and misses its state at times, for fewer steps than it may, for as
     many, and for more.
     """
-    n, ranges, period_s = len(drawn[0].thrust), settings.ranges, settings.horizon.update_period_s
+    n, ranges, period_s = len(drawn[0].state), settings.ranges, settings.horizon.update_period_s
+    method = method_of(settings)
     flying = np.arange(n) % 5 >= 2
     scale = 10.0 ** rng.uniform(-3, 0.5, (n, 1))
     yaw, yaw_rate = rng.uniform(-7, 7, n), rng.choice([0.0, 1.0, -3.0], n)
@@ -65,7 +66,9 @@ def _with_flights(
             calm[:, None], np.clip(target, np.negative(bounds), bounds), inputs.target[:, :4]
         )
         state[:, :4] = np.clip(state[:, :4], np.negative(bounds), bounds)
-        inputs.state[:] = np.where(calm[:, None], state, inputs.state)
+        inputs.state[:, :7] = np.where(calm[:, None], state, inputs.state[:, :7])
+        if method.has_height:
+            _fly_height(settings, inputs, calm, scale, rng)
         starts = (left == 0) & (rng.random(n) < 0.1) & (np.arange(n) % 5 == 4)
         lengths = rng.choice([1, 2, max(1, most - 1), max(1, most), most + 1, most + 3], n)
         left = np.where(starts, lengths, np.maximum(left - 1, 0))
@@ -73,25 +76,43 @@ def _with_flights(
     return drawn
 
 
+def _fly_height(
+    settings: Settings, inputs: StepInputs, calm: NDArray[np.bool_], scale: Any, rng: np.random.Generator
+) -> None:
+    """Let heights of flights differ little from those of their targets, which repeat those of y; in place."""
+    level = len(method_of(settings).level_target)
+    limits = np.array([settings.ranges.position_m, settings.ranges.velocity_m_s])
+    goal = np.clip(inputs.target[:, [1, 3]], -limits, limits)
+    own = np.clip(goal + (scale * rng.normal(0, 1, goal.shape)), -limits, limits)
+    inputs.target[calm, level : level + 2] = goal[calm]
+    inputs.state[calm, 7:9] = own[calm]
+
+
 def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
     """Step a fresh controller through `inputs`, bad values among the good.
 
+    With a height the delivered thrust is set in every eleventh step.
     Halfway it is reset. What else its method sets is set then, if it is weights, or in every seventh step.
     With limits, they change in every ninth step.
     """
     rng = np.random.default_rng(seed)
-    takes_weights = bool(method_of(controller.settings).weight_limits)
+    method = method_of(controller.settings)
+    takes_weights, columns = bool(method.weight_limits), len(method.command)
     found = Run([], [])
     for index, case in enumerate(inputs):
-        command = rng.uniform(-1.5, 1.5, (len(case.thrust), 2))
-        command[::5, 0] = rng.choice(BAD_COMMANDS, len(command[::5]))
+        command = rng.uniform(-1.5, 1.5, (len(case.state), 2))
+        if method.has_height:
+            command = np.column_stack([command, rng.uniform(-5, 30, len(command))])
+        command[::5, index % columns if columns > 2 else 0] = rng.choice(BAD_COMMANDS, len(command[::5]))
         if index == len(inputs) // 2:
             found.setters.append(controller.reset(command))
             if takes_weights:
                 found.setters.append(controller.set_weights(_weights(rng, len(command))))
         elif index % 7 == 5 and not takes_weights:
             found.setters.append(controller.set_command(command))
-        if index % 9 == 8 and method_of(controller.settings).limiting is not None:
+        if method.has_height and index % 11 == 10:
+            found.setters.append(controller.set_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
+        if index % 9 == 8 and method.limiting is not None:
             found.setters.append(controller.set_limits(random_limits(controller.settings, len(command), rng)))
         found.steps.append(controller.step(case.state, case.target, case.thrust))
     return found

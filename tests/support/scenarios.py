@@ -225,6 +225,20 @@ ALTITUDES: Final = {
 }
 """The same with other altitude loops."""
 
+LATE_THRUST: Final = tuple(
+    Scenario(
+        vehicle=CRAZYFLIE,
+        duration_s=0.5,
+        trajectory=curve,
+        size_m=1.0,
+        start_tilt_rad=(0.5, 0.0),
+        command_delay_ticks=delay_ticks,
+        dropped_share=0.2,
+    )
+    for curve, delay_ticks in (("take-off-and-landing", 50), ("height-step", 100), ("tilted-circle", 7))
+)
+"""Commands that are late for a drone on the ground, and for one that starts tilted."""
+
 BATCHES: Final = {
     "truth": TRUTH,
     "sensed": SENSED,
@@ -242,6 +256,11 @@ BATCHES: Final = {
     "touching": TOUCHING,
     "flown in space": FLOWN_IN_SPACE,
     **ALTITUDES,
+    "level by pid": tuple(one.model_copy(update={"altitude_loop": "pid"}) for one in captured(CRAZYFLIE)[:2]),
+    "late thrust": LATE_THRUST,
+    "flown take-off": (
+        Scenario(vehicle=FLOWN, duration_s=0.5, sensors="mocap", start="take-off", start_tilt_rad=(0.2, 0.1)),
+    ),
 }
 
 

@@ -211,8 +211,28 @@ def limits(draw: st.DrawFn, tilt_rad: float, most_braking_m_s2: float) -> Values
     )
 
 
+SLOW: Values = QUADRATIC | {
+    "height.climb_m_s": 0.1,
+    "height.descent_m_s": 0.1,
+    "ranges.thrust_acceleration_max_m_s2": 1000.0,
+}
+"""Values with a height beside which its other keys may have any value."""
+
+
 def base_of(path: str) -> Values:
     """Return the fewest values beside which a controller uses the key at `path`, whatever its value."""
+    if path in ("limits.fence.floor_m", "limits.fence.ceiling_m"):
+        walls = {"limits.fence.floor_m": -10000.0, "limits.fence.ceiling_m": 10000.0}
+        return WIDE | SLOW | {other: value for other, value in walls.items() if other != path}
+    if path in ("height.climb_m_s", "height.descent_m_s"):
+        strong = {
+            "height.response_time_s": 2.0,
+            "height.thrust_min_m_s2": 0.5,
+            "height.thrust_max_m_s2": 100.0,
+        }
+        return WIDE | {other: value for other, value in (SLOW | strong).items() if other != path}
+    if path.startswith("height."):
+        return SLOW
     if path.startswith("limits.fence."):
         walls = {
             f"limits.fence.{axis}_{end}_m": value

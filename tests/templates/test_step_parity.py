@@ -10,26 +10,39 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.builds import libraries, share_of
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
+from tests.support.height import HEIGHT_CORNERS, height_case
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
 from tests.support.tools import toolchain
 
-METHODS = {"one_norm": settings_case, "quadratic": quadratic_case}
-SIZES = {"one_norm": (250, 4), "quadratic": (100, 60)}
+METHODS = {"one_norm": settings_case, "quadratic": quadratic_case, "height": height_case}
+SIZES = {"one_norm": (250, 4), "quadratic": (100, 60), "height": (100, 60)}
 """Controllers and steps of a run; a flight with outages is longer than a search."""
-FEW_SETTINGS = [
-    pytest.param("one_norm", index, scalar, marks=[] if index in {2, 5} else pytest.mark.long)
-    for index in range(len(CORNER_HORIZONS) + 1)
-    for scalar in SCALARS
-] + [
-    pytest.param("quadratic", index, scalar, marks=[] if index in {1, 2} else pytest.mark.long)
-    for index in range(len(CORNER_SETTINGS) + 2)
-    for scalar in ("float32", "float64")
-]
+FEW_SETTINGS = (
+    [
+        pytest.param("one_norm", index, scalar, marks=[] if index in {2, 5} else pytest.mark.long)
+        for index in range(len(CORNER_HORIZONS) + 1)
+        for scalar in SCALARS
+    ]
+    + [
+        pytest.param("quadratic", index, scalar, marks=[] if index in {1, 2} else pytest.mark.long)
+        for index in range(len(CORNER_SETTINGS) + 2)
+        for scalar in ("float32", "float64")
+    ]
+    + [
+        pytest.param("height", index, scalar, marks=[] if index == 1 else pytest.mark.long)
+        for index in range(len(HEIGHT_CORNERS) + 3)
+        for scalar in (SCALARS if index < len(HEIGHT_CORNERS) else ("float32", "float64"))
+    ]
+)
 MANY_SETTINGS = [
     (method, index, scalar)
-    for method, scalars in (("one_norm", SCALARS), ("quadratic", ("float32", "float64")))
-    for index in range(30)
+    for method, scalars, count in (
+        ("one_norm", SCALARS, 30),
+        ("quadratic", ("float32", "float64"), 30),
+        ("height", ("float32", "float64"), 10),
+    )
+    for index in range(count)
     for scalar in scalars
 ]
 

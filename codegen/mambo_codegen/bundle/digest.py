@@ -17,7 +17,7 @@ from mambo_codegen.methods import Method, Step
 from mambo_codegen.methods.math import Real, rounded
 from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import STATE, InputLimits, Representation
+from mambo_codegen.numbers.representation import InputLimits, Representation
 
 TICKS: Final = 100
 """Steps of an episode."""
@@ -36,8 +36,8 @@ _MULTIPLIER: Final = 2654435761
 """The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
 
 Words = NDArray[np.uint32]
-StepInputs = tuple[Real, Real, Real]
-"""States (n, 7), targets (n, 4) and thrusts (n,) of one step of n controllers."""
+StepInputs = tuple[Real, Real, Real | None]
+"""States, targets and thrusts of one step of n controllers, as in `ReferenceController.step`."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,8 @@ class InputScales:
     target_motion: float
     """Of what the tracker reads: the change of the target's velocity from step to step, in m/s, or a given
     acceleration, in m/s^2; 0 without a tracker."""
+    climb_motion: float
+    """The same of the target's climb; 0 without a height."""
 
 
 def input_scales(method: Method) -> InputScales:
@@ -71,10 +73,11 @@ def input_scales(method: Method) -> InputScales:
     hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
-    tracker, motion = method.tracker, 0.0
-    if tracker:
-        most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
-        motion = min(tracker.tested_input, most)
+    motions = []
+    for tracker in (method.tracker, method.climb_tracker):
+        if tracker:
+            most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
+        motions.append(min(tracker.tested_input, most) if tracker else 0.0)
     return InputScales(
         target_position_m=position_m / unit,
         target_velocity_m_s=velocity_m_s / unit,
@@ -88,7 +91,8 @@ def input_scales(method: Method) -> InputScales:
         yaw_rad=100.0 / unit,
         thrust_acceleration_m_s2=thrust_m_s2 / unit,
         hover_m_s2=hover_m_s2,
-        target_motion=motion / unit,
+        target_motion=motions[0] / unit,
+        climb_motion=motions[1] / unit,
     )
 
 
@@ -124,9 +128,9 @@ def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
         state, target, thrust, change = _next_inputs(method, scales, generator)
         for _ in range(TICKS_PER_INPUT):
             yield (
-                numbers.to_si(state, *STATE),
+                numbers.to_si(state, *method.state),
                 numbers.to_si(target, *method.target),
-                numbers.to_si(thrust, "thrust"),
+                None if method.has_height else numbers.to_si(thrust, "thrust"),
             )
             target = target + change
 
@@ -157,7 +161,7 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
     """Draw states, targets, thrusts and changes of the targets from step to step, in numbers of the C.
 
     Five in 64 have an input out of range, six if an acceleration is given. Velocities change for a tracker
-    that measures the acceleration by them.
+    that measures the acceleration by them. With a height one drone in eight touches the floor.
     """
     numbers, limits = method.numbers, method.limits
     choice = generator.next()
@@ -175,8 +179,11 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
     state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
     state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
     state += [draw(scales.yaw_rad, "yaw")]
-    thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
-    thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+    thrust = np.full_like(state[0], limits.thrust_least)
+    if not method.has_height:
+        offset = draw(scales.thrust_acceleration_m_s2, "thrust")
+        thrust = numbers.constant(scales.hover_m_s2, "thrust") + offset
+        thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
     change = [np.zeros_like(thrust)] * len(method.target)
     if method.tracker:
         motion = [draw(scales.target_motion, method.tracker.input_quantity) for _ in range(2)]
@@ -184,6 +191,16 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
             target += motion
         else:
             change[2:4] = motion
+    if method.has_height:
+        target += [draw(scales.target_position_m, "position"), draw(scales.target_velocity_m_s, "velocity")]
+        state += [target[-2] + error(scales.error_position_m, "position")]
+        state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
+        state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
+        vertical = [draw(scales.climb_motion, tracker.input_quantity)] if (tracker := method.tracker) else []
+        if len(method.target) > len(target):
+            target += vertical
+        else:
+            change[-1:] = vertical or change[-1:]
 
     fault = (choice >> 8) & 63
     position, pitch, yaw, velocity = _out_of_range(numbers, limits)
@@ -191,8 +208,10 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
     state[5] = np.where(fault == 1, pitch, state[5])
     state[6] = np.where(fault == 2, yaw, state[6])
     target[3], change[3] = np.where(fault == 3, velocity, target[3]), np.where(fault == 3, 0, change[3])
+    if method.has_height:
+        state[8] = np.where(fault == 4, velocity, state[8])
     thrust = np.where(fault == 4, numbers.computed(0), thrust)
-    if len(target) > 4:
+    if len(method.level_target) > 4:
         target[4] = np.where(fault == 5, position, target[4])
     return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
 

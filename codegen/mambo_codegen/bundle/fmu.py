@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.limits_constants import LIMITS
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
@@ -80,7 +81,7 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
         ]
     if (limiting := method_of(settings).limiting) is not None:
         reach_m = ranges.position_m
-        speed_m_s, braking_m_s2, *walls, _ = limiting.limits.tolist()
+        speed_m_s, braking_m_s2, *walls, _ = limiting.limits[: len(LIMITS)].tolist()
         most_m_s2 = limiting.tilted.at(tilt_rad)
         variables += [
             FmuVariable(

@@ -40,6 +40,10 @@ _FORMS: Final = (
             "rate_product",
             "scaled_velocity",
             "speed_ratio",
+            "reach_product",
+            "gravity_product",
+            "step2_product",
+            "factor_product",
         ),
         "{} * {}",
     )
@@ -54,6 +58,7 @@ _FORMS: Final = (
             "attitude_sum",
             "row_sum",
             "to_move",
+            "to_factor",
         ),
         "{}",
     )
@@ -61,12 +66,14 @@ _FORMS: Final = (
         "half_change": "NMPC_HALF * {}",
         "halved": "NMPC_HALF * {}",
         "squared": "{0} * {0}",
+        "angle_square": "{0} * {0}",
         "square_sum": "({0} * {0}) + ({1} * {1})",
         "sine_difference": "({} * {}) - ({} * {})",
         "sine_sum": "({} * {}) + ({} * {})",
         "position_correction": "({} * {}) + ({} * {})",
         "velocity_correction": "({} * {}) + ({} * {})",
         "disturbance_correction": "({} * {}) + ({} * {})",
+        "gain_correction": "({} * {}) + ({} * {})",
     }
 )
 """What each product is in floating point, by the name of its function."""

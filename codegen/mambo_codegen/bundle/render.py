@@ -24,6 +24,7 @@ from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.methods.limits_context import limits_context
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -155,6 +156,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     scalar = settings.code.scalar
     return (
         products(fixed=numbers.formats is not None)
+        | {"height": None}
         | method.context
         | {
             "settings": settings,
@@ -184,6 +186,9 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "tracker": method.tracker,
             "limiting": method.limiting,
             **limits_context(method),
+            "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
+            "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
+            "level_columns": len(method.level_target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
             "given": method.tracker is not None and method.tracker.is_given,
@@ -191,6 +196,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
             "yaw_limit_rad": YAW_LIMIT_RAD,
+            "turn_rad": TURN_RAD,
+            "turns_per_rad": TURNS_PER_RAD,
             "vectors": self_test(method),
             "episodes": episode_count(method),
             "ticks": TICKS,
@@ -239,6 +246,6 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     bits = numbers.bits or {}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
-        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking")
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking", "factor")
         if name in bits
     }

@@ -19,15 +19,15 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 class SelfTestStep:
     """One step: inputs and results.
 
-    Inputs: state (7,), target (4,) or (6,), thrust. Results: status, command (2,) and
-    `Method.tested_numbers`.
+    Inputs: state and target, as in `ReferenceController.step`, and thrust, None with a height. Results:
+    status, the numbers of nmpc_command_t and `Method.tested_numbers`.
     """
 
     state: tuple[float, ...]
     target: tuple[float, ...]
-    thrust_acceleration_m_s2: float
+    thrust_acceleration_m_s2: float | None
     status: Status
-    command_rad: tuple[float, float]
+    command: tuple[float, ...]
     others: tuple[float, ...]
 
 
@@ -36,21 +36,22 @@ def self_test(method: Method) -> list[SelfTestStep]:
 
     The first input has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails. Every seventh input is out of range: first a state, then a target, then a thrust.
-    For a tracker that reads it the target's velocity changes little from step to step. The values are a Weyl
-    sequence; a library's random numbers may change with its version.
+    For a tracker that reads it the target's velocity changes little from step to step. With a height the
+    drone touches the floor in every fifth step. The values are a Weyl sequence; a library's random numbers
+    may change with its version.
     """
     settings = method.settings
     controller = method.reference_controller()
 
     def step(state: list[float], target: list[float], thrust: float) -> SelfTestStep:
-        made = controller.step([state], [target], [thrust])
-        roll_rad, pitch_rad = made.command_rad[0].tolist()
+        given = None if method.has_height else thrust
+        made = controller.step([state], [target], None if given is None else [given])
         return SelfTestStep(
             state=tuple(state),
             target=tuple(target),
-            thrust_acceleration_m_s2=thrust,
+            thrust_acceleration_m_s2=given,
             status=Status(int(made.status[0])),
-            command_rad=(roll_rad, pitch_rad),
+            command=method.command_of(made),
             others=method.tested_numbers(made),
         )
 
@@ -59,10 +60,11 @@ def self_test(method: Method) -> list[SelfTestStep]:
     spread = _weyl_sequence()
     scalar = settings.code.scalar
     tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
-    steps = [step([tiny] + [0.0] * 6, [0.0] * len(method.target), hover_thrust(settings))]
+    still = [tiny] + [0.0] * (len(method.state) - 1)
+    steps = [step(still, [0.0] * len(method.target), hover_thrust(settings))]
     tracker = method.tracker
     measures = tracker is not None and not tracker.is_given
-    velocity_m_s, change_m_s = [0.0, 0.0], speed_m_s
+    velocity_m_s, change_m_s, climb_m_s = [0.0, 0.0], speed_m_s, 0.0
     if tracker and measures:
         change_m_s = min(tracker.tested_input, speed_m_s / 8)
     for index in range(1, STEPS):
@@ -75,6 +77,13 @@ def self_test(method: Method) -> list[SelfTestStep]:
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
         if tracker and tracker.is_given:
             target += [_next(spread, tracker.input_limit / 2) for _ in range(2)]
+        if method.has_height:
+            goal_m, climb_change_m_s = _next(spread, position_m), _next(spread, change_m_s)
+            climb_m_s = (climb_m_s * measures) + climb_change_m_s
+            state += [goal_m + _next(spread, 0.15 * position_m), climb_m_s + _next(spread, 0.5 * speed_m_s)]
+            state += [float(index % 5 == 4)]
+            given = [_next(spread, tracker.input_limit / 2)] if tracker else []
+            target = [*target, goal_m, climb_m_s, *given][: len(method.target)]
         thrust = hover_thrust(settings, _next(spread, 2.0))
         if index % 7 == 6:
             match index // 7:
@@ -83,6 +92,7 @@ def self_test(method: Method) -> list[SelfTestStep]:
                 case 1:
                     target[3] = -2 * ranges.velocity_m_s
                 case _:
+                    state[7:8] = [2 * ranges.position_m] * len(state[7:8])
                     thrust = 0.0
         steps.append(step(state, target, thrust))
     return steps

@@ -11,7 +11,18 @@ from mambo_codegen.methods.limits_constants import LimitsConstants
 from mambo_codegen.methods.rate_feedback import feedback_steps
 from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import Formats
-from mambo_codegen.numbers.representation import ACCELERATION, TARGET, WEIGHTS, InputLimits, Representation
+from mambo_codegen.numbers.representation import (
+    ACCELERATION,
+    COMMAND,
+    CONTACT,
+    HEIGHT,
+    STATE,
+    TARGET,
+    THRUST,
+    WEIGHTS,
+    InputLimits,
+    Representation,
+)
 from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.sections import Sections
@@ -47,15 +58,43 @@ class Constants(ABC):
         """The constants of the target tracker, in float64; None with `target.acceleration = "none"`."""
         return tracker_constants(self.settings, self.step_s)
 
+    @property
+    def climb_tracker(self) -> TrackerConstants | None:
+        """The constants of the tracker of the target's height; None without one."""
+        return None
+
     @cached_property
     def feedback_steps(self) -> tuple[float, float] | None:
         """Commands of roll and pitch per change of the angle in an update period; None without feedback."""
         return feedback_steps(self.settings)
 
     @property
+    def has_height(self) -> bool:
+        """Whether the controller has the height for a third axis, and commands the thrust."""
+        return self.settings.height is not None
+
+    @property
+    def state(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_state_t, in their order."""
+        return (*STATE, *HEIGHT, *CONTACT) if self.has_height else STATE
+
+    @property
+    def level_target(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_target_t but those of the height, in their order."""
+        return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
+
+    @property
     def target(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_target_t, in their order."""
-        return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
+        level = self.level_target
+        if not self.has_height:
+            return level
+        return (*level, *HEIGHT, *(THRUST if len(level) > len(TARGET) else ()))
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_command_t, in their order."""
+        return (*COMMAND, *THRUST) if self.has_height else COMMAND
 
     @cached_property
     def numbers(self) -> Representation:

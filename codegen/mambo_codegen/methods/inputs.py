@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.numbers.representation import COMMAND, STATE, THRUST
+from mambo_codegen.numbers.representation import STATE, THRUST
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -37,21 +37,31 @@ class Inputs:
 
     def __init__(self, constants: Constants) -> None:
         self._numbers, self._target = constants.numbers, constants.target
+        self._state, self._command = constants.state, constants.command
+        self._level_columns, self._has_height = len(constants.level_target), constants.has_height
         self.limits = constants.limits
 
     def quantize(
-        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None
     ) -> tuple[Real, Real, Real]:
         """Return states (n, 7), targets (n, k) and thrusts (n,) as numbers; k is 4, or 6 with accelerations.
 
-        The columns of a target beyond k are ignored.
+        With a height states are (n, 10), and targets have 2 columns more, or 3; there is no thrust, and the
+        numbers are the least. The columns of a target beyond k are ignored. Raises ValueError for a thrust
+        that is missing, or that there is not.
         """
-        thrusts = np.asarray(thrust_acceleration_m_s2)[:, None]
-        return (
-            self.numbers(state, STATE),
-            self.numbers(np.asarray(target)[:, : len(self._target)], self._target),
-            self.numbers(thrusts, THRUST)[:, 0],
-        )
+        if (thrust_acceleration_m_s2 is None) != self._has_height:
+            raise ValueError(
+                "with [height] a step takes no thrust"
+                if self._has_height
+                else "without [height] a step takes the thrust"
+            )
+        states = self.numbers(state, self._state)
+        if thrust_acceleration_m_s2 is None:
+            thrusts = np.full(len(states), self.limits.thrust_least)
+        else:
+            thrusts = self.numbers(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
+        return states, self.numbers(np.asarray(target)[:, : len(self._target)], self._target), thrusts
 
     def numbers(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
         """Return `values` as numbers, in the type that the reference computes with."""
@@ -59,7 +69,7 @@ class Inputs:
 
     def check(self, state: Real, target: Real, thrust: Real) -> tuple[Rows, Rows, Rows]:
         """Return whether each state, each target and each thrust (n,) is finite and within its range."""
-        limits = self.limits
+        limits, level = self.limits, self._level_columns
         good_state = (
             within(state[:, 0:2], limits.position)
             & within(state[:, 2:4], limits.velocity)
@@ -69,8 +79,15 @@ class Inputs:
         good_target = (
             within(target[:, 0:2], limits.position)
             & within(target[:, 2:4], limits.velocity)
-            & within(target[:, 4:], limits.thrust_most)
+            & within(target[:, 4:level], limits.thrust_most)
         )
+        if self._has_height:
+            first = len(STATE)
+            good_state &= within(state[:, first : first + 1], limits.position)
+            good_state &= within(state[:, first + 1 : first + 2], limits.velocity)
+            good_target &= within(target[:, level : level + 1], limits.position)
+            good_target &= within(target[:, level + 1 : level + 2], limits.velocity)
+            good_target &= within(target[:, level + 2 :], limits.thrust_most)
         good_thrust: Rows = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
         return good_state, good_target, good_thrust
 
@@ -82,10 +99,15 @@ class Inputs:
             Status.OK,
         )
 
-    def command(self, command_rad: ArrayLike) -> tuple[Real, Rows]:
-        """Return commands (n, 2) clamped to the tilt limit, and whether each may be set."""
-        given = self.numbers(command_rad, COMMAND)
-        return clamp(given, self.limits.tilt), within(given, self.limits.attitude)
+    def command(self, command: ArrayLike) -> tuple[Real, Rows]:
+        """Return commands (n, 2) clamped to the tilt limit, and whether each may be set.
+
+        With a height they have the thrust for a third column, which is not limited.
+        """
+        given = self.numbers(command, self._command)
+        angles = given[:, 0:2]
+        good = within(angles, self.limits.attitude) & within(given[:, 2:], self.limits.thrust_most)
+        return np.concatenate([clamp(angles, self.limits.tilt), given[:, 2:]], axis=1), good
 
 
 def within(values: Real, limit: Any) -> Rows:
@@ -95,10 +117,15 @@ def within(values: Real, limit: Any) -> Rows:
 
 
 def choose(chosen: Rows, new: Record, old: Record) -> Record:
-    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else those of `old`."""
+    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else those of `old`.
+
+    What one of them does not have, which is None, neither has.
+    """
 
     def rows(name: str) -> Any:
         ours, theirs = getattr(new, name), getattr(old, name)
+        if ours is None:
+            return None
         if is_dataclass(ours):
             return choose(chosen, ours, theirs)
         return np.where(chosen.reshape(-1, *[1] * (ours.ndim - 1)), ours, theirs)

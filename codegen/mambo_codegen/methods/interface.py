@@ -35,16 +35,22 @@ class ReferenceController(Protocol):
 
     memory: Any
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> Step:
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
         target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
         thrust_acceleration_m_s2 (n,): thrust over mass, up.
+
+        With [height] state (n, 10) has height (m), climb (m/s) and contact with the floor (0 or 1) besides,
+        up positive; target has height and climb besides, and the climb's acceleration (m/s^2) where the
+        acceleration is given; and there is no thrust, which the controller commands.
         """
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Forget the past, and hold `command_rad` (n, 2)."""
+        """Forget the past, and hold `command_rad` (n, 2), with [height] (n, 3): the thrust over mass too."""
 
     @property
     def stored_limits(self) -> Real:
@@ -113,7 +119,10 @@ class Method(Constants):
     @property
     def chapters(self) -> tuple[tuple[str, str], ...]:
         """The chapters of nmpc.c with these settings, and a word on each."""
-        needs = ("tracker", self.tracker), ("limits", self.limiting), ("float", self.numbers.formats)
+        needs = (
+            *(("tracker", self.tracker), ("height", self.has_height), ("limits", self.limiting)),
+            ("float", self.numbers.formats),
+        )
         absent = {name for name, needed in needs if not needed}
         return tuple(item for item in self.sub_blocks.items() if item[0] not in absent)
 
@@ -140,6 +149,11 @@ class Method(Constants):
                 for one in self.results
             }
         )
+
+    def command_of(self, step: Any) -> tuple[float, ...]:
+        """Return the numbers of nmpc_command_t that a step of one controller gives, in SI units."""
+        thrust = [step.thrust_m_s2[0].item()] if self.has_height else []
+        return (*step.command_rad[0].tolist(), *thrust)
 
     @abstractmethod
     def tested_numbers(self, step: Any) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.limits_arithmetic import limits_arithmetic
-from mambo_codegen.methods.limits_constants import LIMITS, SPELLING, LimitsConstants
+from mambo_codegen.methods.limits_constants import SPELLING, LimitsConstants
 from mambo_codegen.methods.math import Real, clamp, larger, smaller
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -26,6 +26,7 @@ class ActiveLimit(IntFlag):
     BRAKING = 2
     FENCE = 4
     TILT = 8
+    HEIGHT = 16
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ class LimitsLaw:
     def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
         self._products = limits_arithmetic(constants, limits)
         self._numbers, self._ranges = constants.numbers, constants.limits
+        self._quantities = limits.quantities
         constant = self._numbers.constant
         self._smallest_speed = constant(SMALLEST_LIMIT, "velocity")
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
@@ -89,11 +91,11 @@ class LimitsLaw:
         self.defaults: Real = self.quantize([limits.limits])
 
     def quantize(self, limits: ArrayLike) -> Real:
-        """Return limits (n, 7), of the quantities LIMITS, as numbers."""
-        return self._numbers.quantize(limits, LIMITS).astype(self._numbers.computed)
+        """Return limits (n, k), of the constants' quantities, as numbers."""
+        return self._numbers.quantize(limits, self._quantities).astype(self._numbers.computed)
 
     def check(self, limits: Real) -> Rows:
-        """Return whether limits (n, 7) may be set (n,); not if one is NaN."""
+        """Return whether limits (n, k) may be set (n,), but for those of the height; not if one is NaN."""
         speed, braking, tilt = limits[:, 0], limits[:, 1], limits[:, 6]
         low, high, reach = limits[:, 2:4], limits[:, 4:6], self._ranges.position
         most = self._products.tilt_product(self._slope, tilt) - self._trim
@@ -109,7 +111,7 @@ class LimitsLaw:
         return good
 
     def bounds(self, limits: Real) -> Bounds:
-        """Derive what the steps need from good limits (n, 7)."""
+        """Derive what the steps need from good limits (n, k), but for those of the height."""
         products, speed = self._products, limits[:, 0]
         low, high = limits[:, 2:4], limits[:, 4:6]
         braking = products.least_braking(limits[:, 1] + limits[:, 1], speed)

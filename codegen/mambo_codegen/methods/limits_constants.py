@@ -32,6 +32,9 @@ SPELLING: Final = 1.0005
 LIMITS: Final = ("velocity", "braking", *["position"] * 4, "angle")
 """The quantity of each number in nmpc_limits_t, in their order."""
 
+HEIGHT_LIMITS: Final = ("position", "position", "velocity", "velocity")
+"""The same of the further ones with a height: floor, ceiling, climb and descent."""
+
 LATER_LIMITS: Final = ("limits.speed_m_s", "limits.braking_m_s2", "limits.fence")
 """Keys that the settings' digest leaves out at their defaults."""
 
@@ -61,7 +64,7 @@ class LimitsConstants:
     approach_1_s: k.
     tilted:       what the tilt limit gives.
     limits:       (7,) the limits of the settings, of the quantities LIMITS: a missing one is the widest that
-                  may be set.
+                  may be set. With a height (11,), HEIGHT_LIMITS too.
     steps_per_s:  the update rate.
     """
 
@@ -69,6 +72,11 @@ class LimitsConstants:
     tilted: TiltAcceleration
     limits: NDArray[np.float64]
     steps_per_s: float
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantity of each limit."""
+        return (*LIMITS, *HEIGHT_LIMITS)[: len(self.limits)]
 
     @property
     def knee_s2(self) -> float:
@@ -95,7 +103,10 @@ def limits_constants(
         approach_1_s=approach_1_s,
         tilted=tilted,
         limits=np.array(
-            [limits.speed_m_s or ranges.velocity_m_s, braking_m_s2, *low, *high, limits.tilt_rad]
+            [
+                *(limits.speed_m_s or ranges.velocity_m_s, braking_m_s2, *low, *high, limits.tilt_rad),
+                *_height_limits(settings),
+            ]
         ),
         steps_per_s=1 / settings.horizon.update_period_s,
     )
@@ -141,7 +152,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
         return dict.fromkeys(("braking", "approach", "knee", "slope", "rate"), 0)
     slope = found.tilted.slope_m_s2_rad
     return {
-        "braking": fractional_bits(16 * slope * found.limits[-1]),
+        "braking": fractional_bits(16 * slope * found.limits[LIMITS.index("angle")]),
         "approach": min(fractional_bits(found.approach_1_s), 29 + velocity - position),
         "knee": fractional_bits(found.knee_s2),
         "slope": fractional_bits(SPELLING * slope),
@@ -152,6 +163,16 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
 def stored_quantities(*command: str) -> tuple[str, ...]:
     """Return the quantity of each number in nmpc_bounds_t; `command` are those of the command limits."""
     return (*["position"] * 5, "velocity", "braking", "angle", *command)
+
+
+def _height_limits(settings: Sections) -> tuple[float, ...]:
+    """Return floor, ceiling, climb and descent; none without a height."""
+    height, fence, reach_m = settings.height, settings.limits.fence, settings.ranges.position_m
+    if height is None:
+        return ()
+    is_walled = fence.floor_m < fence.ceiling_m
+    walls = (fence.floor_m, fence.ceiling_m) if is_walled else (-reach_m, reach_m)
+    return (*walls, height.climb_m_s, height.descent_m_s)
 
 
 ONE_NORM_TILT: Final = TiltAcceleration(GRAVITY_M_S2, 0.0)

@@ -13,7 +13,7 @@ from mambo_codegen.methods.limits_arithmetic import (
     ROOT_ERROR,
     STARTS,
 )
-from mambo_codegen.methods.limits_constants import ROOT_BITS, SHARE_BITS, SPELLING
+from mambo_codegen.methods.limits_constants import ROOT_BITS, SHARE_BITS, SPELLING, stored_quantities
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -31,6 +31,9 @@ def limits_context(method: Method) -> dict[str, object]:
     start = (
         FIXED_START if fixed else f"0x{STARTS[numbers.scalar][1]:X}{'UL' if scalar == 'float32' else 'ULL'}"
     )
+    stored = method.reference_controller().stored_limits[0].tolist()
+    bounds = [str(number) if fixed else literals.real(float(number), scalar) for number in stored]
+    others = bounds[len(stored_quantities()) :]
     return {
         "limit_bits": {limit.name: limit.value for limit in ActiveLimit},
         "smallest_limit": SMALLEST_LIMIT,
@@ -39,10 +42,9 @@ def limits_context(method: Method) -> dict[str, object]:
         "root_start": start,
         "root_iterations": FIXED_ITERATIONS if fixed else ITERATIONS[numbers.scalar],
         "limits_shifts": limits_shifts(numbers.bits) if numbers.bits is not None else None,
-        "default_bounds": [
-            str(number) if fixed else literals.real(float(number), scalar)
-            for number in method.reference_controller().stored_limits[0].tolist()
-        ],
+        "default_bounds": bounds,
+        "default_target_bounds": others[-6:-4] if method.has_height else others[-2:],
+        "default_height_bounds": others[-4:],
         "outage_steps": method.outage_steps,
         "least_square": LEAST_SQUARE,
         "root_limit": 2 / math.sqrt(LEAST_SQUARE),

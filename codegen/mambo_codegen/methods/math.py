@@ -73,6 +73,13 @@ def clamp(values: Real, limit: Any) -> Real:
     return clamped
 
 
+def confine(values: Real, low: Any, high: Any) -> Real:
+    """Saturate `values` at `low` and `high`, with the comparisons of the C."""
+    limited = np.where(values > high, high, values)
+    confined: Real = np.where(limited < low, low, limited)
+    return confined
+
+
 def smaller(a: Real, b: Real) -> Real:
     """Return the smaller numbers, with the comparison of the C."""
     least: Real = np.where(a < b, a, b)

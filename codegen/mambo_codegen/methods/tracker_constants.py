@@ -55,13 +55,18 @@ class TrackerConstants:
         return 1.25 * self.input_limit
 
 
-def tracker_constants(settings: Sections, step_s: float) -> TrackerConstants | None:
-    """Derive the constants of the tracker for the prediction step tau; None if `settings` have none."""
+def tracker_constants(
+    settings: Sections, step_s: float, jump_m_s2: float | None = None
+) -> TrackerConstants | None:
+    """Derive the constants of the tracker for the prediction step tau; None if `settings` have none.
+
+    `jump_m_s2` is the acceleration from which on the target has jumped; None for what the tilt limit gives.
+    """
     if settings.target.acceleration == "none":
         return None
     is_given, ranges = settings.target.acceleration == "given", settings.ranges
     update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
-    acceleration_m_s2 = JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad
+    acceleration_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
     if is_given:
         input_limit = min(acceleration_m_s2, ranges.thrust_acceleration_max_m_s2)
         factor = step_s * step_s

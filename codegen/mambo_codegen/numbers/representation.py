@@ -19,6 +19,8 @@ TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
 ACCELERATION: Final = ("thrust", "thrust")
 THRUST: Final = ("thrust",)
 COMMAND: Final = ("angle", "angle")
+HEIGHT: Final = ("position", "velocity")
+CONTACT: Final = ("whole",)
 WEIGHTS: Final = ("tracking", "effort")
 """The quantity of each column of an input."""
 

@@ -4,7 +4,7 @@ from typing import Final
 
 from pydantic.fields import FieldInfo
 
-from mambo_codegen.settings.fields import SettingsSection
+from mambo_codegen.settings.fields import SettingsSection, type_of
 from mambo_codegen.settings.key import Form, Key, key_of
 from mambo_codegen.settings.model import Settings
 
@@ -18,7 +18,7 @@ KEYS: dict[str, Key] = {}
 def _collect(path: str, section: FieldInfo) -> None:
     """Add the section at `path`, its keys, and then the sections in it."""
     SECTIONS[path] = section.description or ""
-    model = type(section.default)
+    model = type_of(section)
     schemas = model.model_json_schema()["properties"]
     inner = {
         name: field

@@ -57,7 +57,7 @@ def with_option(settings: Settings, path: str, value: object, source: str = "set
 def with_value(document: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:
     """Return `document` with `value` at the dotted `path`."""
     name, _, rest = path.partition(".")
-    return {**document, name: with_value(document.get(name, {}), rest, value) if rest else value}
+    return {**document, name: with_value(document.get(name) or {}, rest, value) if rest else value}
 
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:

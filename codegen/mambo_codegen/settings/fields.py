@@ -1,9 +1,10 @@
 """What the sections of the settings share: their base, the types of their numbers, and marks of keys."""
 
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 SHORTEST_LAG_S: Final = 0.001
@@ -28,6 +29,13 @@ def _none_or_lag(value: float) -> float:
     return value
 
 
+def _none_or_delay(value: float) -> float:
+    """Return a dead time in seconds; refuse one between 0 and SHORTEST_LAG_S."""
+    if 0 < value < SHORTEST_LAG_S:
+        raise PydanticCustomError("delay", f"must be 0 or lie in {SHORTEST_LAG_S}..0.1; 0 means no dead time")
+    return value
+
+
 def _none_or_ramp(value: float) -> float:
     """Return a ramp in seconds; refuse one between 0 and SHORTEST_RAMP_S."""
     if 0 < value < SHORTEST_RAMP_S:
@@ -47,6 +55,14 @@ Lag = Annotated[
     float,
     Field(ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}),
     AfterValidator(_none_or_lag),
+    AfterValidator(_without_minus_zero),
+]
+Delay = Annotated[
+    float,
+    Field(
+        ge=0, le=0.1, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}
+    ),
+    AfterValidator(_none_or_delay),
     AfterValidator(_without_minus_zero),
 ]
 Ramp = Annotated[
@@ -82,8 +98,16 @@ class OnlyFor:
     norm: str
 
 
+@dataclass(frozen=True)
+class OnlyWith:
+    """Marks a section or a key that only controllers with this optional section use."""
+
+    section: str
+
+
 ONE_NORM: Final = OnlyFor("1-norm")
 QUADRATIC: Final = OnlyFor("quadratic")
+WITH_HEIGHT: Final = OnlyWith("height")
 
 
 class SettingsSection(BaseModel):
@@ -98,3 +122,9 @@ class SettingsSection(BaseModel):
         defer_build=True,
         field_title_generator=lambda name, _: name,
     )
+
+
+def type_of(field: FieldInfo) -> type[Any]:
+    """Return the section that `field` is, also if it is optional; else the type of its default."""
+    kinds = (kind for kind in get_args(field.annotation) if isinstance(kind, type))
+    return next((kind for kind in kinds if issubclass(kind, SettingsSection)), type(field.default))

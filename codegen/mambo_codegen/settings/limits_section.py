@@ -1,15 +1,22 @@
 """The section of the limits: of commands, speed, braking and place."""
 
 import math
+from typing import Annotated
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from mambo_codegen.settings.fields import BrakingLimit, Number, SettingsSection, SpeedLimit
+from mambo_codegen.settings.fields import (
+    WITH_HEIGHT,
+    BrakingLimit,
+    Number,
+    SettingsSection,
+    SpeedLimit,
+)
 
 
 class Fence(SettingsSection):
-    """A box that the drone stays in, along x and y of the world: north and east."""
+    """A box that the drone stays in, along x and y of the world: north and east; with [height] upwards."""
 
     x_min_m: Number = Field(0.0, ge=-10000, le=9999, description="Least x in the fence, in metres.")
     x_max_m: Number = Field(
@@ -26,10 +33,21 @@ class Fence(SettingsSection):
         description="Largest y in the fence, in metres; more than y_min_m. Both 0 for no walls along y.",
     )
 
-    @field_validator("x_max_m", "y_max_m")
+    floor_m: Annotated[Number, WITH_HEIGHT] = Field(
+        0.0, ge=-10000, le=9999, description="Least height in the fence, in metres."
+    )
+    ceiling_m: Annotated[Number, WITH_HEIGHT] = Field(
+        0.0,
+        ge=-9999,
+        le=10000,
+        description="Largest height in the fence, in metres; more than floor_m. Both 0 for neither.",
+    )
+
+    @field_validator("x_max_m", "y_max_m", "ceiling_m")
     @classmethod
     def _max_above_min(cls, largest: float, info: ValidationInfo) -> float:
-        other = f"{(info.field_name or '')[0]}_min_m"
+        name = info.field_name or ""
+        other = "floor_m" if name == "ceiling_m" else f"{name[0]}_min_m"
         smallest = info.data.get(other, -math.inf)
         if largest <= smallest and not largest == smallest == 0:
             raise PydanticCustomError("fence", f"must be more than {smallest!r} (limits.fence.{other})")

@@ -18,7 +18,7 @@ class Settings(Sections):
 
     @model_validator(mode="after")
     def _obeys_joint_rules(self) -> Self:
-        refused = list(self._unused()) or method_of(self).refusals()
+        refused = self._misplaced() or list(self._unused()) or method_of(self).refusals()
         if refused:
             raise ValidationError.from_exception_data(
                 "Settings",
@@ -33,15 +33,20 @@ class Settings(Sections):
             )
         return self
 
+    def _misplaced(self) -> list[Refusal]:
+        """Refuse a section that needs another method."""
+        if self.height is None or self.cost.norm == "quadratic":
+            return []
+        return [Refusal("cost", "norm", 'must be "quadratic" with [height]')]
+
     def _unused(self) -> Iterator[Refusal]:
         """Refuse every value that would have no effect, unless it is the default."""
         for section, values in self.values.items():
             for name, value in values.items():
                 path = f"{section}.{name}"
-                if not self.uses(path) and value != DEFAULTS.value(path):
-                    yield Refusal(
-                        section, name, f'has no effect with cost.norm = "{self.cost.norm}"; leave it out'
-                    )
+                unmet = self.unmet(path)
+                if unmet and value != DEFAULTS.value(path):
+                    yield Refusal(section, name, f"has no effect {unmet}; leave it out")
 
     @property
     def in_use(self) -> dict[str, dict[str, Any]]:

@@ -12,8 +12,21 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from mambo_codegen.settings import reserved
-from mambo_codegen.settings.fields import ONE_NORM, QUADRATIC, Lag, Number, OnlyFor, Ramp, SettingsSection
+from mambo_codegen.settings.fields import (
+    ONE_NORM,
+    QUADRATIC,
+    WITH_HEIGHT,
+    Lag,
+    Number,
+    OnlyFor,
+    OnlyWith,
+    Ramp,
+    SettingsSection,
+    type_of,
+)
+from mambo_codegen.settings.height_section import Height
 from mambo_codegen.settings.limits_section import Limits
+from mambo_codegen.settings.optimizer_section import Optimizer
 
 
 class Horizon(SettingsSection):
@@ -274,79 +287,6 @@ class Damping(SettingsSection):
     )
 
 
-class Optimizer(SettingsSection):
-    """The search for the moves by resilient backpropagation (RPROP)."""
-
-    variant: Literal["rprop+", "irprop-"] = Field(
-        "rprop+",
-        description='What RPROP does when a gradient changes its sign: "rprop+" restores the previous move '
-        '(Riedmiller and Braun 1993), "irprop-" keeps the move and makes a smaller step in the next '
-        "iteration (Igel and Huesken 2000).",
-    )
-    iterations: int = Field(
-        5,
-        ge=1,
-        le=100,
-        description="I_max, iterations in every control step; each evaluates the cost once (Table I).",
-    )
-    tolerance: Number = Field(
-        0.05,
-        ge=0,
-        le=1e6,
-        description="epsilon, in units of the cost: when the cost changes by less from one iteration to the "
-        "next, the search has converged and the plan no longer changes (Table I).",
-    )
-    initial_step_rad: Number = Field(
-        0.01,
-        ge=1e-6,
-        le=1,
-        description="U_step or Delta_0, in radians: initial step size of every search (Table I).",
-    )
-    increase: Number = Field(
-        1.2,
-        ge=1,
-        le=10,
-        description="eta+: factor of the step size while the gradient keeps its sign (Table I).",
-    )
-    decrease: Number = Field(
-        0.8,
-        ge=0.01,
-        le=1,
-        description="eta-: factor of the step size when the gradient changes its sign (Table I).",
-    )
-    step_max_rad: Number = Field(
-        0.1, ge=1e-6, le=1, description="Delta_max, in radians: the largest step size (Table I)."
-    )
-    step_min_rad: Number = Field(
-        1e-6, ge=1e-9, le=1, description="Delta_min, in radians: the smallest step size (Table I)."
-    )
-    warm_start: Literal["last_command", "plan"] = Field(
-        "last_command",
-        description='Omega_k, the initial guess of every search: "last_command" sets all moves to the last '
-        'command, "plan" keeps the last plan. The paper does not say which.',
-    )
-
-    @field_validator("step_max_rad")
-    @classmethod
-    def _max_above_initial(cls, step_max: float, info: ValidationInfo) -> float:
-        initial = info.data.get("initial_step_rad", step_max)
-        if step_max < initial:
-            raise PydanticCustomError(
-                "step", f"must lie in {initial!r}..1 (at least optimizer.initial_step_rad)"
-            )
-        return step_max
-
-    @field_validator("step_min_rad")
-    @classmethod
-    def _min_below_initial(cls, step_min: float, info: ValidationInfo) -> float:
-        initial = info.data.get("initial_step_rad", step_min)
-        if step_min > initial:
-            raise PydanticCustomError(
-                "step", f"must lie in 1e-9..{initial!r} (at most optimizer.initial_step_rad)"
-            )
-        return step_min
-
-
 class Ranges(SettingsSection):
     """The ranges of the inputs; a step refuses an input out of range with a status."""
 
@@ -439,32 +379,48 @@ class Sections(SettingsSection):
         Optimizer(), description="The RPROP search for the moves."
     )
     limits: Limits = Field(Limits(), description="The limits of commands, speed, braking and place.")
+    height: Annotated[Height | None, QUADRATIC, WITH_HEIGHT] = Field(
+        None,
+        description="The height as a third axis of the controller, whose command is the thrust. Without this "
+        "section it commands roll and pitch alone.",
+    )
     ranges: Ranges = Field(
         Ranges(), description="The ranges of the inputs; a step refuses an input out of range with a status."
     )
     code: Code = Field(Code(), description="Types and names of the C.")
 
     def uses(self, path: str) -> bool:
-        """Return whether a controller with the norm of these settings uses the key at a dotted path."""
+        """Return whether a controller with these settings uses the key or section at a dotted path."""
+        return self.unmet(path) is None
+
+    def unmet(self, path: str) -> str | None:
+        """Return why a controller with these settings does not use a dotted path; None if it does."""
         model, metadata = type(self), []
         for name in path.split("."):
             field = model.model_fields[name]
             metadata += field.metadata
-            model = type(field.default)
-        return all(mark.norm == self.cost.norm for mark in metadata if isinstance(mark, OnlyFor))
+            model = type_of(field)
+        for mark in metadata:
+            if isinstance(mark, OnlyFor) and mark.norm != self.cost.norm:
+                return f'with cost.norm = "{self.cost.norm}"'
+            if isinstance(mark, OnlyWith) and getattr(self, mark.section) is None:
+                return f"without [{mark.section}]"
+        return None
 
     def value(self, path: str) -> Any:
-        """Return the value at a dotted path: that of a key, or a section."""
+        """Return the value at a dotted path: of a key, or a section; of an absent section the default."""
         found: Any = self
         for name in path.split("."):
+            if found is None:
+                found = Height()
             found = getattr(found, name)
         return found
 
     @property
     def values(self) -> dict[str, dict[str, Any]]:
-        """All values, by the dotted paths of their sections, in the order of the file."""
+        """All values, by the dotted paths of their sections, in the order of the file; no absent section."""
         found: dict[str, dict[str, Any]] = {}
-        for section, values in self.model_dump().items():
+        for section, values in self.model_dump(exclude_none=True).items():
             found[section] = {name: value for name, value in values.items() if not isinstance(value, dict)}
             inner = {name: value for name, value in values.items() if isinstance(value, dict)}
             found |= {f"{section}.{name}": value for name, value in inner.items()}

@@ -139,6 +139,17 @@ static void step(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_step(self, &state, &target, input[11], NULL);
 }
 
+/* Slew any heading by any change. */
+static void slew_heading(void)
+{
+    const nmpc_real_t range_rad = NMPC_YAW_RANGE_RAD;
+    const nmpc_real_t next_rad = nmpc_slew_heading(any_number(), any_number(), any_number());
+
+    (void)range_rad;
+    (void)next_rad;
+    /*@ assert heading_is_within_the_range: -range_rad <= next_rad <= range_rad; */
+}
+
 static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
@@ -203,6 +214,7 @@ void take_numbers(void)
 {
     nmpc_t controller;
 
+    slew_heading();
     nmpc_init(&controller);
     while (any_int != 0) {
         nmpc_t *self = (any_int != 0) ? &controller : NULL;

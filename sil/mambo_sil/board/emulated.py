@@ -11,16 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.bundle.digest import TICKS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
+from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulation.avr_machine import Long
 from mambo_sil.board.emulation.machine import TIME_LIMIT_S, start
 from mambo_sil.board.firmware.firmware_build import Builder
 from mambo_sil.errors import EmulatorError
-from mambo_sil.flight.controllers.compiled import DIRT, as_arrays, empty_outcome
+from mambo_sil.flight.controllers.compiled import DIRT, as_array, as_arrays, empty_outcome
 from mambo_sil.flight.controllers.controller_library import batch_source, with_default_prefix
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
-"""Functions of the emulated program that Python calls."""
+"""Functions of the emulated program that Python calls; with a height nmpc_batch_set_thrust, too."""
 
 _MAX_WORK: Final = 2_000
 """Most prediction steps x moves x iterations in one call, so that it ends within its time limit."""
@@ -35,7 +36,8 @@ _MAX_PADDING: Final = 16
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
     """Build the program for an emulated core: the bundle of `settings` and a loop over n controllers."""
     files = render(with_default_prefix(settings), with_digest=False)
-    return builder.guest(files, batch_source(), GUEST, folder)
+    functions = GUEST if settings.height is None else (*GUEST, "nmpc_batch_set_thrust")
+    return builder.guest(files, batch_source(), functions, folder)
 
 
 class EmulatedController:
@@ -59,7 +61,10 @@ class EmulatedController:
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
         sizes = [
             self._instance_bytes,
-            *(width * np.dtype(self.scalar).itemsize for width in (7, len(self._method.target), 1)),
+            *(
+                width * np.dtype(self.scalar).itemsize
+                for width in (len(self._method.state), len(self._method.target), 1)
+            ),
         ]
         sizes += [values.nbytes for values in one.values()]
         overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
@@ -79,23 +84,30 @@ class EmulatedController:
         for batch in self._batches():
             self._run_batch(batch, "nmpc_batch_init")
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
-        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
-
-        `CompiledController.step` explains k.
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> Any:
+        """Compute the next commands; the inputs are those of `CompiledController.step`.
 
         Returns the `step_type` of the method.
         """
         inputs = as_arrays(self._method, self._n, state, target, thrust_acceleration_m_s2)
         outcome = self._empty_outcome(self._n)
         for batch in self._batches():
-            for address, values in zip(self._inputs, inputs, strict=True):
+            for address, values in zip(self._inputs, inputs, strict=False):  # with a height without thrust
                 self.machine.write(address, values[batch].tobytes())
             self._run_batch(batch, "nmpc_batch_step", *self._inputs, self._outcome)
             for name, values in outcome.items():
                 content = self.machine.read(self._outputs[name], values[batch].nbytes)
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
         return self._method.make_step(outcome)
+
+    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+        """Tell that the drones got thrusts over mass (n,), with a height; one that is NaN changes nothing."""
+        numbers = as_array(self._numbers, np.asarray(thrust_m_s2)[:, np.newaxis], THRUST, (self._n, 1))
+        for batch in self._batches():
+            self.machine.write(self._inputs[2], numbers[batch].tobytes())
+            self._run_batch(batch, "nmpc_batch_set_thrust", self._inputs[2])
 
     def save(self) -> bytes:
         """Return the instances as they are now."""

@@ -21,7 +21,8 @@ Walls = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max of a fence, m; infinity for no wall."""
 
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
-"""The numbers of nmpc_limits_t, in their order."""
+HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
+"""The numbers of nmpc_limits_t, in their order; the last are those of a controller of the height."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ def with_limits(settings: Settings, **changed: float) -> tuple[float, ...]:
         raise FlightError(
             "the settings have no limits: give limits.speed_m_s, limits.braking_m_s2 or a fence"
         )
-    own = dict(zip(LIMITS, limiting.limits.tolist(), strict=True))
+    own = dict(zip((*LIMITS, *HEIGHT_LIMITS), limiting.limits.tolist(), strict=False))
     return tuple((own | changed).values())
 
 

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.representation import COMMAND
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -32,8 +34,10 @@ from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
+from mambo_sil.flight.controllers.thrust_controller import flown, lifts, numbers_of
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
+from mambo_sil.flight.thrust_delivery import ThrustDelivery
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace
 from mambo_sil.flight.trajectories import Trajectory, is_spatial, vertical_of
 
@@ -61,7 +65,10 @@ class Outcome(Protocol):
 
     @property
     def status(self) -> IntArray:
-        """0 where the controller accepted its input (n,)."""
+        """0 where the controller accepted its input (n,).
+
+        A controller of the height also has `thrust_m_s2` (n,), the commanded thrust over mass.
+        """
         ...
 
 
@@ -73,7 +80,8 @@ class PositionController(Protocol):
 
         The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy, ax, ay], in the world frame (NED).
         On a course with a height the targets (n, 9) end with height, climb and vertical acceleration, up.
-        The thrust acceleration is positive along -z of the body.
+        The thrust acceleration is positive along -z of the body. Inputs of a controller of the height:
+        `controllers/thrust_controller.py`.
         """
         ...
 
@@ -185,6 +193,16 @@ class Flight:
         return traced.swapaxes(0, 1)
 
     @cached_property
+    def targets_in_space(self) -> FloatArray:
+        """The targets (k, n, 9) as controllers of the height are given them, also on a level course."""
+        given = self.given_targets
+        if given.shape[2] == HEIGHT.stop:
+            return given
+        by_flight = given.swapaxes(0, 1)
+        level = np.broadcast_to((HOVER_HEIGHT_M, 0.0, 0.0), (*by_flight.shape[:2], 3))
+        return np.concatenate([by_flight, level], axis=-1).swapaxes(0, 1)
+
+    @cached_property
     def landing(self) -> NDArray[np.bool_]:
         """Which courses (n,) touch the ground; there it carries the drone."""
         return np.asarray((self.given_targets[..., HEIGHT][..., :1] <= 0.0).any(axis=(0, 2)))
@@ -211,26 +229,25 @@ def fly(
 
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
-    times_s, targets = flight.times_s(), flight.given_targets
-    lifting_until, landing = lifting_updates(flight, times_s), flight.landing
+    controller = flown(controller)
+    lifting = lifts(controller)
+    times_s, targets = flight.times_s(), flight.targets_in_space if lifting else flight.given_targets
+    open_loop_until, landing = open_loop_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
     drone, step_s = vehicle.drone, vehicle.drone.step_s
+    mass_kg, most_n = drone.body.mass_kg, drone.altitude.thrust_max_n
     altitude = AltitudeLoop(flight.altitude, drone, flight.flights)
+    delivery = ThrustDelivery(drone, flight.flights)
     take_off_n = np.full(flight.flights, loops.take_off_thrust_n(drone))
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = suite_of(flight, seeds, truth(state))
-    wire = Wire(flight.link, flight.flights)
-    caller = _Caller(
-        controller,
-        Drops(flight.link, seeds),
-        targets,
-        allocate_trace(times_s, flight.traced_targets, sensed=suite is not None),
-        drone.body.mass_kg,
-    )
+    trace = allocate_trace(times_s, flight.traced_targets, sensed=suite is not None)
+    drops, first = Drops(flight.link, seeds), first_command(state, lifting=lifting)
+    caller, wire = _Caller(controller, drops, targets, trace, first), Wire(flight.link, first)
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
-        lifting = update < lifting_until
+        open_loop = update < open_loop_until
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
         wanted = vertical_target(targets[update])
         for tick in range(flight.ticks_per_update):
@@ -238,18 +255,41 @@ def fly(
                 state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
                 seen = true if suite is None else suite.estimate(true)
-                thrust_n = take_off_n if lifting else altitude.thrust_n(wanted, seen)
+                stock = not lifting and not open_loop
+                thrust_n = altitude.thrust_n(wanted, seen) if stock else take_off_n
             if tick == 0:
-                caller.call(update, true, seen, thrust_n)
-            command_rad = wire.carry(caller.command_rad)
+                grounded = landing & (true.position_m[2] >= 0.0)
+                told = delivery.tell() if lifting else thrust_n / mass_kg
+                caller.call(update, true, seen, grounded, told)
+                if open_loop:
+                    trace.thrust_acceleration_m_s2[update] = thrust_n / mass_kg
+            command = wire.carry(caller.command)
             with np.errstate(all="ignore"):
-                state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
+                if lifting and not open_loop:
+                    thrust_n = np.clip(mass_kg * command[2], -most_n, most_n)
+                state, given_n = vehicle.advance(
+                    state, command[:2], thrust_n, heading_rad, seen=seen, moment=moment
+                )
+                if lifting:
+                    delivery.note(mass_kg * command[2], given_n)
                 if landing.any():
                     state = carry_on_ground(state, landing)
         if progress is not None:
             progress((update + 1) / len(times_s))
-    _unify_nan(caller.trace)
-    return caller.trace
+    _unify_nan(trace)
+    return trace
+
+
+def first_command(state: VehicleState, *, lifting: bool) -> FloatArray:
+    """Return the commands (2, n) that drones have before the first of their controllers: level.
+
+    With controllers of the height (3, n): and with the thrust over mass of hover, on the ground 0.
+    """
+    z_m = state.body[POSITION][2]
+    level = np.zeros((2, len(z_m)))
+    if not lifting:
+        return level
+    return np.concatenate([level, np.where(z_m < 0.0, GRAVITY_M_S2, 0.0)[np.newaxis]])
 
 
 def suite_of(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
@@ -263,7 +303,7 @@ def suite_of(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | Mocap
             return None
 
 
-def lifting_updates(flight: Flight, times_s: FloatArray) -> int:
+def open_loop_updates(flight: Flight, times_s: FloatArray) -> int:
     """Return how many of the updates at `times_s` (k,) fall into the open-loop beginning of a take-off."""
     open_loop_s = loops.TAKE_OFF_S if flight.start == "take-off" else 0.0
     return int((times_s < times_s[0] + open_loop_s - flight.vehicle.drone.step_s / 2.0).sum())
@@ -331,29 +371,38 @@ def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) ->
 
 
 class _Caller:
-    """Calls the position controller of n flights, records the trace and holds the command (2, n)."""
+    """Calls the position controller of n flights, records the trace and holds the command.
+
+    The command is (2, n), roll and pitch; of a controller of the height (3, n), with the thrust over mass.
+    """
 
     def __init__(
-        self, controller: PositionController, drops: Drops, targets: FloatArray, trace: Trace, mass_kg: float
+        self,
+        controller: PositionController,
+        drops: Drops,
+        targets: FloatArray,
+        trace: Trace,
+        first: FloatArray,
     ) -> None:
-        self._controller, self._drops, self._targets, self._mass_kg = controller, drops, targets, mass_kg
-        self.trace = trace
-        self.command_rad: FloatArray = np.zeros((2, trace.flights))
+        self._controller, self._drops, self._targets, self._trace = controller, drops, targets, trace
+        self.command = first
 
-    def call(self, update: int, true: Seen, seen: Seen, thrust_n: FloatArray) -> None:
-        """Call the controller with the state `seen` and record the update.
+    def call(
+        self, update: int, true: Seen, seen: Seen, grounded: NDArray[np.bool_], thrust_m_s2: FloatArray
+    ) -> None:
+        """Call the controller with the state `seen` and the thrust (n,), and record the update.
 
         A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
-        trace = self.trace
-        measured = np.ascontiguousarray(
-            np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
-        )
+        trace, lifting = self._trace, len(self.command) > len(COMMAND)
+        rows = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
+        if lifting:
+            rows += [-seen.position_m[2:], -seen.velocity_m_s[2:], grounded[np.newaxis].astype(np.float64)]
+        measured = np.ascontiguousarray(np.concatenate(rows).T)
         dropped = self._drops.next()
         if dropped is not None:
             measured[dropped] = np.nan
-        thrust_acceleration_m_s2 = thrust_n / self._mass_kg
-        outcome = self._controller.step(measured, self._targets[update], thrust_acceleration_m_s2)
+        outcome = self._controller.step(measured, self._targets[update], thrust_m_s2)
         trace.position_m[update] = true.position_m.T
         trace.velocity_m_s[update] = true.velocity_m_s.T
         trace.euler_rad[update] = true.euler_rad.T
@@ -361,10 +410,11 @@ class _Caller:
             trace.seen_position_m[update] = seen.position_m.T
             trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
             trace.seen_euler_rad[update] = seen.euler_rad.T
-        trace.command_rad[update] = outcome.command_rad
-        trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
+        command = numbers_of(outcome).T
         trace.status[update] = outcome.status
         if dropped is not None:
-            trace.command_rad[update, dropped] = self.command_rad.T[dropped]
+            command[:, dropped] = self.command[:, dropped]
             trace.status[update, dropped] = NOT_CALLED
-        self.command_rad = trace.command_rad[update].T
+        trace.command_rad[update] = command[:2].T
+        trace.thrust_acceleration_m_s2[update] = command[2] if lifting else thrust_m_s2
+        self.command = command

@@ -92,7 +92,7 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
 
 
 def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array:
-    """Draw limits (n, 7) in the order of nmpc_limits_t; a quarter of them are bad."""
+    """Draw limits (n, k) in the order of nmpc_limits_t; a quarter of them are bad."""
     ranges, most_rad = settings.ranges, settings.limits.tilt_rad
     speed = np.exp(rng.uniform(np.log(0.05), np.log(1.2 * ranges.velocity_m_s), n))
     share = rng.choice([1.0, 0.7, 0.4, 1.01, -0.7, np.nan], n, p=[0.5, 0.25, 0.1, 0.05, 0.05, 0.05])
@@ -102,7 +102,7 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
     high = low + rng.choice([0.5, 2.0, 8.0, -1.0], (n, 2), p=[0.3, 0.3, 0.38, 0.02])
     is_open, reach_m = rng.random((n, 2)) < 0.2, ranges.position_m
     ends_m = reach_m * rng.choice([1.0, 1.1], (2, n, 2), p=[0.95, 0.05])
-    return np.column_stack(
+    level = np.column_stack(
         [
             speed,
             braking,
@@ -111,6 +111,13 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
             tilt,
         ]
     )
+    height = settings.height
+    if height is None:
+        return level
+    floor_m = rng.uniform(-3, 1, n)
+    ceiling_m = floor_m + rng.choice([0.3, 2.0, -1.0], n, p=[0.3, 0.68, 0.02])
+    speeds = np.array([height.climb_m_s, height.descent_m_s]) * rng.uniform(0.3, 1.02, (n, 2))
+    return np.column_stack([level, floor_m, ceiling_m, np.maximum(speeds, 0.1)])
 
 
 def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
@@ -372,4 +379,5 @@ def _floating(settings: Settings) -> Scalar:
 def _rows(inputs: StepInputs) -> Array:
     """Join the inputs into rows (n, k), in the order of `step_quantities`."""
     target = inputs.target
+    assert inputs.thrust is not None
     return np.concatenate([inputs.state, target[:, :4], inputs.thrust[:, None], target[:, 4:]], axis=1)

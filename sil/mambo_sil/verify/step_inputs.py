@@ -16,11 +16,11 @@ NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
 
 @dataclass(frozen=True)
 class StepInputs:
-    """Inputs of one step of n controllers: state (n, 7), target (n, 4) or (n, 6), thrust (n,)."""
+    """Inputs of one step of n controllers, as in `ReferenceController.step`; no thrust with a height."""
 
     state: Array
     target: Array
-    thrust: Array
+    thrust: Array | None
 
 
 def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
@@ -47,18 +47,39 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
 
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
-    tracker = method_of(settings).tracker
+    method = method_of(settings)
+    tracker = method.tracker
     if tracker and tracker.is_given:
-        target = np.concatenate([target, _accelerations(tracker.input_limit, high, n, rng)], axis=1)
-    return StepInputs(state, target, thrust)
+        target = np.concatenate([target, _accelerations(tracker.input_limit, high, (n, 2), rng)], axis=1)
+    if not method.has_height:
+        return StepInputs(state, target, thrust)
+    own, goal = _heights(settings, scale, rng)
+    if climb := method.climb_tracker if tracker and tracker.is_given else None:
+        goal = np.concatenate([goal, _accelerations(climb.input_limit, high, (n, 1), rng)], axis=1)
+    return StepInputs(np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1), None)
 
 
-def _accelerations(limit_m_s2: float, range_m_s2: float, n: int, rng: np.random.Generator) -> Array:
-    """Draw accelerations (n, 2) of targets, some beyond the tracker's limit or the range of the input."""
-    drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, (n, 2))
-    special = rng.random((n, 2)) < 0.05
+def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Draw height, climb and contact with the floor (n, 3), and those of targets (n, 2); some are special."""
+    n, limits = len(scale), [settings.ranges.position_m, settings.ranges.velocity_m_s]
+    goal = np.clip(rng.normal(0, 1, (n, 2)) * [2, 1], np.negative(limits), limits)
+    own = np.clip(goal + (rng.normal(0, 1, (n, 2)) * scale), np.negative(limits), limits)
+    own[rng.random(n) < 0.1] = goal[0]
+    for values in (own, goal):
+        row, column = rng.integers(n), rng.integers(2)
+        values[row, column] = rng.choice([*NOT_IN_RANGE, limits[column], -limits[column], -0.0])
+    grounded = rng.choice([0.0, 1.0], (n, 1), p=[0.8, 0.2])
+    return np.concatenate([own, grounded], axis=1), goal
+
+
+def _accelerations(
+    limit_m_s2: float, range_m_s2: float, shape: tuple[int, int], rng: np.random.Generator
+) -> Array:
+    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input."""
+    drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, shape)
+    special = rng.random(shape) < 0.05
     edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
-    return np.where(special, rng.choice(edges, (n, 2)), np.clip(drawn, -range_m_s2, range_m_s2))
+    return np.where(special, rng.choice(edges, shape), np.clip(drawn, -range_m_s2, range_m_s2))
 
 
 def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:
@@ -74,9 +95,9 @@ def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generato
     limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_input
     with np.errstate(invalid="ignore"):
         for before, now in itertools.pairwise(drawn):
-            moved = before.target[:, 2:] + rng.uniform(-change_m_s, change_m_s, (n, 2))
-            near = (rng.random((n, 1)) < 2 / 3) & np.isfinite(moved) & np.isfinite(now.target[:, 2:])
-            now.target[:, 2:] = np.where(near, np.clip(moved, -limit_m_s, limit_m_s), now.target[:, 2:])
+            moved = before.target[:, 2:4] + rng.uniform(-change_m_s, change_m_s, (n, 2))
+            near = (rng.random((n, 1)) < 2 / 3) & np.isfinite(moved) & np.isfinite(now.target[:, 2:4])
+            now.target[:, 2:4] = np.where(near, np.clip(moved, -limit_m_s, limit_m_s), now.target[:, 2:4])
     return drawn
 
 

@@ -11,18 +11,19 @@ from mambo_sil.drone.plant.randomness import BLOCK, Draws, Purpose, generators
 @pytest.mark.parametrize("delays", [(0,), (3,), (0, 1, 3), (2, 2, 0)])
 def test_a_command_arrives_after_the_delay_of_its_flight(delays: tuple[int, ...]) -> None:
     """Roll and pitch sent at tick k arrive at tick k + delay, for many ticks; before that, zero tilt."""
-    wire = Wire(Link(delay_ticks=np.array(delays)), len(delays))
+    first = np.repeat([[0.0], [0.5]], len(delays), axis=1)
+    wire = Wire(Link(delay_ticks=np.array(delays)), first)
     for tick in range(20):
         sent = np.array([[1.0 + tick], [-100.0 - tick]]) + 0.1 * np.arange(len(delays))
         due = tick - np.array(delays)
         expected = np.array([1.0 + due, -100.0 - due]) + 0.1 * np.arange(len(delays))
-        np.testing.assert_allclose(wire.carry(sent), np.where(due >= 0, expected, 0.0), rtol=1e-14)
+        np.testing.assert_allclose(wire.carry(sent), np.where(due >= 0, expected, first), rtol=1e-14)
 
 
 def test_a_link_has_no_delay_and_no_losses_by_default() -> None:
     """Commands arrive at once, and no update is dropped."""
     command_rad = np.array([[0.1], [0.2]])
-    assert Wire(Link(), 1).carry(command_rad) is command_rad
+    assert Wire(Link(), np.zeros((2, 1))).carry(command_rad) is command_rad
     assert Drops(Link(), (0,)).next() is None
 
 

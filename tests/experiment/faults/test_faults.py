@@ -32,14 +32,11 @@ from mambo_sil.experiment.faults.fault import (
 )
 from mambo_sil.experiment.faults.fault_flights import End, Verdict, fly_faults
 from mambo_sil.experiment.faults.faults_report import table
-from mambo_sil.experiment.faults.injection import (
-    Applied,
-    FaultyController,
-    LevellingCaller,
-)
+from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller
 from mambo_sil.experiment.faults.scenarios import FaultScenario, scenarios
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.adjusted import AdjustedController, Adjustment
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController

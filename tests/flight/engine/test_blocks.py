@@ -15,8 +15,9 @@ from mambo_sil.drone.plant.vehicle import Moment, Seen, Vehicle, VehicleState, t
 from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import NOISES, Sensors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.faults.injection import Applied, FaultyController
+from mambo_sil.experiment.faults.injection import FaultyController
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.engine_library import LANES, texts
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
 from mambo_sil.flight.names import AltitudeName

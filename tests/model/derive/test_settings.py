@@ -118,6 +118,36 @@ def test_a_first_order_drone_is_copied() -> None:
     assert (trimmed.roll_trim_rad, trimmed.pitch_trim_rad) == (0.01, -0.02)
 
 
+def test_the_height_is_that_of_drones_whose_thrust_is_known() -> None:
+    """By rotors or by its response; not of another, nor of one that hardly climbs."""
+    height = settings_for(CRAZYFLIE).height
+    assert height is not None
+    assert (height.lag_s, height.delay_s) == (0.072, 0.005)
+    assert (height.response_time_s, height.velocity_weight_s) == (0.13, 0.15)
+    assert (height.thrust_min_m_s2, height.thrust_max_m_s2) == (2.9, 15.2)
+    mambo = settings_for(vehicle_toml.preset("mambo")).height
+    assert mambo is not None
+    assert (mambo.lag_s, mambo.thrust_max_m_s2, mambo.descent_m_s) == (0.03, 18.1, 1.5)
+    assert settings_for(GENERIC).height is None
+    slow = settings_for(changed(GENERIC, thrust={"lag_s": 0.1, "dead_time_s": 0.04})).height
+    assert slow is not None
+    assert (slow.lag_s, slow.delay_s, slow.response_time_s) == (0.1, 0.045, 0.218)
+    weak = {"thrust_max_n": 1.15 * GENERIC.weight_n}
+    assert settings_for(changed(GENERIC, thrust={"lag_s": 0.1}, altitude=weak)).height is None
+
+
+@pytest.mark.parametrize("rate_hz", [50, 200, 2000])
+@pytest.mark.parametrize("ratio", [1.17, 1.5, 2.0, 12.0])
+@pytest.mark.parametrize("lag_s", [0.001, 0.1, 2.0])
+def test_every_height_is_one_that_a_controller_can_have(lag_s: float, ratio: float, rate_hz: int) -> None:
+    """Whatever the lag, the thrust and the rate: the climb and the descent are braked in time."""
+    thrust = {"lag_s": lag_s, "dead_time_s": lag_s / 10.0}
+    strong = {"thrust_max_n": ratio * GENERIC.weight_n}
+    sensors, attitude = {"position_rate_hz": 50}, {"rate_hz": rate_hz}
+    drone = changed(GENERIC, thrust=thrust, altitude=strong, attitude=attitude, sensors=sensors)
+    assert settings_for(drone).height is not None
+
+
 @pytest.mark.parametrize(("ratio", "tilt_rad"), [(1.05, 0.155), (1.3, 0.347), (1.9, 0.5), (9.0, 0.5)])
 def test_the_tilt_limit_leaves_thrust_for_the_weight(ratio: float, tilt_rad: float) -> None:
     """At the limit of both angles the largest thrust still carries the drone."""

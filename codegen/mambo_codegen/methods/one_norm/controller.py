@@ -158,7 +158,9 @@ class OneNormController:
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
         return np.where(good, Status.OK, Status.BAD_WEIGHT)
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> OneNormStep:
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> OneNormStep:
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.

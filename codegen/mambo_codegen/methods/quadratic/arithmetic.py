@@ -8,9 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
+from mambo_codegen.methods.math import Real, clamp, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats
+from mambo_codegen.methods.quadratic.height_constants import STEEPEST_RAD
+from mambo_codegen.methods.quadratic.height_formats import FACTOR_BITS, GAIN_CHANGE
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
@@ -93,6 +95,30 @@ class QuadraticArithmetic(Protocol):
     def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
         """Return ratio * move."""
 
+    def gain_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        """Return the correction of the thrust gain by both innovations."""
+
+    def reach_product(self, steps: Any, velocity_m_step: Real) -> Real:
+        """Return steps * velocity, m."""
+
+    def gravity_product(self, per_gravity: Any, acceleration_m_step2: Real) -> Real:
+        """Return an acceleration in units of g."""
+
+    def angle_square(self, angle_rad: Real) -> Real:
+        """Return the square of an angle; in fixed point of at most STEEPEST_RAD."""
+
+    def step2_product(self, s2: Any, thrust_m_s2: Real) -> Real:
+        """Return T_s^2 * thrust over mass, m/step^2."""
+
+    def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
+        """Return thrust over mass / T_s^2, m/s^2."""
+
+    def factor_product(self, value: Real, factor: Real) -> Real:
+        """Return value * factor, in the format of the value."""
+
+    def to_factor(self, cosine: Real) -> Real:
+        """Return a cosine in the format of factors."""
+
 
 class QuadraticFloatArithmetic:
     """Products in float32 or float64."""
@@ -136,6 +162,12 @@ class QuadraticFloatArithmetic:
     def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         return (a * b) + (c * d)
 
+    def angle_square(self, angle_rad: Real) -> Real:
+        return angle_rad * angle_rad
+
+    def to_factor(self, cosine: Real) -> Real:
+        return cosine
+
     def _product(self, a: Any, b: Real) -> Real:
         return a * b
 
@@ -144,7 +176,8 @@ class QuadraticFloatArithmetic:
 
     sine_product = target_product = tracker_product = drag_product = aged_position = aged_velocity = _product
     tilt_product = command_product = feedback_product = ratio_product = _product
-    position_correction = velocity_correction = disturbance_correction = _correction
+    gravity_product = factor_product = reach_product = step2_product = thrust_product = _product
+    position_correction = velocity_correction = disturbance_correction = gain_correction = _correction
 
 
 class QuadraticFixedArithmetic:
@@ -155,6 +188,7 @@ class QuadraticFixedArithmetic:
         self._shifts = formats.shifts
         self._trigonometry: FixedTrigonometry = constants.trigonometry
         self._update_period_s = self.numbers.constant(constants.settings.horizon.update_period_s, "step")
+        self._steepest = self.numbers.constant(STEEPEST_RAD, "angle")
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
@@ -227,6 +261,33 @@ class QuadraticFixedArithmetic:
 
     def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
         return self._rounded(ratio * move_m_step2, "ratio_product")
+
+    def gain_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        change = self._rounded((gain * by_m) + (other_gain * by_m_step), "gain_correction")
+        most = round(GAIN_CHANGE * 2**FACTOR_BITS)
+        return np.clip(change, -most, most)
+
+    def reach_product(self, steps: Any, velocity_m_step: Real) -> Real:
+        return self._rounded(steps * velocity_m_step, "reach_product")
+
+    def gravity_product(self, per_gravity: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(per_gravity * acceleration_m_step2, "gravity_product")
+
+    def angle_square(self, angle_rad: Real) -> Real:
+        limited = clamp(angle_rad, self._steepest)
+        return self._rounded(limited * limited, "angle_square")
+
+    def step2_product(self, s2: Any, thrust_m_s2: Real) -> Real:
+        return self._rounded(s2 * thrust_m_s2, "step2_product")
+
+    def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
+        return self._rounded(per_s2 * thrust_m_step2, "thrust_product")
+
+    def factor_product(self, value: Real, factor: Real) -> Real:
+        return rounded(value * factor, FACTOR_BITS)
+
+    def to_factor(self, cosine: Real) -> Real:
+        return rounded(cosine, SINE_BITS - FACTOR_BITS)
 
     def _rounded(self, product: Real, name: str) -> Real:
         return rounded(product, self._shifts[name])

@@ -61,14 +61,22 @@ class AttitudeModel:
         )
         """The largest moves (2,), right and forward: no command for one exceeds the tilt limit."""
 
-    def set_command(self, attitude: AttitudeState, command_rad: Real) -> AttitudeState:
-        """Set the last commands to `command_rad` (n, 2), roll and pitch."""
+    def set_command(
+        self, attitude: AttitudeState, command_rad: Real, weight: Real | None = None
+    ) -> AttitudeState:
+        """Set the last commands to `command_rad` (n, 2), roll and pitch.
+
+        Here and below the accelerations of tilts count `weight` (n,) times as much, if there is one.
+        """
         product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
+        product = self.weighed(product, weight)
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
-    def change_command(self, attitude: AttitudeState, change_rad: Real) -> AttitudeState:
+    def change_command(
+        self, attitude: AttitudeState, change_rad: Real, weight: Real | None = None
+    ) -> AttitudeState:
         """Change the last commands by `change_rad` (n, 2), roll and pitch."""
-        product = self._products.tilt_product(self._command_gain, change_rad)
+        product = self.weighed(self._products.tilt_product(self._command_gain, change_rad), weight)
         change = np.stack([product[:, 0], -product[:, 1]], axis=1)
         return replace(attitude, command=clamp(attitude.command + change, self._limit))
 
@@ -81,11 +89,18 @@ class AttitudeModel:
             tilt_rad[:, None] == generated_rad, self.command_limit, self._products.to_move(product)
         )
 
-    def steady(self, command_rad: Real) -> AttitudeState:
+    def weighed(self, acceleration: Real, weight: Real | None) -> Real:
+        """Return accelerations (n, 2) or (2,) times `weight` (n,), if there is one."""
+        return (
+            acceleration if weight is None else self._products.factor_product(acceleration, weight[:, None])
+        )
+
+    def steady(self, command_rad: Real, weight: Real | None = None) -> AttitudeState:
         """Return the model at the steady attitude of the commands (n, 2)."""
         zeros = np.zeros_like(command_rad)
         sine = zeros[:, 0]
-        command = self.set_command(AttitudeState(zeros, zeros, zeros, zeros, sine, sine), command_rad).command
+        level = AttitudeState(zeros, zeros, zeros, zeros, sine, sine)
+        command = self.set_command(level, command_rad, weight).command
         return AttitudeState(command, zeros, command, command, sine, np.full_like(sine, self._one))
 
     def advance(self, attitude: AttitudeState) -> AttitudeState:
@@ -116,9 +131,9 @@ class AttitudeModel:
             cosine=cosine,
         )
 
-    def measure(self, tilt_rad: Real) -> Real:
+    def measure(self, tilt_rad: Real, weight: Real | None = None) -> Real:
         """Return the accelerations (n, 2), right and forward, of measured roll and pitch (n, 2)."""
-        product = self._products.tilt_product(self._gain, tilt_rad - self._trim)
+        product = self.weighed(self._products.tilt_product(self._gain, tilt_rad - self._trim), weight)
         return np.stack([product[:, 0], -product[:, 1]], axis=1)
 
     def command_rad(self, command: Real) -> Real:

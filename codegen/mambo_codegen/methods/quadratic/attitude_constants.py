@@ -13,7 +13,7 @@ float64 once.
 """
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 from mambo_codegen.kept import keep
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.sections import Damping, Model, Sections
+
+MOST_WEIGHT: Final = 1.9
+"""With a height, by how much a tilt may count more than in hover: the largest (g + a)/g."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,15 @@ def attitude_loops(model: Model, damping: Damping) -> tuple[LoopValues, LoopValu
 def attitude_constants(settings: Sections) -> AttitudeConstants:
     """Derive the constants of the attitude model."""
     model, step_s = settings.model, settings.horizon.update_period_s
-    solutions = [_solution(step_s, loop) for loop in attitude_loops(model, settings.damping)]
+    solutions = [attitude_solution(step_s, loop) for loop in attitude_loops(model, settings.damping)]
     rows = [solution["rows"] for solution in solutions]
     gain = GRAVITY_M_S2 * model.acceleration_per_tilt * (step_s * step_s)
     loop_gains = np.array([model.roll_gain, model.pitch_gain])
     trim_rad = np.array([model.roll_trim_rad, model.pitch_trim_rad])
     tilt_rad = loop_gains * settings.limits.tilt_rad
     largest = float(np.max(gain * (tilt_rad + np.abs(trim_rad))))
+    if settings.height is not None:
+        largest *= MOST_WEIGHT
     return AttitudeConstants(
         gain_m_step2_rad=gain,
         command_gain_m_step2_rad=gain * loop_gains,
@@ -89,8 +94,8 @@ def attitude_constants(settings: Sections) -> AttitudeConstants:
     )
 
 
-def _solution(update_period_s: float, loop: LoopValues) -> dict[str, Any]:
-    """Return what `solve_attitude` returns."""
+def attitude_solution(update_period_s: float, loop: LoopValues) -> dict[str, Any]:
+    """Return what `solve_attitude` returns for a loop."""
 
     def solve() -> dict[str, Any]:
         from mambo_codegen.methods.quadratic.solutions import solve_attitude  # noqa: PLC0415 - imports mpmath

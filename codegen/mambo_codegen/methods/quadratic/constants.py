@@ -6,8 +6,10 @@ from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.limits_constants import LimitsConstants, stored_quantities
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants, attitude_constants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats, formats
+from mambo_codegen.methods.quadratic.height_constants import HeightConstants, height_constants
 from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
+from mambo_codegen.methods.tracker_constants import TrackerConstants
 
 
 class QuadraticConstants(Constants):
@@ -34,6 +36,16 @@ class QuadraticConstants(Constants):
         return law_constants(self.settings)
 
     @cached_property
+    def height(self) -> HeightConstants | None:
+        """The constants of the height, in float64; None without it."""
+        return height_constants(self.settings)
+
+    @property
+    def climb_tracker(self) -> TrackerConstants | None:
+        """The constants of the tracker of the target's height; None without one."""
+        return self.height.tracker if self.height else None
+
+    @cached_property
     def limiting(self) -> LimitsConstants | None:
         """The constants of the limits of speed, braking and place, in float64; None without any."""
         return limits(self.settings)
@@ -53,5 +65,19 @@ class QuadraticConstants(Constants):
         limiting = stored_quantities("move", "move") if self.limiting else ()
         if self.limiting and self.tracker and self.tracker.is_given:
             limiting += ("velocity", "velocity")
+        height = self._stored_height
+        if self.limiting and self.height:
+            limiting += ("position",) * 4
         tilt = ["angle"] * 2 if self.feedback_steps else []
-        return (*observer, *attitude, *tracker, *limiting, *tilt, "angle", "angle")
+        return (*observer, *attitude, *tracker, *height, *limiting, *tilt, "angle", "angle")
+
+    @property
+    def _stored_height(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_height_t, in their order."""
+        if self.height is None:
+            return ()
+        learnt = {"gain": ["factor"], "acceleration": ["acceleration"], "none": []}[self.height.learn]
+        tracker = ["acceleration"] * 2 if self.tracker else []
+        if self.tracker and not self.tracker.is_given:
+            tracker = ["velocity", *tracker]
+        return ("position", "speed", *learnt, *["acceleration"] * 3, "factor", "thrust", *tracker)

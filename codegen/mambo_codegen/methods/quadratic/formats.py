@@ -10,14 +10,21 @@ row the same one; one shift makes the sum a 32-bit number again.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen.methods.limits_constants import limits_bits
-from mambo_codegen.methods.quadratic.attitude_constants import attitude_constants
+from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, attitude_constants
+from mambo_codegen.methods.quadratic.height_constants import height_constants
+from mambo_codegen.methods.quadratic.height_formats import (
+    learnt_m_s2,
+    vertical_bits,
+    vertical_bounds,
+    vertical_shifts,
+)
 from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
 from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
@@ -70,6 +77,8 @@ class _Bounds:
     acceleration: float
     move: float
     angle: float
+    thrust_m_s2: float
+    learnt_m_s2: float
 
 
 def formats(settings: Sections) -> QuadraticFormats:
@@ -82,19 +91,26 @@ def formats(settings: Sections) -> QuadraticFormats:
         settings.observer,
         settings.damping,
         settings.limits,
+        settings.height,
         settings.ranges,
     )
 
 
 @lru_cache(maxsize=64)
 def _formats(*sections: Any) -> QuadraticFormats:
-    names = ("horizon", "model", "target", "cost", "observer", "damping", "limits", "ranges")
+    names = ("horizon", "model", "target", "cost", "observer", "damping", "limits", "height", "ranges")
     settings = Sections.model_construct(**dict(zip(names, sections, strict=True)))
     attitude, observer = attitude_constants(settings), observer_constants(settings)
-    law = law_constants(settings)
+    law, height = law_constants(settings), height_constants(settings)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
     ranges = settings.ranges
+    loops = np.concatenate([attitude.tilt_row, attitude.integral_row])
+    laws, gain, ratios = law.rows, observer.gain[np.newaxis], np.abs(law.ratios)
+    if height is not None:
+        laws = np.concatenate([laws, np.insert(height.rows, STATES.index("i"), 0.0, axis=1)[np.newaxis]])
+        loops = np.concatenate([loops, np.insert(height.thrust_row, 1, 0.0)[np.newaxis]])
+        gain, ratios = np.stack([observer.gain, height.gain]), np.append(ratios, abs(height.ratio))
 
     position = fractional_bits(bounds.position)
     speed = fractional_bits(bounds.speed)
@@ -105,11 +121,11 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "velocity": fractional_bits(2 * ranges.velocity_m_s),
         "angle": fractional_bits(bounds.angle),
         "yaw": fractional_bits(YAW_LIMIT_RAD),
-        "thrust": fractional_bits(ranges.thrust_acceleration_max_m_s2),
+        "thrust": fractional_bits(bounds.thrust_m_s2),
         "speed": speed,
         "acceleration": acceleration,
         "move": min(fractional_bits(4 * bounds.move), acceleration),
-        "disturbance": fractional_bits(max(settings.observer.disturbance_limit_m_s2, 0.001)),
+        "disturbance": fractional_bits(bounds.learnt_m_s2),
         "step": fractional_bits(period_s),
         "tracker": fractional_bits(tracker.factor) if tracker else 0,
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
@@ -117,33 +133,34 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "feedback": feedback_bits(feedback_steps(settings)),
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
-        "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,
+        "ratio": fractional_bits(*ratios) if law.moves == 2 else 0,
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
     shifts = {
-        "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, bounds.states, bits),
-        "row": _shift(
-            np.abs(law.rows), [bounds.states[name] for name in STATES], _inputs(bits), bits["move"]
-        ),
+        "attitude": _attitude_shift(loops, bounds.states, bits),
+        "row": _shift(np.abs(laws), [bounds.states[name] for name in STATES], _inputs(bits), bits["move"]),
     }
     bits["attitude"] = shifts["attitude"]
-    for name, row, kind in zip(
-        ("position", "velocity", "disturbance"),
-        observer.gain,
-        ("position", "speed", "acceleration"),
-        strict=True,
-    ):
+    if height is not None:
+        bits |= vertical_bits(height)
+    learns_gain = height is not None and height.learns_gain
+    rows = {name: gain[:, row] for row, name in enumerate(("position", "velocity", "disturbance"))}
+    if learns_gain:
+        rows |= {"disturbance": gain[:1, 2], "gain": gain[1:, 2]}
+    kinds = {"position": "position", "velocity": "speed", "disturbance": "acceleration", "gain": "factor"}
+    for name, row in rows.items():
         innovations = [bounds.states["innovation"], bounds.states["innovation_step"]]
-        sources = [position, speed]
+        sources, kind = [position, speed], kinds[name]
         shift = _shift(np.abs(row), innovations, sources, bits[kind])
         shifts[f"{name}_correction"] = shift
         for by, source in zip(("position", "velocity"), sources, strict=True):
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
     for name, source in zip(STATES, _inputs(bits), strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
-    return QuadraticFormats(bits, shifts | _product_shifts(bits, tracker.input_quantity if tracker else ""))
+    shifts |= _product_shifts(bits, tracker.input_quantity if tracker else "")
+    return QuadraticFormats(bits, shifts | (vertical_shifts(bits) if height else {}))
 
 
 def refusals(settings: Sections) -> list[Refusal]:
@@ -175,11 +192,30 @@ def _inputs(bits: Mapping[str, int]) -> list[int]:
 
 
 def _bounds(settings: Sections) -> _Bounds:
+    """Return the bounds along all axes."""
+    height, level = height_constants(settings), _level_bounds(settings)
+    if height is None:
+        return level
+    found = vertical_bounds(
+        height, observer_constants(settings), attitude_constants(settings), settings.ranges.position_m
+    )
+    names = ("position", "speed", "acceleration", "move", "thrust_m_s2", "angle")
+    return replace(
+        level,
+        states={name: max(bound, found.states.get(name, 0.0)) for name, bound in level.states.items()},
+        learnt_m_s2=max(level.learnt_m_s2, learnt_m_s2(height)),
+        **{name: max(getattr(level, name), getattr(found, name)) for name in names},
+    )
+
+
+def _level_bounds(settings: Sections) -> _Bounds:
+    """Return the bounds along right and forward, and of what the axes share."""
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law = law_constants(settings)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
     reach_m, speed, limit = settings.ranges.position_m, observer.velocity_limit_m_step, attitude.limit_m_step2
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
+    tilted *= MOST_WEIGHT if settings.height else 1.0
     tilted, turned = max(tilted, limit), _TURN * limit
     target = tracker.acceleration_bound_m_step2 if tracker else 0.0
     jerk = tracker.jerk_limit_m_step2_update if tracker else 0.0
@@ -223,13 +259,14 @@ def _bounds(settings: Sections) -> _Bounds:
         angle=(2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
         * max([1.0, *(feedback_steps(settings) or ())])
         + (2 * settings.limits.tilt_rad),
+        thrust_m_s2=settings.ranges.thrust_acceleration_max_m_s2,
+        learnt_m_s2=max(settings.observer.disturbance_limit_m_s2, 0.001),
     )
 
 
-def _attitude_shift(tilt: Any, integral: Any, states: Mapping[str, float], bits: Mapping[str, int]) -> int:
-    rows = np.abs(np.concatenate([tilt, integral]))
+def _attitude_shift(rows: Any, states: Mapping[str, float], bits: Mapping[str, int]) -> int:
     bounds = [states[name] for name in _ATTITUDE_STATES]
-    return _shift(rows, bounds, [bits["acceleration"]] * 4, bits["acceleration"])
+    return _shift(np.abs(rows), bounds, [bits["acceleration"]] * 4, bits["acceleration"])
 
 
 def _shift(gains: Any, bounds: Sequence[float], inputs: Sequence[int], result: int) -> int:

@@ -33,7 +33,7 @@ from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attit
 from mambo_codegen.methods.rate_feedback import lag_refusals
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Refusal
-from mambo_codegen.settings.sections import Sections
+from mambo_codegen.settings.sections import Horizon, Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
 MOVED: Final = ("e", "v", "a", "i", "c", "u")
@@ -112,8 +112,15 @@ def _laws(settings: Sections) -> list[LawSolution]:
 
 
 def _law(settings: Sections, loop: LoopValues) -> LawSolution:
-    period_s, ramp_s, cost = settings.horizon.update_period_s, settings.horizon.ramp_s, settings.cost
-    inputs = period_s, ramp_s, cost.response_time_s, cost.velocity_weight_s, loop
+    cost = settings.cost
+    return axis_law(settings.horizon, cost.response_time_s, cost.velocity_weight_s, loop)
+
+
+def axis_law(
+    horizon: Horizon, response_time_s: float, velocity_weight_s: float, loop: LoopValues
+) -> LawSolution:
+    """Return the law along an axis whose acceleration answers its command by `loop`."""
+    inputs = horizon.update_period_s, horizon.ramp_s, response_time_s, velocity_weight_s, loop
 
     def solve() -> dict[str, Any]:
         from mambo_codegen.methods.quadratic.solutions import solve_law  # noqa: PLC0415 - imports mpmath

@@ -14,8 +14,11 @@ from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.height_constants import height_context
+from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
+from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
-from mambo_codegen.numbers.representation import COMMAND
+from mambo_codegen.numbers.representation import COMMAND, THRUST
 from mambo_codegen.settings.key import Refusal
 
 _WORK: tuple[int, int] = (50, 1)
@@ -35,6 +38,7 @@ class Quadratic(QuadraticConstants, Method):
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
         "optimizer": "the minimum of the cost",
+        "height": "the third axis, whose command is the thrust",
         "limits": "speed, braking and place",
         "step": "a control step",
         "interface": "the functions of nmpc.h",
@@ -58,7 +62,7 @@ class Quadratic(QuadraticConstants, Method):
     def refusals(self) -> list[Refusal]:
         """Return why a controller with a quadratic cost cannot have the settings."""
         settings = self.settings
-        refused = law.refusals(settings)
+        refused = law.refusals(settings) or height_refusals(settings)
         return refused or (formats.refusals(settings) if settings.code.scalar == "fixed" else [])
 
     def reference_controller(self, n: int = 1) -> QuadraticController:
@@ -75,6 +79,7 @@ class Quadratic(QuadraticConstants, Method):
             StepResult("saturated", count_type=np.bool_),
             StepResult("stored", self.stored, (len(self.stored),)),
             *((StepResult("active"),) if self.limiting else ()),
+            *((StepResult("thrust_m_s2", THRUST),) if self.has_height else ()),
         )
 
     def tested_numbers(self, step: QuadraticStep) -> tuple[float, ...]:
@@ -124,6 +129,8 @@ class Quadratic(QuadraticConstants, Method):
             "move_limits": AttitudeModel(self, arithmetic(self)).command_limit.tolist(),
             "observer": self.observer,
             "law": self.law,
+            **height_context(self.height),
+            "gain_change": GAIN_CHANGE,
             "stored_numbers": len(self.stored),
             "stored_quantities": self.stored,
             "row_quantities": ROW,
@@ -131,6 +138,9 @@ class Quadratic(QuadraticConstants, Method):
             "attitude_shares": [
                 period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)
             ],
+            "thrust_share": period_s / (period_s + self.settings.height.lag_s)
+            if self.settings.height
+            else None,
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
@@ -187,6 +197,10 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
         "aged_velocity": bool(constants.observer.age_steps),
         "feedback_product": constants.feedback_steps is not None,
         "ratio_product": constants.law.moves > 1,
+        **dict.fromkeys(
+            ("reach_product", "gravity_product", "step2_product", "thrust_product", "factor_product"),
+            constants.has_height,
+        ),
         "target_product": constants.tracker is not None,
         "tracker_product": constants.tracker is not None,
     }

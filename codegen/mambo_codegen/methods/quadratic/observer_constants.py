@@ -43,7 +43,7 @@ def observer_constants(settings: Sections) -> ObserverConstants:
     observer, update_s = settings.observer, settings.horizon.update_period_s
     period_s = Fraction(update_s)
     return ObserverConstants(
-        gain=_gain(settings),
+        gain=observer_gain(settings, observer.disturbance_noise),
         disturbance_limit_m_step2=float(Fraction(observer.disturbance_limit_m_s2) * period_s**2),
         velocity_limit_m_step=float(Fraction(settings.ranges.velocity_m_s) * period_s),
         drag_1_step=float(Fraction(settings.model.drag_1_s) * period_s),
@@ -54,12 +54,15 @@ def observer_constants(settings: Sections) -> ObserverConstants:
     )
 
 
-def _gain(settings: Sections) -> NDArray[np.float64]:
-    """Return the gain (3, 2) of the stationary Kalman filter, for velocities in m/step and so on."""
+def observer_gain(settings: Sections, disturbance_noise: float) -> NDArray[np.float64]:
+    """Return the gain (3, 2) of the stationary Kalman filter, for velocities in m/step and so on.
+
+    `disturbance_noise` is that along the axis; the other noises are those of all axes.
+    """
     observer, period_s = settings.observer, settings.horizon.update_period_s
     noise = (
         observer.acceleration_noise,
-        observer.disturbance_noise,
+        disturbance_noise,
         observer.position_noise,
         observer.velocity_noise,
     )

@@ -17,6 +17,18 @@ void run(void)
 
 nmpc_t nmpc_controller;
 
+#ifdef NMPC_HAS_HEIGHT
+
+nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_command_t *command);
+
+nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_command_t *command)
+{
+    nmpc_init(&nmpc_controller);
+    return nmpc_step(&nmpc_controller, state, target, command);
+}
+
+#else
+
 nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_real_t thrust_acceleration_m_s2,
                   nmpc_command_t *command);
 
@@ -27,4 +39,5 @@ nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_r
     return nmpc_step(&nmpc_controller, state, target, thrust_acceleration_m_s2, command);
 }
 
+#endif
 #endif

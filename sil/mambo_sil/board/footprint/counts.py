@@ -41,14 +41,14 @@ FLIGHT: Final = Bernoulli(2.0, 0.5)
 
 @dataclass(frozen=True, eq=False)
 class CountedStep:
-    """One step: state (1, 7), target (1, 4), thrust (1,), the instance before it, status, what it took.
+    """One step: its inputs, the instance before it, status, what it took; thrust is None with a height.
 
     `cycles` is None without a model of the core.
     """
 
     state: FloatArray
     target: FloatArray
-    thrust: FloatArray
+    thrust: FloatArray | None
     before: bytes
     accepted: bool
     by_function: Counter[str]
@@ -121,6 +121,7 @@ class CountingController:
         flash: FlashWait | None = None,
     ) -> None:
         self._emulated = EmulatedController(settings, elf, core, counting=True)
+        self._method = method_of(settings)
         image = load(elf)
         self._name_of = lru_cache(None)(lambda address: image.name_of(address).partition("+")[0])
         self._model = CycleModel(image, core, flash) if modelled else None
@@ -129,10 +130,21 @@ class CountingController:
     def step(
         self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray
     ) -> OneNormStep:
-        """Step once with state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
+        """Step once with state (1, 7), target (1, 6) and thrust_acceleration_m_s2 (1,).
+
+        A controller of the height holds the height of a target that the drone is at.
+        """
+        if not self._method.has_height:
+            return self._step(state, target, thrust_acceleration_m_s2)
+        level = len(self._method.level_target)
+        still = np.zeros((1, len(self._method.target) - level))
+        goal = np.concatenate([target[:, :level], still], axis=1)
+        return self._step(np.concatenate([state, np.zeros((1, 3))], axis=1), goal, None)
+
+    def _step(self, state: FloatArray, target: FloatArray, thrust: FloatArray | None) -> OneNormStep:
         before = self._emulated.save()
         self._emulated.machine.take_executed()
-        outcome: OneNormStep = self._emulated.step(state, target, thrust_acceleration_m_s2)
+        outcome: OneNormStep = self._emulated.step(state, target, thrust)
         executed = self._emulated.machine.take_executed().only(self._is_of_a_step)
         by_function: Counter[str] = Counter()
         for address, times in executed.times.items():
@@ -141,7 +153,7 @@ class CountingController:
             CountedStep(
                 state=state,
                 target=target,
-                thrust=thrust_acceleration_m_s2,
+                thrust=thrust,
                 before=before,
                 accepted=not outcome.status[0],
                 by_function=by_function,
@@ -155,9 +167,9 @@ class CountingController:
         return self._name_of(address) not in HARNESS
 
     def retry(self, step: CountedStep, state: FloatArray, target: FloatArray) -> CountedStep:
-        """Repeat an earlier step from the instance before it, with another state (1, 7) and target (1, 4)."""
+        """Repeat an earlier step from the instance before it, with another state (1, k) and target (1, m)."""
         self._emulated.restore(step.before)
-        self.step(state, target, step.thrust)
+        self._step(state, target, step.thrust)
         return self.steps.pop()
 
 
@@ -215,11 +227,12 @@ def _search(
     searched = []
     for _ in range(search_steps):
         state, target = best.state.copy(), best.target.copy()
-        index = rng.integers(11 if limited else 7)
-        if index < 7:
+        columns = state.shape[1]
+        index = rng.integers(columns + (4 if limited else 0))
+        if index < columns:
             state[0, index] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
         else:
-            target[0, index - 7] += rng.normal() * 10.0 ** rng.uniform(-1, 1)
+            target[0, index - columns] += rng.normal() * 10.0 ** rng.uniform(-1, 1)
         tried = controller.retry(best, state, target)
         if tried.accepted:
             searched.append(tried)

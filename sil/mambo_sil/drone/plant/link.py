@@ -27,18 +27,20 @@ class Link:
 class Wire:
     """Delays the commands of n flights, each by its own number of ticks."""
 
-    def __init__(self, link: Link, flights: int) -> None:
+    def __init__(self, link: Link, first: FloatArray) -> None:
+        """Start with commands `first` (rows, n) on the way."""
+        flights = first.shape[1]
         self._delay = np.broadcast_to(np.asarray(link.delay_ticks, np.int64), flights)
-        self._sent = np.zeros((int(self._delay.max(initial=0)) + 1, 2, flights))
+        self._sent = np.repeat(first[np.newaxis], int(self._delay.max(initial=0)) + 1, axis=0)
         self._flights = np.arange(flights)
         self._tick = 0
 
-    def carry(self, command_rad: FloatArray) -> FloatArray:
-        """Accept the command (2, n) sent at this tick; return the command (2, n) that arrives at it."""
+    def carry(self, command: FloatArray) -> FloatArray:
+        """Accept the command (rows, n) sent at this tick; return the command that arrives at it."""
         depth = len(self._sent)
         if depth == 1:
-            return command_rad
-        self._sent[self._tick % depth] = command_rad
+            return command
+        self._sent[self._tick % depth] = command
         arriving = (self._tick - self._delay) % depth
         self._tick += 1
         return np.ascontiguousarray(self._sent[arriving, :, self._flights].T)

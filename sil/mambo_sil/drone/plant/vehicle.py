@@ -190,7 +190,21 @@ class Vehicle:
         seen: Seen,
         moment: Moment | None = None,
     ) -> VehicleState:
-        """Return the state one tick later.
+        """Return the state one tick later; arguments as of `advance`."""
+        state, _ = self.advance(state, command_rad, thrust_n, yaw_reference_rad, seen=seen, moment=moment)
+        return state
+
+    def advance(
+        self,
+        state: VehicleState,
+        command_rad: FloatArray,
+        thrust_n: FloatArray,
+        yaw_reference_rad: PerFlight,
+        *,
+        seen: Seen,
+        moment: Moment | None = None,
+    ) -> tuple[VehicleState, FloatArray]:
+        """Return the state one tick later, and the thrust (n,) that the motors were commanded in sum.
 
         `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The inner loops
         receive `seen`.
@@ -199,10 +213,11 @@ class Vehicle:
         if isinstance(loop, FirstOrderDrone):
             around = self._surroundings(thrust_n, moment or Moment())
             body, memory = loop.advance(state.body, state.memory, command_rad, yaw_reference_rad, around)
-            return VehicleState(body, state.rotor_speed_rad_s, memory)
+            return VehicleState(body, state.rotor_speed_rad_s, memory), around.demand_n
         demand = Demand(command_rad, yaw_reference_rad, thrust_n, seen.euler_rad, seen.rates_rad_s)
         motor_command, memory = loop.command_motors(demand, state.memory)
-        return VehicleState(*self.integrate(state, motor_command, moment), memory)
+        commanded_n = np.add.reduce(motor_command, axis=0) * airframe_of(self.drone).thrust_per_command_n
+        return VehicleState(*self.integrate(state, motor_command, moment), memory), np.asarray(commanded_n)
 
     def _surroundings(self, thrust_n: FloatArray, moment: Moment) -> Surroundings:
         """Return the forces on drones without rotors, with their demanded thrust (n,)."""

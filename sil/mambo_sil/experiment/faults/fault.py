@@ -12,7 +12,10 @@ from mambo_sil.drone.plant.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ControllerInput:
-    """Inputs of one controller at one update: state (7,), target (6,), thrust over mass."""
+    """Inputs of one controller at one update: state (7,), target (6,), thrust over mass.
+
+    Of a controller of the height: state (10,), target (9,), and the thrust that it is told.
+    """
 
     state: FloatArray
     target: FloatArray
@@ -61,13 +64,18 @@ class SetState:
 
 @dataclass(frozen=True)
 class ScaleState:
-    """The state is multiplied by seven factors, as a wrong unit does."""
+    """The state is multiplied by seven factors, as a wrong unit does; the height counts as the position."""
 
     factors: tuple[float, ...]
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The factors of a state with a height."""
+        return (*self.factors, self.factors[0], self.factors[2], 1.0)
+
     def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
         """Return what the controller is given."""
-        return replace(now, state=now.state * np.array(self.factors))
+        return replace(now, state=now.state * np.array(self.numbers[: len(now.state)]))
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,7 @@ class ShiftState:
 
     def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
         """Return what the controller is given."""
-        return replace(now, state=now.state + np.array(self.by))
+        return replace(now, state=_added(now.state, self.by))
 
 
 @dataclass(frozen=True)
@@ -100,7 +108,7 @@ class ShiftTarget:
 
     def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
         """Return what the controller is given."""
-        return replace(now, target=now.target + np.array(self.by))
+        return replace(now, target=_added(now.target, self.by))
 
 
 @dataclass(frozen=True)
@@ -116,6 +124,11 @@ class SetThrust:
 
 Alteration = KeepInputs | FreezeState | SetState | ScaleState | ShiftState | WrapYaw | ShiftTarget | SetThrust
 """What happens to the inputs of a controller."""
+
+
+def _added(values: FloatArray, by: tuple[float, ...]) -> FloatArray:
+    """Return values to the first of which numbers are added."""
+    return np.concatenate([values[: len(by)] + np.array(by), values[len(by) :]])
 
 
 def shift_yaw(shift_rad: float) -> ShiftState:

@@ -21,6 +21,7 @@ from mambo_sil.experiment.faults.fault import (
     WrapYaw,
 )
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import LEVEL
 from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign, native
 
@@ -34,7 +35,7 @@ def native_faulty(
 ) -> Native:
     """Return n controllers with faults around `inner`; `instances` as in `FaultyController`."""
     chosen = [fault or _NONE for fault in faults]
-    histories = [np.zeros((fault.late_updates + 1, 2)) for fault in chosen]
+    histories = [np.tile(LEVEL, (fault.late_updates + 1, 1)) for fault in chosen]
     saved = None if instances is None else np.empty_like(instances[0])
     records = ffi.new("engine_faulty_t[]", len(chosen))
     for row, (fault, history) in enumerate(zip(chosen, histories, strict=True)):
@@ -42,13 +43,13 @@ def native_faulty(
         _fill_alteration(record, fault.alter)
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
-        record.controller, record.self = inner.step, inner.instance(row)
-        record.computed_rad = pointer("double *", history)
+        record.controller, record.self, record.lifting = inner.step, inner.instance(row), inner.lifts
+        record.computed = pointer("double *", history)
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))
             record.memory_bytes = instances.shape[1]
     kept = inner, histories, instances, saved
-    return Native(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept)
+    return Native(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept, inner.lifts)
 
 
 def _fill_alteration(record: Any, alter: Alteration) -> None:
@@ -61,7 +62,7 @@ def _fill_alteration(record: Any, alter: Alteration) -> None:
             record.columns = (alter.columns.start, alter.columns.stop)
             record.on, record.of = alter.on, alter.of
         case ScaleState():
-            values = alter.factors
+            values = alter.numbers
         case ShiftState() | ShiftTarget():
             values = alter.by
         case WrapYaw():
@@ -74,7 +75,7 @@ def _fill_alteration(record: Any, alter: Alteration) -> None:
 
 def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:
     """Return n callers with `patience` (n,) around `inner` that reset `compiled`."""
-    reset, level = compiled.native_reset(np.zeros((1, 2)))
+    reset, level = compiled.native_reset([LEVEL if inner.lifts else LEVEL[:2]])
     memory = native(engine, compiled)
     records = ffi.new("engine_levelling_t[]", len(patience))
     for row, patient in enumerate(patience.tolist()):
@@ -82,5 +83,6 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.controller, record.self = inner.step, inner.instance(row)
         record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
         record.level, record.patience = pointer("char *", level), patient
+        record.hover_m_s2, record.lifting = LEVEL[2], inner.lifts
     kept = inner, memory, level
-    return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept)
+    return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept, inner.lifts)

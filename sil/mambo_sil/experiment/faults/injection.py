@@ -6,7 +6,6 @@ controller themselves. Each has a twin in C, sil/mambo_sil/flight/engine/faults.
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,16 +16,9 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import ControllerInput, Fault
 from mambo_sil.experiment.faults.faults_in_c import native_faulty, native_levelling
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import LEVEL, Applied, flown, lifts, numbers_of
 from mambo_sil.flight.engine.native import Native
 from mambo_sil.flight.loop import PositionController
-
-
-@dataclass(frozen=True, eq=False)
-class Applied:
-    """What reaches the drone: command (n, 2) and status (n,), NOT_CALLED if the controller did not run."""
-
-    command_rad: NDArray[np.floating[Any]]
-    status: IntArray
 
 
 class FaultyController:
@@ -43,14 +35,14 @@ class FaultyController:
         faults: Sequence[Fault | None],
         instances: NDArray[np.uint8] | None = None,
     ) -> None:
-        self.controller = controller
+        self.controller = flown(controller)
         self._instances = instances
         self._given = faults
         self._faults = [(row, fault) for row, fault in enumerate(faults) if fault is not None]
         self._began: dict[int, ControllerInput] = {}
         self._update = 0
         latest = max((fault.late_updates for _, fault in self._faults), default=0)
-        level = np.zeros((len(faults), 2))
+        level = np.tile(LEVEL if lifts(self.controller) else LEVEL[:2], (len(faults), 1))
         self._computed = deque([level] * (latest + 1), maxlen=latest + 1)
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
@@ -69,13 +61,13 @@ class FaultyController:
         outcome = self.controller.step(state, target, thrust)
         if self._instances is not None and before is not None:
             self._instances[~called] = before[~called]
-        self._computed.append(np.where(called[:, np.newaxis], outcome.command_rad, self._computed[-1]))
-        command_rad = self._computed[-1].copy()
+        self._computed.append(np.where(called[:, np.newaxis], numbers_of(outcome), self._computed[-1]))
+        command = self._computed[-1].copy()
         for row, fault in active:
             late = min(fault.late_updates, self._update - fault.begin + 1)
-            command_rad[row] = self._computed[-1 - late][row]
+            command[row] = self._computed[-1 - late][row]
         self._update += 1
-        return Applied(command_rad, np.where(called, outcome.status, NOT_CALLED))
+        return Applied.of(command, np.where(called, outcome.status, NOT_CALLED))
 
     def wrap(self, engine: Any, inner: Native) -> Native:
         """Return the same around `inner` in the engine, for one flight of each controller from its start."""
@@ -85,13 +77,15 @@ class FaultyController:
 class LevellingCaller:
     """A caller of n controllers that commands zero tilt after `patience` (n,) consecutive rejected steps.
 
-    It also resets `compiled` (`nmpc_reset`) to zero tilt, so that the first accepted step starts from there.
+    It also resets `compiled` (`nmpc_reset`) to zero tilt, so that the first accepted step starts from there;
+    with a controller of the height, to hover.
     """
 
     def __init__(
         self, controller: PositionController, compiled: CompiledController, patience: IntArray
     ) -> None:
-        self.controller = controller
+        self.controller = flown(controller)
+        self._level = np.array(LEVEL if lifts(self.controller) else LEVEL[:2])
         self._compiled = compiled
         self._patience = patience
         self._refused = np.zeros(len(patience), np.int64)
@@ -102,9 +96,9 @@ class LevellingCaller:
         self._refused = np.where(outcome.status != 0, self._refused + 1, 0)
         ended = self._refused == self._patience
         if ended.any():  # the other controllers receive NaN, which they reject
-            self._compiled.reset(np.where(ended, 0.0, np.nan)[:, np.newaxis] * np.ones(2))
+            self._compiled.reset(np.where(ended[:, np.newaxis], self._level, np.nan))
         levelled = (self._refused >= self._patience)[:, np.newaxis]
-        return Applied(np.where(levelled, 0.0, outcome.command_rad), outcome.status)
+        return Applied.of(np.where(levelled, self._level, numbers_of(outcome)), outcome.status)
 
     def wrap(self, engine: Any, inner: Native) -> Native:
         """Return the same around `inner` in the engine, for one flight of each controller from its start."""

@@ -68,7 +68,6 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     bursts = SetState(range(7), _NAN, on=3, of=10)
     jump = move_target(jump_m)
     bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
-    bad_thrust = _only(Status.BAD_THRUST)
     levels_out = "caller levels out"
     return (
         FaultScenario(
@@ -96,8 +95,7 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
         FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
-        FaultScenario("thrust reported as zero, 1 s", 1.0, SetThrust(0.0), answers=bad_thrust),
-        FaultScenario("thrust NaN, 1 s", 1.0, SetThrust(_NAN), answers=bad_thrust),
+        *(_of_the_height() if settings.height else _of_the_thrust()),
         FaultScenario("yaw a turn off, to the end", TO_THE_END, shift_yaw(2.0 * math.pi)),
         FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, WrapYaw(), turning=True),
         FaultScenario("yaw half a turn off, 1 s", 1.0, shift_yaw(math.pi)),
@@ -106,6 +104,22 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
         *(_wrong_weights(settings) if method_of(settings).weight_limits else ()),
         *(_limited(settings) if method_of(settings).limiting else ()),
+    )
+
+
+def _of_the_thrust() -> tuple[FaultScenario, ...]:
+    bad_thrust = _only(Status.BAD_THRUST)
+    return (
+        FaultScenario("thrust reported as zero, 1 s", 1.0, SetThrust(0.0), answers=bad_thrust),
+        FaultScenario("thrust NaN, 1 s", 1.0, SetThrust(_NAN), answers=bad_thrust),
+    )
+
+
+def _of_the_height() -> tuple[FaultScenario, ...]:
+    return (
+        FaultScenario("thrust told as least, 1 s", 1.0, SetThrust(1.0), answers=_only(Status.OK)),
+        FaultScenario("floor reported in the air, 1 s", 1.0, SetState(range(9, 10), 1.0)),
+        FaultScenario("height NaN, 1 s", 1.0, SetState(range(7, 8), _NAN), answers=_only(Status.BAD_STATE)),
     )
 
 
@@ -125,7 +139,7 @@ def _limited(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario(f"fence of {2 * FENCE_M:g} m, 5 s", 5.0, limits=near, answers=ok),
         FaultScenario("speed limit 0.5 m/s, 5 s", 5.0, limits=with_limits(settings, speed=0.5), answers=ok),
-        FaultScenario("limits NaN, 5 s", 5.0, limits=(_NAN,) * 7, answers=refused),
+        FaultScenario("limits NaN, 5 s", 5.0, limits=(_NAN,) * len(near), answers=refused),
         FaultScenario(
             "fence inside out, 5 s", 5.0, limits=with_limits(settings, **square_fence(-1.0)), answers=refused
         ),

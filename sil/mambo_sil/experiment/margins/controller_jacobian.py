@@ -57,7 +57,10 @@ def linear_controller(settings: Settings) -> LinearController | None:
 
 
 def _step(controller: CompiledController, state: FloatArray) -> Any:
-    """Step controllers whose target is the origin, at hover thrust."""
+    """Step controllers whose target is the origin, at hover thrust; with a height it is 0, too."""
+    if controller.settings.height is not None:
+        heights = np.zeros((controller.n, 3))
+        return controller.step(np.concatenate([state, heights], axis=1), np.zeros((controller.n, 9)))
     target, thrust = np.zeros((controller.n, 6)), np.full(controller.n, GRAVITY_M_S2)
     return controller.step(state, target, thrust)
 

@@ -4,16 +4,36 @@
  */
 #include "nmpc.h"
 
+#ifdef NMPC_HAS_HEIGHT
+/* Numbers of a state: those of nmpc_state_t, and 1 or 0 for the contact with the floor. */
+#define STATE_NUMBERS 10
+
+static nmpc_state_t state_of(const nmpc_real_t *numbers)
+{
+    const nmpc_state_t state = { { numbers[0], numbers[1] }, { numbers[2], numbers[3] }, numbers[4], numbers[5],
+                                 numbers[6], numbers[7], numbers[8], numbers[9] != (nmpc_real_t)0 };
+
+    return state;
+}
+#endif
+
 #ifdef NMPC_STORED_NUMBERS
 /* Output arrays of a step: for each controller one element, of stored NMPC_STORED_NUMBERS. */
 typedef struct {
     int *status;
+#ifdef NMPC_HAS_HEIGHT
+    nmpc_real_t (*command_rad)[2];
+#else
     nmpc_command_t *command;
+#endif
     int *missed;
     int *saturated;
     nmpc_real_t *stored;
 #ifdef NMPC_LIMIT_SPEED
     int *active;
+#endif
+#ifdef NMPC_HAS_HEIGHT
+    nmpc_real_t *thrust_m_s2;
 #endif
 } nmpc_outcome_t;
 
@@ -76,6 +96,35 @@ void nmpc_batch_init(nmpc_t *controllers, int n)
     }
 }
 
+#ifdef NMPC_HAS_HEIGHT
+/* There is no thrust; Python passes none. */
+void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const nmpc_target_t *target,
+                     const nmpc_real_t *none, const nmpc_outcome_t *outcome)
+{
+    int i;
+
+    (void)none;
+    for (i = 0; i < n; i++) {
+        const nmpc_state_t measured = state_of(&state[i * STATE_NUMBERS]);
+        nmpc_command_t command;
+
+        outcome->status[i] = (int)nmpc_step(&controllers[i], &measured, &target[i], &command);
+        outcome->command_rad[i][0] = command.roll_rad;
+        outcome->command_rad[i][1] = command.pitch_rad;
+        outcome->thrust_m_s2[i] = command.thrust_m_s2;
+        read_outcome(&controllers[i], i, outcome);
+    }
+}
+
+void nmpc_batch_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        (void)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
+    }
+}
+#else
 void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, const nmpc_target_t *target,
                             const nmpc_real_t *thrust_acceleration_m_s2, const nmpc_outcome_t *outcome)
 {
@@ -87,6 +136,7 @@ void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, cons
         read_outcome(&controllers[i], i, outcome);
     }
 }
+#endif
 
 unsigned long nmpc_batch_instance_bytes(void)
 {

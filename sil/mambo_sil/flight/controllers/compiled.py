@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.limits_constants import LIMITS
-from mambo_codegen.numbers.representation import COMMAND, STATE, THRUST, WEIGHTS, Representation
+from mambo_codegen.numbers.representation import THRUST, WEIGHTS, Representation
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.flight.controllers.controller_library import build_library, ffi
@@ -24,19 +24,22 @@ def digest_compiled(library: Any, episodes: int) -> int:
 
 
 def as_arrays(
-    method: Method, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+    method: Method, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike | None
 ) -> list[NDArray[Any]]:
-    """Return state (n, 7), target (n, 4) or (n, 6), thrust (n,) as the C reads them.
+    """Return state (n, k), target (n, m) and, without a height, thrust (n,) as the C reads them.
 
-    Columns of a target that the controller has no use for are left out. Raises ValueError for other shapes.
+    Columns of a target that the controller has no use for are left out. Raises ValueError for other shapes,
+    and for a thrust that is missing or that there is not.
     """
     columns = len(method.target)
+    if (thrust is None) != method.has_height:
+        raise ValueError(f"a step takes {'no' if method.has_height else 'the'} thrust with these settings")
     return [
         as_array(method.numbers, values, quantities, shape)
         for values, quantities, shape in (
-            (state, STATE, (n, 7)),
+            (state, method.state, (n, len(method.state))),
             (np.asarray(target)[:, :columns], method.target, (n, columns)),
-            (thrust, THRUST, (n,)),
+            *(() if thrust is None else ((thrust, THRUST, (n,)),)),
         )
     ]
 
@@ -63,8 +66,16 @@ def empty_outcome(method: Method, n: int, integer: DTypeLike) -> dict[str, NDArr
 
 
 Setter = Literal["set_weights", "set_limits"]
-SETTERS: Final[dict[Setter, Sequence[str]]] = {"set_weights": WEIGHTS, "set_limits": LIMITS}
-"""The functions that change a controller in flight, and the quantities of their numbers."""
+SETTERS: Final[tuple[Setter, ...]] = ("set_weights", "set_limits")
+"""The functions that change a controller in flight."""
+
+
+def setter_quantities(method: Method, setter: Setter) -> Sequence[str]:
+    """Return the quantities of the numbers of a setter."""
+    if setter == "set_weights":
+        return WEIGHTS
+    return method.limiting.quantities if method.limiting else LIMITS
+
 
 DIRT = b"\xa5"
 """Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
@@ -90,12 +101,12 @@ class CompiledController:
         return ffi.addressof(self._library, "nmpc_host_step"), self._controllers, self._instance_bytes
 
     def native_reset(self, command_rad: ArrayLike) -> tuple[Any, NDArray[Any]]:
-        """Return the function `nmpc_host_reset`, and `command_rad` (n, 2) as it reads them."""
-        return self._native_set("nmpc_host_reset", command_rad, COMMAND)
+        """Return the function `nmpc_host_reset`, and `command_rad` (n, 2) or (n, 3) as it reads them."""
+        return self._native_set("nmpc_host_reset", command_rad, self._method.command)
 
     def native_setter(self, setter: Setter, values: ArrayLike) -> tuple[Any, NDArray[Any]]:
-        """Return the function of `set_weights` or `set_limits`, and `values` (n, k) as it reads them."""
-        return self._native_set(f"nmpc_host_{setter}", values, SETTERS[setter])
+        """Return the function of a setter, and `values` (n, k) as it reads them."""
+        return self._native_set(f"nmpc_host_{setter}", values, setter_quantities(self._method, setter))
 
     @property
     def instances(self) -> NDArray[np.uint8]:
@@ -104,24 +115,37 @@ class CompiledController:
         return whole[: self.n * self._instance_bytes].reshape(self.n, -1)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
-        return self._set_each(self._library.nmpc_host_reset, command_rad, COMMAND)
+        """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,).
+
+        With a height (n, 3), the thrust over mass too.
+        """
+        return self._set_each(self._library.nmpc_host_reset, command_rad, self._method.command)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
         """Set tracking and effort weight to `weights` (n, 2), of a 1-norm; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_set_weights, weights, WEIGHTS)
 
     def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Tell that `command_rad` (n, 2) was sent, with a quadratic cost; returns a status (n,)."""
-        return self._set_each(self._library.nmpc_host_set_command, command_rad, COMMAND)
+        """Tell that `command_rad` (n, 2) or (n, 3) was sent, with a quadratic cost; returns a status (n,)."""
+        return self._set_each(self._library.nmpc_host_set_command, command_rad, self._method.command)
+
+    def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
+        """Tell that the drones got thrusts over mass (n,); returns a status (n,).
+
+        Raises ValueError without a height in the settings.
+        """
+        if not self._method.has_height:
+            raise ValueError("the settings have no height")
+        return self._set_each(self._library.nmpc_host_set_thrust, np.asarray(thrust_m_s2)[:, None], THRUST)
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
-        """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t; returns a status (n,).
+        """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; returns a status (n,).
 
         Raises ValueError without limits in the settings.
         """
         self._demand_limits()
-        return self._set_each(self._library.nmpc_host_set_limits, limits, LIMITS)
+        quantities = setter_quantities(self._method, "set_limits")
+        return self._set_each(self._library.nmpc_host_set_limits, limits, quantities)
 
     @property
     def limits_active(self) -> NDArray[np.int64]:
@@ -131,11 +155,12 @@ class CompiledController:
         self._library.nmpc_host_limits_active(self._controllers, self.n, ffi.cast("int *", _address(active)))
         return active.astype(np.int64)
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
-        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> Any:
+        """Compute the next commands; the inputs are those of `ReferenceController.step`.
 
-        The target's columns are x, y, vx, vy, ax, ay; only a controller that is given the acceleration of its
-        target reads the last two, and needs them.
+        Only a controller that is given the acceleration of its target reads ax and ay, and needs them.
 
         Returns a step of the class `Method.step_type`.
         """
@@ -151,7 +176,7 @@ class CompiledController:
 
         Each call reads what is in `inputs` then, and overwrites `outcome`.
         """
-        given = [_address(values) for values in inputs]
+        given = [_address(values) for values in inputs] + [ffi.NULL] * (3 - len(inputs))
         results = [_address(values) for values in outcome.values()]
         addresses = ffi.new("void *[]", results)
         function, controllers, n = self._library.nmpc_batch_step, self._controllers, self.n

@@ -26,16 +26,18 @@ DECLARATIONS: Final = """
     void nmpc_host_reset(void *controllers, int n, const void *command, int *status);
     void nmpc_host_set_weights(void *controllers, int n, const void *weights, int *status);
     void nmpc_host_set_command(void *controllers, int n, const void *command, int *status);
+    void nmpc_host_set_thrust(void *controllers, int n, const void *thrust, int *status);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
     void nmpc_host_limits_active(const void *controllers, int n, int *active);
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
-                           double thrust_acceleration_m_s2, double *command_rad);
+                           double thrust_acceleration_m_s2, double *command);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);
 """
 """The functions that Python calls in a library: those of the glue, and one step of the self-test.
 
 nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost,
-nmpc_host_set_limits and nmpc_host_limits_active with limits. `ffi` is made from them.
+nmpc_host_set_thrust with a height, nmpc_host_set_limits and nmpc_host_limits_active with limits.
+`ffi` is made from them.
 """
 
 ffi: Final[Any] = controller_interface.ffi

@@ -7,14 +7,23 @@
 #include "nmpc.h"
 
 /* Python passes arrays of numbers where the C reads structs. */
-typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
 #ifdef NMPC_HAS_TARGET_ACCELERATION
-#define TARGET_NUMBERS 6
+#define LEVEL_NUMBERS 6
 #else
-#define TARGET_NUMBERS 4
+#define LEVEL_NUMBERS 4
+#endif
+#ifdef NMPC_HAS_HEIGHT
+#define TARGET_NUMBERS (LEVEL_NUMBERS + (LEVEL_NUMBERS / 2))
+#define COMMAND_NUMBERS 3
+#define LIMITS_NUMBERS 11
+#else
+typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
+#define TARGET_NUMBERS LEVEL_NUMBERS
+#define COMMAND_NUMBERS 2
+#define LIMITS_NUMBERS 7
 #endif
 typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == TARGET_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
-typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == COMMAND_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
 #ifndef NMPC_STORED_NUMBERS
 typedef char assert_weights_are_an_array[(sizeof(nmpc_weights_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
 #endif
@@ -48,8 +57,19 @@ void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *wei
 }
 #endif
 
+#ifdef NMPC_HAS_HEIGHT
+void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
+    }
+}
+#endif
+
 #ifdef NMPC_LIMIT_SPEED
-typedef char assert_limits_are_an_array[(sizeof(nmpc_limits_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_limits_are_an_array[(sizeof(nmpc_limits_t) == LIMITS_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
 
 void nmpc_host_set_limits(nmpc_t *controllers, int n, const nmpc_limits_t *limits, int *status)
 {
@@ -85,18 +105,22 @@ static nmpc_real_t number_of(double value, int bits)
 }
 #define NUMBER(value, quantity) number_of(value, NMPC_##quantity##_BITS)
 #define ANGLE_RAD(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_ANGLE_BITS))
+#define THRUST_M_S2(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_THRUST_BITS))
 #else
 #define NUMBER(value, quantity) ((nmpc_real_t)(value))
 #define ANGLE_RAD(number) ((double)(number))
+#define THRUST_M_S2(number) ((double)(number))
 #endif
 
-/* One step of one controller in SI units, for the engine of the simulation. */
+/* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
+ * of a state, whose last is not 0 on the floor, and 9 of a target; it is told a thrust that is no NaN, and returns the
+ * next one behind the angles. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
-                       double thrust_acceleration_m_s2, double *command_rad)
+                       double thrust_acceleration_m_s2, double *command)
 {
     nmpc_state_t measured;
     nmpc_target_t wanted;
-    nmpc_command_t command;
+    nmpc_command_t given;
     nmpc_status_t status;
     int i;
 
@@ -112,8 +136,24 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     measured.roll_rad = NUMBER(state[4], ANGLE);
     measured.pitch_rad = NUMBER(state[5], ANGLE);
     measured.yaw_rad = NUMBER(state[6], YAW);
-    status = nmpc_step((nmpc_t *)self, &measured, &wanted, NUMBER(thrust_acceleration_m_s2, THRUST), &command);
-    command_rad[0] = ANGLE_RAD(command.roll_rad);
-    command_rad[1] = ANGLE_RAD(command.pitch_rad);
+#ifdef NMPC_HAS_HEIGHT
+    if (thrust_acceleration_m_s2 == thrust_acceleration_m_s2) {
+        (void)nmpc_set_thrust((nmpc_t *)self, NUMBER(thrust_acceleration_m_s2, THRUST));
+    }
+    measured.height_m = NUMBER(state[7], POSITION);
+    measured.climb_m_s = NUMBER(state[8], VELOCITY);
+    measured.grounded = state[9] != 0.0;
+    wanted.height_m = NUMBER(target[6], POSITION);
+    wanted.climb_m_s = NUMBER(target[7], VELOCITY);
+#ifdef NMPC_HAS_TARGET_ACCELERATION
+    wanted.climb_acceleration_m_s2 = NUMBER(target[8], THRUST);
+#endif
+    status = nmpc_step((nmpc_t *)self, &measured, &wanted, &given);
+    command[2] = THRUST_M_S2(given.thrust_m_s2);
+#else
+    status = nmpc_step((nmpc_t *)self, &measured, &wanted, NUMBER(thrust_acceleration_m_s2, THRUST), &given);
+#endif
+    command[0] = ANGLE_RAD(given.roll_rad);
+    command[1] = ANGLE_RAD(given.pitch_rad);
     return (int64_t)status;
 }

@@ -9,6 +9,7 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.flight.controllers.compiled import SETTERS, CompiledController, Setter
+from mambo_sil.flight.controllers.thrust_controller import flown, innermost
 from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign
 from mambo_sil.flight.loop import Outcome, PositionController
@@ -36,7 +37,7 @@ class AdjustedController:
     """
 
     def __init__(self, controller: PositionController, n: int, adjustments: Sequence[Adjustment]) -> None:
-        self.controller = controller
+        self.controller = flown(controller)
         self._n = n
         self._adjustments = adjustments
         self._update = 0
@@ -53,7 +54,7 @@ class AdjustedController:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
         """Set what is due at this update, and step."""
-        for setter, quantities in SETTERS.items():
+        for setter in SETTERS:
             due = [
                 index
                 for index, one in enumerate(self._adjustments)
@@ -61,9 +62,10 @@ class AdjustedController:
             ]
             if due:
                 rows = [self._adjustments[index].row for index in due]
-                values = np.full((self._n, len(quantities)), np.nan)
-                values[rows] = [self._adjustments[index].values for index in due]
-                self._status[due] = getattr(self.controller, setter)(values)[rows]
+                given = [self._adjustments[index].values for index in due]
+                values = np.full((self._n, len(given[0])), np.nan)
+                values[rows] = given
+                self._status[due] = getattr(innermost(self.controller), setter)(values)[rows]
         self._update += 1
         outcome: Outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
         return outcome
@@ -73,7 +75,7 @@ class AdjustedController:
 
         The engine writes the answer to each adjustment into its element of the statuses.
         """
-        compiled = self.controller
+        compiled = innermost(self.controller)
         assert isinstance(compiled, CompiledController)
         records = ffi.new("engine_adjusted_t[]", self._n)
         kept: list[Any] = [inner, self._status]
@@ -91,4 +93,5 @@ class AdjustedController:
                 kept.append(values)
             records[row].adjustments, records[row].count = due, len(own)
             kept.append(due)
-        return Native(engine.engine_adjusted_step, records, ffi.sizeof("engine_adjusted_t"), tuple(kept))
+        size = ffi.sizeof("engine_adjusted_t")
+        return Native(engine.engine_adjusted_step, records, size, tuple(kept), inner.lifts)

@@ -27,11 +27,12 @@ static double remainder_of(double value, double period)
 static void alter(const engine_faulty_t *faulty, int64_t since, double *state, double *target, double *thrust_m_s2)
 {
     const double *values = faulty->values;
+    const int64_t states = faulty->lifting ? 10 : 7;
     int64_t i;
 
     switch (faulty->effect) {
     case FREEZE_STATE:
-        for (i = 0; i < 7; i++) {
+        for (i = 0; i < states; i++) {
             state[i] = faulty->began[i];
         }
         break;
@@ -41,12 +42,12 @@ static void alter(const engine_faulty_t *faulty, int64_t since, double *state, d
         }
         break;
     case SCALE_STATE:
-        for (i = 0; i < 7; i++) {
+        for (i = 0; i < states; i++) {
             state[i] = state[i] * values[i];
         }
         break;
     case SHIFT_STATE:
-        for (i = 0; i < 7; i++) {
+        for (i = 0; i < states; i++) {
             state[i] = state[i] + values[i];
         }
         break;
@@ -72,49 +73,48 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
     const int64_t depth = faulty->late_updates + 1;
     const int active = (faulty->begin <= faulty->update) && (faulty->update < faulty->end);
     const int dropped = active && (faulty->drop_every > 0) && ((since % faulty->drop_every) == 0);
-    double *computed_rad = faulty->computed_rad + (2 * (faulty->update % depth));
-    const double *before_rad = faulty->computed_rad + (2 * ((faulty->update + faulty->late_updates) % depth));
-    const double *sent_rad = computed_rad;
-    double given[7];
-    double aimed[6];
-    double answer_rad[2];
+    const size_t states = (faulty->lifting ? 10U : 7U) * sizeof(double);
+    const size_t targets = (faulty->lifting ? 9U : 6U) * sizeof(double);
+    double *computed = faulty->computed + (3 * (faulty->update % depth));
+    const double *before = faulty->computed + (3 * ((faulty->update + faulty->late_updates) % depth));
+    const double *sent = computed;
+    double given[10];
+    double aimed[9];
+    double answer[3] = { 0.0, 0.0, 0.0 };
     int64_t status;
     int i;
 
-    memcpy(given, state, sizeof given);
-    memcpy(aimed, target, sizeof aimed);
+    memcpy(given, state, states);
+    memcpy(aimed, target, targets);
     if (active) {
         if (since == 0) {
-            memcpy(faulty->began, state, sizeof given);
+            memcpy(faulty->began, state, states);
         }
         alter(faulty, since, given, aimed, &thrust_acceleration_m_s2);
     }
     if (dropped) {
-        for (i = 0; i < 7; i++) {
+        for (i = 0; i < 10; i++) {
             given[i] = NAN;
         }
         if (faulty->memory != NULL) {
             memcpy(faulty->saved, faulty->memory, (size_t)faulty->memory_bytes);
         }
     }
-    status = faulty->controller(faulty->self, given, aimed, thrust_acceleration_m_s2, answer_rad);
+    status = faulty->controller(faulty->self, given, aimed, thrust_acceleration_m_s2, answer);
     if (dropped) {
         status = -1;
-        answer_rad[0] = before_rad[0];
-        answer_rad[1] = before_rad[1];
+        memcpy(answer, before, sizeof answer);
         if (faulty->memory != NULL) {
             memcpy(faulty->memory, faulty->saved, (size_t)faulty->memory_bytes);
         }
     }
-    computed_rad[0] = answer_rad[0];
-    computed_rad[1] = answer_rad[1];
+    memcpy(computed, answer, sizeof answer);
     if (active) {
         const int64_t late = (faulty->late_updates <= since) ? faulty->late_updates : (since + 1);
 
-        sent_rad = faulty->computed_rad + (2 * (((faulty->update + depth) - late) % depth));
+        sent = faulty->computed + (3 * (((faulty->update + depth) - late) % depth));
     }
-    command_rad[0] = sent_rad[0];
-    command_rad[1] = sent_rad[1];
+    memcpy(command_rad, sent, (faulty->lifting ? 3U : 2U) * sizeof *sent);
     faulty->update++;
     return status;
 }
@@ -133,6 +133,9 @@ int64_t engine_levelling_step(void *self, const double *state, const double *tar
     if (caller->refused >= caller->patience) {
         command_rad[0] = 0.0;
         command_rad[1] = 0.0;
+        if (caller->lifting) {
+            command_rad[2] = caller->hover_m_s2;
+        }
     }
     return status;
 }

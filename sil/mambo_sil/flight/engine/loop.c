@@ -38,15 +38,18 @@ static inline void mark_lost(const engine_simulation_t *simulation, vehicle_stat
     }
 }
 
-/* Call the controllers, except of dropped updates, and record the update. */
+/* Call the controllers, except of dropped updates, and record the update. The thrust is that of the altitude loop, or
+ * what controllers that command it are told; the one recorded is that of the loop, of the controllers or of a take-off. */
 static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                         int64_t update, const double *targets, const engine_draws_t *draws,
-                        engine_controller_t controller, void *self, int64_t stride,
-                        const seen_t *truth_now, const seen_t *seen, real_t thrust_n, real_t *command_rad,
-                        const engine_trace_t *trace)
+                        engine_controller_t controller, void *self, int64_t stride, const seen_t *truth_now,
+                        const seen_t *seen, real_t thrust_m_s2, real_t *held, const engine_trace_t *trace)
 {
-    const real_t thrust_acceleration_m_s2 = thrust_n / simulation->nominal_mass_kg;
-    lanes_t command[2] = { { command_rad[0] }, { command_rad[1] } };
+    const int take_off = update < simulation->open_loop_updates;
+    const real_t lift_m_s2 = splat(simulation->take_off_thrust_n / simulation->nominal_mass_kg);
+    const real_t touching = choose(flight->landing & (truth_now->position_m[2] >= 0.0), splat(1.0), splat(0.0));
+    const real_t heights[3] = { -seen->position_m[2], -seen->velocity_m_s[2], touching };
+    lanes_t command[3] = { { held[0] }, { held[1] }, { held[2] } };
     int lane;
     int i;
 
@@ -54,31 +57,33 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         const int64_t row = ((index + lane) * simulation->updates) + update;
         const int64_t drop = (lane * simulation->updates) + update;
         const int dropped = simulation->dropping && (draws->drops[drop] < lane_of(flight->dropped_share, lane));
-        double measured[7];
-        double answer_rad[2];
+        double measured[10];
+        double answer[3] = { 0.0, 0.0, 0.0 };
         int64_t status;
 
-        for (i = 0; i < 7; i++) {
+        for (i = 0; i < 10; i++) {
             const real_t value = (i < 2) ? seen->position_m[i]
-                                         : ((i < 4) ? seen->velocity_m_s[i - 2] : seen->euler_rad[i - 4]);
+                                         : ((i < 4) ? seen->velocity_m_s[i - 2]
+                                                    : ((i < 7) ? seen->euler_rad[i - 4] : heights[i - 7]));
 
             measured[i] = dropped ? NAN : lane_of(value, lane);
         }
         status = controller((char *)self + (lane * stride), measured, targets + (simulation->target_columns * row),
-                            lane_of(thrust_acceleration_m_s2, lane), answer_rad);
+                            lane_of(thrust_m_s2, lane), answer);
         if (dropped) {
             status = -1;
         } else {
-            for (i = 0; i < 2; i++) {
-                command[i].lane[lane] = number(answer_rad[i]);
-                command_rad[i] = command[i].real;
+            for (i = 0; i < 3; i++) {
+                command[i].lane[lane] = number(answer[i]);
+                held[i] = command[i].real;
             }
         }
         write_axes(trace->position_m, row, lane, 3, truth_now->position_m);
         write_axes(trace->velocity_m_s, row, lane, 3, truth_now->velocity_m_s);
         write_axes(trace->euler_rad, row, lane, 3, truth_now->euler_rad);
-        write_axes(trace->command_rad, row, lane, 2, command_rad);
-        write_axes(trace->thrust_acceleration_m_s2, row, lane, 1, &thrust_acceleration_m_s2);
+        write_axes(trace->command_rad, row, lane, 2, held);
+        write_axes(trace->thrust_acceleration_m_s2, row, lane, 1,
+                   take_off ? &lift_m_s2 : (simulation->lifting ? &held[2] : &thrust_m_s2));
         trace->status[row] = status;
         if (simulation->sensed) {
             write_axes(trace->seen_position_m, row, lane, 3, seen->position_m);
@@ -144,7 +149,7 @@ static inline vertical_t vertical_target(const engine_simulation_t *simulation, 
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
                   flying_t *flying)
 {
-    const wire_t wire = { { { splat(0.0) } } };
+    const real_t hover_m_s2 = splat(simulation->gravity_m_s2);
     vehicle_state_t state;
     int i;
 
@@ -168,10 +173,13 @@ void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *
         flying->gusts = gusts_start(drawn);
     }
     late_start(simulation, flight->thrust_start_n, &flying->late);
-    flying->wire = wire;
-    flying->command_rad[0] = splat(0.0);
-    flying->command_rad[1] = splat(0.0);
+    flying->command[0] = splat(0.0);
+    flying->command[1] = splat(0.0);
+    flying->command[2] = choose(flight->body_start[POSITION + 2] < 0.0, hover_m_s2, splat(0.0));
+    wire_start(flying->command, &flying->wire);
     flying->altitude_integral_n = splat(0.0);
+    flying->given_n = splat(0.0);
+    flying->capped = splat(0.0);
     flying->ticks = 0;
 }
 
@@ -198,7 +206,10 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         real_t drawn[8];
         real_t shares[4];
         real_t steady_rad_s[4];
-        real_t arriving_rad[2];
+        real_t arriving[3];
+        real_t told_m_s2;
+        real_t wanted_n;
+        real_t given_n;
         seen_t truth_now;
         seen_t seen;
 
@@ -226,26 +237,40 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             take(draws->sensors, rows, row, 8, drawn);
             seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
         }
-        if (update >= simulation->lifting_updates) {
+        if ((update >= simulation->open_loop_updates) && !simulation->lifting) {
             thrust_n = altitude_thrust_n(simulation, &wanted, &seen, &flying->altitude_integral_n);
         }
         if (tick == 0) {
+            told_m_s2 = thrust_n / simulation->nominal_mass_kg;
+            if (simulation->lifting) {
+                told_m_s2 = choose((flying->capped > 0.0), (flying->given_n / (double)simulation->ticks_per_update)
+                                                               / simulation->nominal_mass_kg, splat(NAN));
+                flying->given_n = splat(0.0);
+                flying->capped = splat(0.0);
+            }
             call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,
-                 thrust_n, flying->command_rad, trace);
+                 told_m_s2, flying->command, trace);
         }
-        carry(flight, ticks, flying->command_rad, &flying->wire, arriving_rad);
+        carry(flight, ticks, flying->command, &flying->wire, arriving);
+        wanted_n = simulation->nominal_mass_kg * arriving[2];
+        if ((update >= simulation->open_loop_updates) && simulation->lifting) {
+            thrust_n = clip(wanted_n, -simulation->thrust_limit_n, simulation->thrust_limit_n);
+        }
         if (simulation->attitude == FIRST_ORDER) {
-            advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving_rad, &r,
+            given_n = maximum(thrust_n, splat(0.0));
+            advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving, &r,
                     &flying->late, state->body);
         } else {
             if (simulation->attitude == CASCADE) {
-                cascade_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+                cascade_shares(simulation, &seen, arriving, thrust_n, heading_rad, state->memory, shares);
             } else {
-                stock_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+                stock_shares(simulation, &seen, arriving, thrust_n, heading_rad, state->memory, shares);
             }
-            commanded_speeds(simulation, shares, steady_rad_s);
+            given_n = commanded_speeds(simulation, shares, steady_rad_s);
             integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, state);
         }
+        flying->given_n = flying->given_n + given_n;
+        flying->capped = choose(magnitude(given_n - wanted_n) > simulation->capped_n, splat(1.0), flying->capped);
         if (simulation->landing) {
             carry_on_ground(flight, state->body);
         }

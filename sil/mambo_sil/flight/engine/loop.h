@@ -20,8 +20,10 @@ typedef struct {
     late_t late;
     gusts_t gusts;
     wire_t wire;
-    real_t command_rad[2];
+    real_t command[3];        /* roll, pitch and, where controllers command it, thrust over mass */
     real_t altitude_integral_n;
+    real_t given_n;           /* what the motors were commanded since the last update, summed over ticks */
+    real_t capped;            /* 1 if that was another thrust than the one that arrived, else 0 */
     int64_t ticks;
 } flying_t;
 

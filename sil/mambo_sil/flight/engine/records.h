@@ -11,7 +11,7 @@ typedef struct {
     int64_t updates;          /* of the position controller */
     int64_t ticks_per_update;
     int64_t first_tick;       /* on the trajectory's clock: negative for a take-off */
-    int64_t lifting_updates;  /* updates with the constant thrust of a take-off */
+    int64_t open_loop_updates;  /* updates with the constant thrust of a take-off */
     int64_t disturbed;        /* whether any flight has gusts, payload, push, impulse, battery sag or ground
                                * effect */
     int64_t windy;            /* whether any flight has gusts */
@@ -21,6 +21,7 @@ typedef struct {
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
+    int64_t lifting;          /* whether the controllers command the thrust */
     int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
 
     double step_s;            /* a tick */
@@ -75,6 +76,7 @@ typedef struct {
     double integrated_error_m;
     double integral_limit_n;
     double take_off_thrust_n;
+    double capped_n;          /* a larger difference of thrusts is told to the controller */
 
     /* Mixer: the wrench that one unit of command of all rotors gives. */
     double wrench_per_command[4];
@@ -185,7 +187,9 @@ typedef struct {
 } engine_trace_t;
 
 /* A position controller: reads a state of 7 and a target of 6 numbers, to which a course with a height adds height,
- * climb and vertical acceleration; writes roll and pitch, returns a status. */
+ * climb and vertical acceleration; writes roll and pitch, returns a status. One that commands the thrust reads states
+ * of 10 and targets of 9 numbers, is told the thrust in place of that of the altitude loop, NaN for the commanded one,
+ * and writes the thrust over mass behind the angles. */
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
@@ -272,12 +276,13 @@ typedef struct {
 int64_t engine_pid_feedforward_step(void *self, const double *state, const double *target,
                                     double thrust_acceleration_m_s2, double *command_rad);
 
-/* A controller with a fault: sil/mambo_sil/experiment/faults/fault.py. Initially update is 0 and computed_rad is 0. */
+/* A controller with a fault: sil/mambo_sil/experiment/faults/fault.py. Initially update is 0. */
 typedef struct {
     engine_controller_t controller;
     void *self;
+    int64_t lifting;          /* whether the controller commands the thrust */
     int64_t effect;
-    double values[7];
+    double values[10];
     int64_t columns[2];
     int64_t on;
     int64_t of;
@@ -288,8 +293,8 @@ typedef struct {
     char *memory;             /* of the controller, which a dropped update leaves as it is; NULL if it has none */
     char *saved;              /* as long as memory */
     int64_t memory_bytes;
-    double *computed_rad;     /* (late_updates + 1, 2): the last commands, at the remainder of their update */
-    double began[7];          /* state at the onset */
+    double *computed;         /* (late_updates + 1, 3): the last commands, at the remainder of their update */
+    double began[10];         /* state at the onset */
     int64_t update;
 } engine_faulty_t;
 
@@ -299,13 +304,15 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
 /* nmpc_host_reset or nmpc_host_set_weights of a generated controller. */
 typedef void (*engine_setter_t)(void *controllers, int n, const void *values, int *status);
 
-/* A caller that commands zero tilt after `patience` rejected steps: LevellingCaller. */
+/* A caller that commands hover after `patience` rejected steps: LevellingCaller. */
 typedef struct {
     engine_controller_t controller;
     void *self;
     engine_setter_t reset;
     void *memory;             /* of the generated controller */
-    const void *level;        /* zero tilt in its numbers */
+    const void *level;        /* zero tilt, and with a thrust that of hover, in its numbers */
+    double hover_m_s2;
+    int64_t lifting;
     int64_t patience;
     int64_t refused;
 } engine_levelling_t;

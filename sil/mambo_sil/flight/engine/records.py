@@ -26,8 +26,9 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
 )
 from mambo_sil.flight import altitude_loops
 from mambo_sil.flight.engine.engine_library import record_type
-from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, open_loop_updates, start_state
 from mambo_sil.flight.names import AltitudeName
+from mambo_sil.flight.thrust_delivery import CAPPED_SHARE
 
 Record = NDArray[Any]
 
@@ -44,8 +45,11 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
-    """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,)."""
+def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = False) -> Record:
+    """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
+
+    `lifting` says whether the controllers command the thrust.
+    """
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
     transition, input_gain = instruments.discretize_imu(STEP_S)
@@ -61,7 +65,7 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "updates": len(times_s),
             "ticks_per_update": flight.ticks_per_update,
             "first_tick": round(times_s[0] / step_s),
-            "lifting_updates": lifting_updates(flight, times_s),
+            "open_loop_updates": open_loop_updates(flight, times_s),
             "disturbed": flight.disturbances.any,
             "windy": flight.disturbances.windy,
             "dropping": bool(np.any(flight.link.dropped_share)),
@@ -70,7 +74,8 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
-            "target_columns": flight.given_targets.shape[2],
+            "lifting": lifting,
+            "target_columns": (flight.targets_in_space if lifting else flight.given_targets).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
@@ -81,6 +86,7 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "weight_n": drone.weight_n,
             "thrust_limit_n": drone.altitude.thrust_max_n,
             "take_off_thrust_n": loops.take_off_thrust_n(drone),
+            "capped_n": CAPPED_SHARE * drone.weight_n,
             "wrench_per_command": wrench_per_command(nominal)[:, 0],
             "nominal_mass_kg": nominal.mass_kg,
             "rotor_offset_m": flight.vehicle.airframe.rotor_offset_m,

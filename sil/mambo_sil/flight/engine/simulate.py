@@ -14,6 +14,7 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
+from mambo_sil.flight.controllers.thrust_controller import flown
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.native import Native, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
@@ -51,6 +52,7 @@ def fly(
     machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
     UnwritableError if the engine cannot be built for want of a folder or space.
     """
+    controller = flown(controller)
     engine = _engine(flight, [controller])
     if engine is None:
         return loop.fly(flight, controller, progress)
@@ -66,6 +68,7 @@ def fly_groups(
     which stays in the processor's cache. Engine, `progress` and errors as in `fly`; in NumPy all flights are
     one group.
     """
+    controllers = [flown(one) for one in controllers]
     engine = _engine(flight, controllers)
     if engine is not None:
         yield from _fly_groups(engine, flight, controllers, progress)
@@ -81,7 +84,7 @@ def fly_compiled(
     """Simulate flights in a library of `engine_library.load`, group after group, with a controller in C."""
     simulation = _Simulation(engine, flight)
     trace = simulation.allocate(flight.flights)
-    called, record = native(engine, controller), trace_record(trace)
+    called, record = native(engine, flown(controller)), trace_record(trace)
     for first in simulation.firsts:
         simulation.draw(first)
         simulation.fly(first, called, record, first)
@@ -135,9 +138,9 @@ class _Simulation:
         self._engine, self._flight = engine, flight
         self.lanes = int(engine.engine_lanes())
         self.firsts = range(0, flight.flights, self.lanes)
-        self._times_s, self._targets = flight.times_s(), flight.given_targets
-        self._record = simulation_record(flight, self._times_s)
-        self._groups = in_lanes(flight_records(flight, self._targets[0]), self.lanes)
+        self._times_s = flight.times_s()
+        self._records = cache(lambda lifting: simulation_record(flight, self._times_s, lifting=lifting))
+        self._groups = in_lanes(flight_records(flight, flight.given_targets[0]), self.lanes)
         updates = len(self._times_s)
         self._buffers = _Buffers(flight, self.lanes, updates, updates * flight.ticks_per_update)
         self._seeds = flight.seeds or (0,) * flight.flights
@@ -153,13 +156,15 @@ class _Simulation:
 
     def fly(self, first: int, called: Native, record: Any, place: int) -> None:
         """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
-        self._record["flights"] = place + min(self.lanes, self._flight.flights - first)
+        flight, common = self._flight, self._records(called.lifts)
+        targets = flight.targets_in_space if called.lifts else flight.given_targets
+        common["flights"] = place + min(self.lanes, flight.flights - first)
         self._engine.engine_fly(
-            pointer("engine_simulation_t *", self._record),
+            pointer("engine_simulation_t *", common),
             pointer("engine_flight_t *", self._groups[first // self.lanes]),
             place,
             pointer("double *", self._times_s),
-            pointer("double *", _by_flight(self._targets)[first - place :]),
+            pointer("double *", _by_flight(targets)[first - place :]),
             self._draws,
             called.step,
             called.instance(first),

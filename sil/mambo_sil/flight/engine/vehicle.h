@@ -122,8 +122,8 @@ static inline real_t smallest(const real_t *value)
     return minimum(minimum(minimum(value[0], value[1]), value[2]), value[3]);
 }
 
-/* Steady rotor speeds of the commands that sum up shares of thrust, roll, pitch and yaw. */
-static inline void commanded_speeds(const engine_simulation_t *simulation, const real_t *share, real_t *speeds)
+/* Steady rotor speeds of the commands that sum up shares of thrust, roll, pitch and yaw; returns their thrust. */
+static inline real_t commanded_speeds(const engine_simulation_t *simulation, const real_t *share, real_t *speeds)
 {
     const real_t others[4] = { (share[0] + share[1]) + share[2], (share[0] - share[1]) + share[2],
                                (share[0] - share[1]) - share[2], (share[0] + share[1]) - share[2] };
@@ -150,9 +150,10 @@ static inline void commanded_speeds(const engine_simulation_t *simulation, const
         }
     }
     for (i = 0; i < 4; i++) {
-        speeds[i] = square_root(simulation->speed_squared_per_command_rad2_s2
-                                * clip(command[i], simulation->command_min, simulation->command_max));
+        command[i] = clip(command[i], simulation->command_min, simulation->command_max);
+        speeds[i] = square_root(simulation->speed_squared_per_command_rad2_s2 * command[i]);
     }
+    return (((command[0] + command[1]) + command[2]) + command[3]) * (simulation->wrench_per_command[0] / 4.0);
 }
 
 /* Wrench of the rotors on their way from `before` to `steady`, `decay` being the share of the way that is left. */

@@ -63,27 +63,39 @@ static inline void apply_impulse(const engine_flight_t *flight, int64_t tick, re
 
 /* Commands on their way to the stock loops, at the remainder of their tick. */
 typedef struct {
-    real_t sent_rad[DELAY_TICKS_MAX + 1][2];
+    real_t sent[DELAY_TICKS_MAX + 1][3];
 } wire_t;
 
-static inline void carry(const engine_flight_t *flight, int64_t tick, const real_t *command_rad, wire_t *wire,
-                         real_t *arriving_rad)
+static inline void wire_start(const real_t *first, wire_t *wire)
+{
+    int k;
+    int i;
+
+    for (k = 0; k < (DELAY_TICKS_MAX + 1); k++) {
+        for (i = 0; i < 3; i++) {
+            wire->sent[k][i] = first[i];
+        }
+    }
+}
+
+static inline void carry(const engine_flight_t *flight, int64_t tick, const real_t *command, wire_t *wire,
+                         real_t *arrived)
 {
     const int64_t depth = DELAY_TICKS_MAX + 1;
     lanes_t delay_ticks;
-    lanes_t arriving[2];
+    lanes_t arriving[3];
     int lane;
     int i;
 
     delay_ticks.whole = flight->delay_ticks;
-    for (i = 0; i < 2; i++) {
-        wire->sent_rad[tick % depth][i] = command_rad[i];
+    for (i = 0; i < 3; i++) {
+        wire->sent[tick % depth][i] = command[i];
         for (lane = 0; lane < LANES; lane++) {
             const int64_t sent = (tick + depth) - delay_ticks.whole_lane[lane];
 
-            arriving[i].lane[lane] = lane_of(wire->sent_rad[sent % depth][i], lane);
+            arriving[i].lane[lane] = lane_of(wire->sent[sent % depth][i], lane);
         }
-        arriving_rad[i] = arriving[i].real;
+        arrived[i] = arriving[i].real;
     }
 }
 

@@ -38,6 +38,15 @@ LATE_VELOCITY_M_S: Final = 0.15
 LEAST_POSITION_M: Final = 0.001
 """Noise densities of the observer."""
 
+QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.13, 1.5, 1.15
+LEAST_LAG_S, LONGEST_LAG_S = 0.03, 0.5
+"""A shorter lag in the model of the thrust rings on a drone whose rotors are slower."""
+THRUST_MIN_M_S2, THRUST_SHARE = 2.9, 0.95
+LEAST_THRUST_MAX_M_S2, MOST_THRUST_MAX_M_S2 = 10.8, 100.0
+"""Bounds of height.thrust_max_m_s2."""
+DESCENT_M_S, DESCENT_S = 1.5, 0.265
+"""Default of height.descent_m_s; and speed that is surely braked, over the acceleration upwards."""
+
 MOST_THRUST_M_S2: Final = 50.0
 """Default of ranges.thrust_acceleration_max_m_s2."""
 
@@ -67,6 +76,7 @@ def derive(drone: VehicleFile) -> list[Derived]:
         *_observer(drone),
         *_limits(drone),
         *_thrust_range(drone),
+        *_height(drone),
     ]
 
 
@@ -87,12 +97,18 @@ def controller_text(drone: VehicleFile, source: str) -> str:
 
 def _horizon(drone: VehicleFile) -> Iterator[Derived]:
     """Yield the update period, the whole number of ticks nearest to 10 ms, and the ramp."""
-    rate_hz = drone.attitude.rate_hz
-    ticks = max(1, round(UPDATE_PERIOD_S * rate_hz))
-    if ticks / rate_hz != UPDATE_PERIOD_S:
+    rate_hz, period_s = drone.attitude.rate_hz, _update_period_s(drone)
+    if period_s != UPDATE_PERIOD_S:
+        ticks = round(period_s * rate_hz)
         words = f"{ticks} of the inner loops' ticks, attitude.rate_hz = {rate_hz}"
-        yield Derived("horizon", "update_period_s", ticks / rate_hz, words)
+        yield Derived("horizon", "update_period_s", period_s, words)
     yield Derived("horizon", "ramp_s", RAMP_S, "So that the controller sees its tilt limit coming")
+
+
+def _update_period_s(drone: VehicleFile) -> float:
+    """Return the whole number of ticks nearest to 10 ms."""
+    rate_hz = drone.attitude.rate_hz
+    return max(1, round(UPDATE_PERIOD_S * rate_hz)) / rate_hz
 
 
 def _attitude(drone: VehicleFile) -> Iterator[Derived]:
@@ -191,6 +207,34 @@ def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:
     if largest_m_s2 > MOST_THRUST_M_S2:
         words = "The largest thrust over the mass, altitude.thrust_max_n and body.mass_kg"
         yield Derived("ranges", "thrust_acceleration_max_m_s2", float(math.ceil(largest_m_s2)), words)
+
+
+def _height(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield the height of a drone whose thrust is known, as far as it can climb; nothing for another."""
+    thrust_m_s2 = drone.altitude.thrust_max_n / drone.body.mass_kg
+    most_m_s2 = _round(min(THRUST_SHARE * thrust_m_s2, MOST_THRUST_MAX_M_S2))
+    if (drone.rotors is None and drone.thrust is None) or most_m_s2 < LEAST_THRUST_MAX_M_S2:
+        return
+    source = "rotors.lag_s" if drone.thrust is None else "thrust.lag_s"
+    lag_s = min(drone.motor_lag_s if drone.thrust is None else drone.thrust.lag_s, LONGEST_LAG_S)
+    dead_time_s = 0.0 if drone.thrust is None else drone.thrust.dead_time_s
+    words = f"As {source}" if lag_s >= LEAST_LAG_S else f"Longer than {source}: too long is safe"
+    yield Derived("height", "lag_s", _round(max(lag_s, LEAST_LAG_S)), words)
+    delay_s = _round(min(dead_time_s + _update_period_s(drone) / 2.0, 0.1))
+    words = "Half an update period" + (" and thrust.dead_time_s" if dead_time_s else "")
+    yield Derived("height", "delay_s", delay_s, words)
+    slowness_s = SLOWNESS * (max(lag_s, LEAST_LAG_S) + delay_s)
+    response_s = _round(min(max(QUICKEST_HEIGHT_S, slowness_s), SLOWEST_RESPONSE_S))
+    words = f"{SLOWNESS:g} times lag and delay, at least {QUICKEST_HEIGHT_S:g}"
+    yield Derived("height", "response_time_s", response_s, words)
+    weight_s = float(f"{min(CLIMB_WEIGHT * response_s, SLOWEST_RESPONSE_S):.2g}")
+    yield Derived("height", "velocity_weight_s", weight_s, f"{CLIMB_WEIGHT:g} times that")
+    yield Derived("height", "thrust_min_m_s2", THRUST_MIN_M_S2, "0.3 g: roll and pitch need some thrust")
+    words = f"{THRUST_SHARE:g} of {thrust_m_s2:.3g}, altitude.thrust_max_n over body.mass_kg"
+    yield Derived("height", "thrust_max_m_s2", most_m_s2, words)
+    descent_m_s = _round(DESCENT_S * (most_m_s2 - GRAVITY_M_S2))
+    if descent_m_s < DESCENT_M_S:
+        yield Derived("height", "descent_m_s", descent_m_s, "What the largest thrust brakes in time")
 
 
 def _round(value: float) -> float:

@@ -1,0 +1,348 @@
+"""Height: the third axis, whose command is the thrust; and what it means for the others."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.methods.inputs import Rows, choose
+from mambo_codegen.methods.math import Real, clamp, confine
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
+from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.height_constants import (
+    COSINE_TERMS,
+    FLOOR_MARGIN_M,
+    LEAST_COSINE,
+    LEAST_WEIGHT,
+    ROW_STATES,
+    HeightConstants,
+)
+from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.fields import SMALLEST_LIMIT
+
+
+@dataclass(frozen=True)
+class HeightState:
+    """The height of n controllers, (n,) each; up is positive.
+
+    height_m, velocity_m_step, disturbance_m_step2, gain: estimates; of the last two the settings choose one.
+    thrust, lagged, command: sa, sc, su of the model of the thrust in nmpc.c, m/step^2.
+    target:      the motion of the target, (n, 1).
+    share:       of the thrust that acts vertically: the cosine of the tilt.
+    thrust_m_s2: the last command.
+    """
+
+    height_m: Real
+    velocity_m_step: Real
+    disturbance_m_step2: Real
+    gain: Real
+    thrust: Real
+    lagged: Real
+    command: Real
+    target: TargetMotion
+    share: Real
+    thrust_m_s2: Real
+
+
+@dataclass(frozen=True)
+class HeightBounds:
+    """Limits of the height of n controllers, (n,) each, in m.
+
+    floor_m, ceiling_m: the walls of the fence.
+    up_m, down_m:       the distances at which the law approaches at the largest climb and descent.
+    """
+
+    floor_m: Real
+    ceiling_m: Real
+    up_m: Real
+    down_m: Real
+
+
+class HeightAxis:
+    """The constants of the height, in the scalar type of the controller."""
+
+    def __init__(
+        self, constants: QuadraticConstants, found: HeightConstants, products: QuadraticArithmetic
+    ) -> None:
+        constant, settings = products.numbers.constant, constants.settings
+        self._products, self._found = products, found
+        rows, last = found.gain, "gain" if found.learns_gain else "disturbance"
+        self._gain = [
+            [
+                constant(value, f"{name}_by_{by}")
+                for value, by in zip(row, ("position", "velocity"), strict=True)
+            ]
+            for row, name in zip(rows, ("position", "velocity", last), strict=True)
+        ]
+        self._thrust_row = [constant(value, "attitude") for value in found.thrust_row]
+        self._lagged_row = [constant(value, "attitude") for value in found.lagged_row]
+        self._rows = [
+            [constant(value, f"row_{state}") for value, state in zip(row, ROW_STATES, strict=True)]
+            for row in found.rows
+        ]
+        self._ratio = constant(found.ratio, "ratio")
+        self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
+        self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)
+        self._least_cosine = constant(LEAST_COSINE, "sine")
+        self._gravity = constant(found.gravity_m_step2, "acceleration")
+        self._per_gravity = constant(found.per_gravity, "per_gravity")
+        self._least = constant((LEAST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
+        self._most = constant((MOST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
+        self._thrusts = [constant(value, "acceleration") for value in found.thrust_m_step2]
+        height = constants.settings.height
+        assert height is not None
+        self._thrusts_m_s2 = [
+            constant(value, "thrust") for value in (height.thrust_min_m_s2, height.thrust_max_m_s2)
+        ]
+        self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
+        self._reach = constant(found.reach_steps, "reach")
+        self._margin = constant(FLOOR_MARGIN_M, "position")
+        self._tracker = Tracker(found.tracker, products) if found.tracker else None
+        age_steps = constants.observer.age_steps
+        self._age = constant(age_steps, "age") if age_steps else None
+        self._height_limit = constant(settings.ranges.position_m, "position")
+        self._velocity_limit = constant(constants.observer.velocity_limit_m_step, "speed")
+        self._hover_m_s2 = constant(GRAVITY_M_S2, "thrust")
+        self._up, self._down = constant(found.up_m, "position"), constant(found.down_m, "position")
+        self._step2 = constant(found.step2_s2, "step2")
+        self._steps2 = constant(found.steps2_per_s2, "per_step2")
+        self._lines = {
+            name: (
+                *(constant(value, "factor") for value in (line.start, line.slope, line.two, 2.0)),
+                line.steps,
+            )
+            for name, line in (("thrust", found.thrust_inverse), ("weight", found.weight_inverse))
+        }
+        self._least_speed = constant(SMALLEST_LIMIT, "velocity")
+        self._most_speeds = np.array([constant(value, "velocity") for value in found.most_m_s])
+
+    def bounds(self, limits: Real) -> HeightBounds:
+        """Derive what the steps need from good limits (n, 4), of the quantities HEIGHT_LIMITS."""
+        products = self._products
+        distance = products.reach_product(self._reach, products.speed_product(limits[:, 2:4]))
+        return HeightBounds(limits[:, 0], limits[:, 1], distance[:, 0], distance[:, 1])
+
+    def check_limits(self, limits: Real) -> Rows:
+        """Return whether limits (n, 4) may be set (n,); not if one is NaN."""
+        floor, ceiling, speeds = limits[:, 0], limits[:, 1], limits[:, 2:4]
+        good: Rows = (
+            (floor >= -self._height_limit)
+            & (floor < ceiling)
+            & (ceiling <= self._height_limit)
+            & np.all((speeds >= self._least_speed) & (speeds <= self._most_speeds), axis=1)
+        )
+        return good
+
+    @property
+    def hover_m_s2(self) -> Any:
+        """The thrust over mass of hover."""
+        return self._hover_m_s2
+
+    def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
+        """Return the height of drones with a steady thrust (n,) and the attitude of commands (n, 2)."""
+        zeros = np.zeros_like(thrust_m_s2)
+        share = self._cosine(command_rad)
+        command = self._vertical(share, thrust_m_s2)
+        return HeightState(
+            height_m=zeros,
+            velocity_m_step=zeros,
+            disturbance_m_step2=zeros,
+            gain=np.full_like(zeros, self._one),
+            thrust=command,
+            lagged=command,
+            command=command,
+            target=unknown_motion(zeros[:, None]),
+            share=share,
+            thrust_m_s2=thrust_m_s2,
+        )
+
+    def limited(self, thrust_m_s2: Real) -> Real:
+        """Return thrusts (n,) within their limits."""
+        return confine(thrust_m_s2, *self._thrusts_m_s2)
+
+    def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
+        """Change the last thrusts to `thrust_m_s2` (n,), within the limits."""
+        return replace(state, command=self._vertical(state.share, thrust_m_s2), thrust_m_s2=thrust_m_s2)
+
+    def advance(self, state: HeightState) -> HeightState:
+        """Let the model of the thrust answer the last command over one control step."""
+        row, total = self._thrust_row, self._products.attitude_sum
+        thrust = ((row[0] * state.thrust) + (row[1] * state.lagged)) + (row[2] * state.command)
+        lagged = (self._lagged_row[0] * state.lagged) + (self._lagged_row[1] * state.command)
+        return replace(state, thrust=total(thrust), lagged=total(lagged))
+
+    def measure(
+        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+    ) -> tuple[HeightState, Rows]:
+        """Correct the estimates by measured height, climb and contact with the floor (n, 3).
+
+        tilt_rad (n, 2) compensates the thrust. Returns also which drones (n,) lie on the floor.
+        """
+        lies = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
+        step = self._products.speed_product(measured[:, 1])
+        first, share = has_state & none_yet, self._cosine(tilt_rad)
+        started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
+        lying = replace(started, velocity_m_step=np.zeros_like(step))
+        found = choose(none_yet, started, self._correct(state, measured, step))
+        corrected = choose(has_state, choose(lies, lying, found), state)
+        flown = self._vertical(share, state.thrust_m_s2)
+        steady = replace(corrected, thrust=flown, lagged=flown, command=flown)
+        return replace(choose(first, steady, corrected), share=share), lies
+
+    def aim(
+        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
+    ) -> tuple[HeightState, Rows]:
+        """Set the next thrust for targets (n, 2 or 3), or for rest at the own height.
+
+        measured (n, 3): as in `measure`, zeros without a good state. follows (n,): whether there is a target.
+        Returns also whether speed or fence changed what was aimed at (n,).
+        """
+        products, motion = self._products, state.target
+        goal = np.where(follows, target[:, 0], state.height_m)
+        climb = np.where(follows, products.speed_product(target[:, 1]), np.zeros_like(goal))
+        disturbance, jerk = state.disturbance_m_step2, np.zeros_like(goal)
+        if self._tracker is not None:
+            given = target[:, 2:3] if self._tracker.is_given else target[:, 1:2]
+            motion = choose(follows, self._tracker.update(motion, given), motion)
+            acceleration = motion.acceleration_m_step2[:, 0]
+            disturbance = np.where(follows, disturbance - acceleration, disturbance)
+            jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
+        error = state.height_m - goal
+        lead = products.reach_product(self._reach, climb)
+        up, down = self._up, self._down
+        if bounds is not None:
+            up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
+            down = confine(state.height_m - bounds.floor_m, -bounds.up_m, bounds.down_m)
+        limited = confine(error, lead - up, lead + down)
+        share = state.share
+        if self._found.learns_gain:
+            share = products.factor_product(share, state.gain)
+        least, most = (products.factor_product(thrust, share) - self._gravity for thrust in self._thrusts)
+        values = [
+            *(limited, state.velocity_m_step - climb, disturbance, jerk),
+            *(self.lift(state, thrust) for thrust in (state.thrust, state.lagged, state.command)),
+        ]
+        command = self._minimize(values, least, most)
+        rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)
+        command = np.where(rests, least, command)
+        thrust = products.factor_product(self._gravity + command, self._inverse("thrust", share))
+        thrust = self.limited(products.thrust_product(self._steps2, thrust))
+        command = self._vertical(state.share, thrust)
+        return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
+
+    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+        """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
+        products = self._products
+        acceleration = np.where(lies, 0, self._acceleration(state))
+        mean = state.velocity_m_step + products.half_change(acceleration)
+        velocity = state.velocity_m_step + products.velocity_change(acceleration)
+        return replace(
+            state,
+            height_m=clamp(state.height_m + products.position_change(mean), self._height_limit),
+            velocity_m_step=clamp(velocity, self._velocity_limit),
+        )
+
+    def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:
+        """Forget the targets of some controllers (n,)."""
+        return replace(state, target=choose(cleared, unknown_motion(state.target.velocity_m_s), state.target))
+
+    def weight(self, acceleration: Real) -> Real:
+        """Return (g + acceleration)/g (n,), by which the tilt of a climbing drone counts, within limits."""
+        limited = confine(acceleration, self._least, self._most)
+        weight: Real = self._one + self._products.gravity_product(self._per_gravity, limited)
+        return weight
+
+    def over_weight(self, acceleration: Real, weight: Real) -> Real:
+        """Return accelerations (n, 2) over weights (n,), never too small by rounding."""
+        return self._products.factor_product(acceleration, self._inverse("weight", weight)[:, None])
+
+    def _inverse(self, name: str, value: Real) -> Real:
+        """Return 1/value from products, as `Reciprocal` has it."""
+        product, (start, slope, two_last, two, steps) = self._products.factor_product, self._lines[name]
+        found: Real = start - product(slope, value)
+        for step in range(steps):
+            found = product(found, (two_last if step == steps - 1 else two) - product(found, value))
+        return found
+
+    def _cosine(self, tilt_rad: Real) -> Real:
+        """Return cos roll cos pitch (n,) of angles (n, 2), at least LEAST_COSINE."""
+        product = self._products.sine_product
+        square = self._products.angle_square(tilt_rad)
+        cosine = self._cosine_one - product(square, self._half - product(square, self._fourth))
+        both = product(cosine[:, 0], cosine[:, 1])
+        limited = np.where(both < self._least_cosine, self._least_cosine, both)
+        return self._products.to_factor(limited)
+
+    def _vertical(self, share: Real, thrust_m_s2: Real) -> Real:
+        """Return the share of a thrust over mass (n,) that acts vertically, m/step^2."""
+        return self._products.factor_product(self._products.step2_product(self._step2, thrust_m_s2), share)
+
+    def lift(self, state: HeightState, thrust: Real) -> Real:
+        """Return the vertical acceleration (n,) of a vertical thrust of the model, less gravity."""
+        if self._found.learns_gain:
+            thrust = self._products.factor_product(thrust, state.gain)
+        lift: Real = thrust - self._gravity
+        return lift
+
+    def _acceleration(self, state: HeightState) -> Real:
+        """Return the vertical acceleration (n,), with that of the disturbance."""
+        lift = self.lift(state, state.thrust)
+        return lift + state.disturbance_m_step2 if self._found.learns_acceleration else lift
+
+    def _correct(self, state: HeightState, measured: Real, step: Real) -> HeightState:
+        products, position, velocity = self._products, state.height_m, state.velocity_m_step
+        height = measured[:, 0]
+        if self._age is not None:
+            height = height + products.aged_position(self._age, velocity)
+            step = step + products.aged_velocity(self._age, self._acceleration(state))
+        by = height - position, step - velocity
+        gain = self._gain
+        corrected = replace(
+            state,
+            height_m=position + products.position_correction(gain[0][0], by[0], gain[0][1], by[1]),
+            velocity_m_step=velocity + products.velocity_correction(gain[1][0], by[0], gain[1][1], by[1]),
+        )
+        grounded = measured[:, 2] != 0
+        if self._found.learns_gain:
+            change = products.gain_correction(gain[2][0], by[0], gain[2][1], by[1])
+            learnt = state.gain + np.where(grounded & (change > 0), 0, change)
+            least, most = self._one - self._learn_limit, self._one + self._learn_limit
+            return replace(corrected, gain=confine(learnt, least, most))
+        if self._found.learns_acceleration:
+            change = products.disturbance_correction(gain[2][0], by[0], gain[2][1], by[1])
+            change = np.where(grounded & (change > 0), 0, change)
+            learnt = clamp(state.disturbance_m_step2 + change, self._learn_limit)
+            return replace(corrected, disturbance_m_step2=learnt)
+        return corrected
+
+    def _minimize(self, state: list[Real], least: Real, most: Real) -> Real:
+        """Return the first free move (n,) between limits that are not symmetric."""
+        products = self._products
+        least, most = products.to_move(least), products.to_move(most)
+        moves = []
+        for row in self._rows:
+            total = row[0] * state[0]
+            for gain, value in zip(row[1:], state[1:], strict=True):
+                total = total + (gain * value)
+            moves.append(products.row_sum(total))
+        if len(moves) == 1:
+            return products.move_acceleration(confine(moves[0], least, most))
+        first, second = moves
+        beyond = confine(second, least, most) - second
+        best = first - products.ratio_product(self._ratio, beyond)
+        return products.move_acceleration(confine(best, least, most))
+
+    def stored(self, state: HeightState) -> list[NDArray[Any]]:
+        """Return the columns (n, 1) of nmpc_height_t, in the order of `stored_quantities`."""
+        columns = [state.height_m, state.velocity_m_step]
+        columns += [state.gain] if self._found.learns_gain else []
+        columns += [state.disturbance_m_step2] if self._found.learns_acceleration else []
+        columns += [state.thrust, state.lagged, state.command, state.share, state.thrust_m_s2]
+        if self._tracker is not None:
+            motion = state.target
+            columns += [] if self._tracker.is_given else [motion.velocity_m_s[:, 0]]
+            columns += [motion.acceleration_m_step2[:, 0], motion.jerk_m_step2_update[:, 0]]
+        return [column[:, None] for column in columns]

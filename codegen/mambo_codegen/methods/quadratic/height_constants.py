@@ -1,0 +1,248 @@
+"""Constants of the height: model of the thrust, observer and law; and of what couples the axes.
+
+The model, the cost and the observer are those of right and forward, with the thrust in place of the tilt:
+
+    lag a' = c - a,  delay c' = u - c,   e' = v,  v' = a + w
+
+where g + u is the commanded thrust over mass along the vertical. `height.c.j2` has the equations.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, LoopValues, attitude_solution
+from mambo_codegen.methods.quadratic.law import LawSolution, axis_law
+from mambo_codegen.methods.quadratic.observer_constants import observer_gain
+from mambo_codegen.methods.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.height_section import Height
+from mambo_codegen.settings.key import Refusal
+from mambo_codegen.settings.sections import Sections
+
+LEAST_WEIGHT: Final = 0.3
+"""Least (g + a)/g, the factor by which the tilt of a climbing drone counts; MOST_WEIGHT is the largest."""
+
+LEAST_COSINE: Final = 0.6
+"""The thrust is compensated for the tilt as if cos roll cos pitch were at least this."""
+
+COSINE_TERMS: Final = 0.5, 0.0416
+"""cos x = 1 - x^2 (0.5 - 0.0416 x^2), within 9e-4 where that is more than LEAST_COSINE."""
+
+STEEPEST_RAD: Final = 1.2
+"""Beyond this angle the cosine is less than LEAST_COSINE."""
+
+RECIPROCAL_ERROR: Final = 3e-4
+"""Largest relative error of a reciprocal."""
+
+DESCENT_SHARE: Final = 0.7
+"""A descent ends by at most this share of the largest acceleration upwards."""
+
+FLOOR_MARGIN_M: Final = 0.02
+"""A target at most this far above a drone on the floor is one on the floor."""
+
+ROW_STATES: Final = ("e", "v", "w", "j", "a", "c", "u")
+"""The states that a row multiplies: those of the law less the integral part, which a thrust does not have."""
+
+
+@dataclass(frozen=True)
+class Reciprocal:
+    """1/x from products: y = start - slope x, and `steps` of y (2 - x y), of which the last has `two` for 2.
+
+    The relative error of each step is the square of that before: at most `error` in the end, and of one sign.
+    `most` is more than any y.
+    """
+
+    start: float
+    slope: float
+    steps: int
+    two: float
+    error: float
+    most: float
+
+
+@dataclass(frozen=True)
+class HeightConstants:
+    """Constants of the height, float64, for lengths in m and times in steps of an update period.
+
+    thrust_row:    (3,) the next a from [a, c, u].
+    lagged_row:    (2,) the next c from [c, u].
+    rows, ratio:   (moves, 7) the unlimited minimum from ROW_STATES, and H12/H11, as in `LawConstants`.
+    gain:          (3, 2) of the observer, as in `ObserverConstants`; with a learnt thrust gain the last row
+                   is that of the gain.
+    learn_limit:   largest deviation of the gain from 1, or largest learnt acceleration, m/step^2.
+    gravity_m_step2, per_gravity: g and its inverse.
+    thrust_m_step2: (2,) least and largest thrust over mass.
+    limit_m_step2: beyond every |a|, |c| and |u|.
+    reach_steps:   1/k of the approach rate k: the law flies at the climb v_T + k (p_T - p).
+    step2_s2, steps2_per_s2: T_s^2 and its inverse.
+    up_m, down_m:  distances at which the law flies at the largest climb and descent.
+    most_m_s:      (2,) largest limits of climb and descent: those that can be braked in time.
+    thrust_inverse, weight_inverse: of the thrust's factors, and of (g + u)/g; the latter is never too small.
+    tracker:       of the target's height; None without.
+    """
+
+    thrust_row: NDArray[np.float64]
+    lagged_row: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    ratio: float
+    gain: NDArray[np.float64]
+    learn: str
+    learn_limit: float
+    gravity_m_step2: float
+    per_gravity: float
+    thrust_m_step2: tuple[float, float]
+    limit_m_step2: float
+    reach_steps: float
+    up_m: float
+    down_m: float
+    step2_s2: float
+    steps2_per_s2: float
+    most_m_s: tuple[float, float]
+    thrust_inverse: Reciprocal
+    weight_inverse: Reciprocal
+    tracker: TrackerConstants | None
+
+    @property
+    def learns_gain(self) -> bool:
+        """Whether a factor of the thrust is learnt."""
+        return self.learn == "gain"
+
+    @property
+    def learns_acceleration(self) -> bool:
+        """Whether a vertical acceleration is learnt."""
+        return self.learn == "acceleration"
+
+
+def height_constants(settings: Sections) -> HeightConstants | None:
+    """Derive the constants of the height; None if `settings` have none."""
+    height, step_s = settings.height, settings.horizon.update_period_s
+    if height is None:
+        return None
+    rows, law = np.array(attitude_solution(step_s, _loop(height))["rows"]), _law(settings, height)
+    gravity = GRAVITY_M_S2 * (step_s * step_s)
+    gain = observer_gain(settings, height.disturbance_noise)
+    deviation = height.learn_limit if height.learn == "gain" else 0.0
+    if height.learn == "gain":
+        gain = gain / np.array([[1.0], [1.0], [gravity]])
+    least, most = (step_s * step_s * thrust for thrust in (height.thrust_min_m_s2, height.thrust_max_m_s2))
+    reach_steps = float(law[0, 1] / law[0, 0])
+    climb, descent = _most_m_s(height, reach_steps * step_s)
+    shares = LEAST_COSINE * (1 - deviation), 1 + deviation
+    return HeightConstants(
+        thrust_row=rows[0, [0, 2, 3]],
+        lagged_row=rows[2, 2:],
+        rows=law,
+        ratio=_solution(settings, height).ratio,
+        gain=gain,
+        learn=height.learn,
+        learn_limit=height.learn_limit * (1.0 if height.learn == "gain" else gravity),
+        gravity_m_step2=gravity,
+        per_gravity=1 / gravity,
+        thrust_m_step2=(least, most),
+        limit_m_step2=max(gravity, ((1 + deviation) * most) - gravity),
+        reach_steps=reach_steps,
+        up_m=reach_steps * step_s * height.climb_m_s,
+        down_m=reach_steps * step_s * height.descent_m_s,
+        step2_s2=step_s * step_s,
+        steps2_per_s2=1 / (step_s * step_s),
+        most_m_s=(climb, descent),
+        thrust_inverse=_reciprocal(*shares),
+        weight_inverse=_never_too_small(_reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
+        tracker=tracker_constants(settings, step_s, _jump_m_s2(height)),
+    )
+
+
+def refusals(settings: Sections) -> list[Refusal]:
+    """Return why a controller cannot have the height of `settings`."""
+    height, step_s = settings.height, settings.horizon.update_period_s
+    if height is None:
+        return []
+    refused = []
+    most_m_s2 = settings.ranges.thrust_acceleration_max_m_s2
+    if height.thrust_max_m_s2 > most_m_s2:
+        rule = f"must be at most {most_m_s2!r} (ranges.thrust_acceleration_max_m_s2)"
+        refused.append(Refusal("height", "thrust_max_m_s2", rule))
+    try:
+        solution = _solution(settings, height)
+    except ValueError:
+        solution = None
+    if solution is None or not solution.spectral_radius < 1:
+        rule = "gives an unstable loop of the height with horizon.ramp_s; write a longer one"
+        return [*refused, Refusal("height", "response_time_s", rule)]
+    law = _law(settings, height)
+    approach_s = float(law[0, 1] / law[0, 0]) * step_s
+    for name, braked_m_s, rest in zip(
+        ("climb_m_s", "descent_m_s"),
+        _most_m_s(height, approach_s),
+        ("height.thrust_min_m_s2", "height.thrust_max_m_s2"),
+        strict=True,
+    ):
+        most_m_s = min(braked_m_s, settings.ranges.velocity_m_s)
+        if getattr(height, name) > most_m_s:
+            floor = np.floor(most_m_s * 1000) / 1000
+            rule = f"must be at most {floor:g}, which the drone can brake in time with {rest} and this law"
+            refused.append(Refusal("height", name, rule))
+    return refused
+
+
+def height_context(height: HeightConstants | None) -> dict[str, object]:
+    """Return what the templates of the height insert."""
+    return {
+        "height": height,
+        "height_quantities": [f"row_{state}" for state in ROW_STATES],
+        "gravity_m_s2": GRAVITY_M_S2,
+        "cosine_terms": COSINE_TERMS,
+        "least_cosine": LEAST_COSINE,
+        "steepest_rad": STEEPEST_RAD,
+        "floor_margin_m": FLOOR_MARGIN_M,
+        "least_weight": LEAST_WEIGHT,
+        "most_weight": MOST_WEIGHT,
+    }
+
+
+def _most_m_s(height: Height, approach_s: float) -> tuple[float, float]:
+    """Return the largest climb and descent whose braking, speed / approach_s, the thrust can give."""
+    return (
+        approach_s * (GRAVITY_M_S2 - height.thrust_min_m_s2),
+        approach_s * DESCENT_SHARE * (height.thrust_max_m_s2 - GRAVITY_M_S2),
+    )
+
+
+def _jump_m_s2(height: Height) -> float:
+    """Return the acceleration of a target that has jumped."""
+    return JUMP_MARGIN * max(GRAVITY_M_S2 - height.thrust_min_m_s2, height.thrust_max_m_s2 - GRAVITY_M_S2)
+
+
+def _loop(height: Height) -> LoopValues:
+    return (height.lag_s, 0.0, height.delay_s, 0.0)
+
+
+def _solution(settings: Sections, height: Height) -> LawSolution:
+    return axis_law(settings.horizon, height.response_time_s, height.velocity_weight_s, _loop(height))
+
+
+def _law(settings: Sections, height: Height) -> NDArray[np.float64]:
+    """Return the rows (moves, 7) of ROW_STATES."""
+    return np.array(_solution(settings, height).rows)[:, [0, 1, 2, 3, 4, 6, 7]]
+
+
+def _reciprocal(low: float, high: float) -> Reciprocal:
+    """Return the reciprocal of numbers from `low` to `high` with the fewest steps.
+
+    Its line has the same error, 1 - x y, at both ends, and the opposite one in the middle.
+    """
+    middle = low + high
+    start = 2 / (((low * high) / middle) + (middle / 4))
+    error, steps = (start * middle / 4) - 1, 0
+    while error > RECIPROCAL_ERROR:
+        error, steps = error * error, steps + 1
+    return Reciprocal(start, start / middle, steps, 2.0, error, 1.01 / low)
+
+
+def _never_too_small(found: Reciprocal) -> Reciprocal:
+    """Return the reciprocal that errs upwards: the last step rounds up by more than the error."""
+    margin = found.error + 1e-5
+    return replace(found, two=2 + margin, error=margin)

@@ -1,0 +1,85 @@
+"""The optional section of the height: its presence gives the controller a third axis."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from mambo_codegen.settings.fields import Delay, Number, SettingsSection
+
+
+class Height(SettingsSection):
+    """The height as a third axis of the controller, whose command is the thrust."""
+
+    lag_s: Number = Field(
+        0.05,
+        ge=0.005,
+        le=0.5,
+        description="Time constant of the first-order lag from commanded to delivered thrust, that of the "
+        "rotors, in seconds. Too long is safe; one that is too short rings, so never less than 0.03 for a "
+        "drone whose lag is not measured.",
+    )
+    delay_s: Delay = Field(
+        0.0,
+        description="Dead time of the thrust and its lags other than lag_s, in seconds, together: they count "
+        "as one first-order lag.",
+    )
+    response_time_s: Number = Field(
+        0.13,
+        ge=0.02,
+        le=2,
+        description="Time in which the drone answers an error of height, in seconds, as "
+        "cost.response_time_s: shorter is closer to the target, noisier and less robust.",
+    )
+    velocity_weight_s: Number = Field(
+        0.15,
+        ge=0,
+        le=2,
+        description="Weight of the climb's error beside the height's, in seconds: more damping after large "
+        "steps.",
+    )
+    thrust_min_m_s2: Number = Field(
+        2.9,
+        ge=0.5,
+        le=9,
+        description="Least commanded thrust over mass, in metres per second squared: enough for roll and "
+        "pitch to be controlled.",
+    )
+    thrust_max_m_s2: Number = Field(
+        15.0,
+        ge=10.8,
+        le=100,
+        description="Largest commanded thrust over mass, in metres per second squared: what the motors "
+        "deliver, less a reserve for roll, pitch and yaw.",
+    )
+    climb_m_s: Number = Field(
+        2.0,
+        ge=0.1,
+        le=20,
+        description="Largest speed upwards that the controller aims at, in metres per second.",
+    )
+    descent_m_s: Number = Field(
+        1.2,
+        ge=0.1,
+        le=20,
+        description="Largest speed downwards that the controller aims at, in metres per second.",
+    )
+    learn: Literal["gain", "acceleration", "none"] = Field(
+        "gain",
+        description='What the observer learns of the height: "gain", by which factor the thrust is more or '
+        'less than expected, as weight, battery and propellers make it; "acceleration", a vertical '
+        'acceleration, such as wind; "none", nothing.',
+    )
+    learn_limit: Number = Field(
+        0.5,
+        ge=0,
+        le=0.6,
+        description="Largest deviation of the learnt gain from 1; or largest learnt acceleration, in units "
+        "of 9.81 m/s^2.",
+    )
+    disturbance_noise: Number = Field(
+        3.0,
+        ge=1e-4,
+        le=100,
+        description="Noise density of the rate of what is learnt, in m/s^3 per root Hz: a larger one learns "
+        "faster. The other noises, age and outage are those of [observer].",
+    )

@@ -1,0 +1,90 @@
+"""Controllers of the height, which command the thrust, as the closed loop calls them.
+
+    state  [x, y, vx, vy, roll, pitch, yaw, height, climb, contact with the floor]   (n, 10)
+    target [x, y, vx, vy, ax, ay, height, climb, vertical acceleration]              (n, 9)
+    thrust what the drones got in the last update period over the nominal mass       (n,)
+
+The thrust is NaN where it is what the controller had commanded.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.methods import method_of
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.representation import TARGET
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+
+LEVEL: Final = (0.0, 0.0, GRAVITY_M_S2)
+"""The command of hover: roll, pitch, thrust over mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Applied:
+    """What reaches the drone: command (n, 2), status (n,), and the thrust (n,) of a controller of the height.
+
+    The status is NOT_CALLED where the controller did not run.
+    """
+
+    command_rad: NDArray[np.floating[Any]]
+    status: IntArray
+    thrust_m_s2: NDArray[np.floating[Any]] | None = None
+
+    @classmethod
+    def of(cls, numbers: FloatArray, status: IntArray) -> "Applied":
+        """Return what has the numbers (n, 2), or with a thrust (n, 3)."""
+        return cls(numbers[:, :2], status, numbers[:, 2] if numbers.shape[1] > 2 else None)
+
+
+def numbers_of(outcome: Any) -> FloatArray:
+    """Return the numbers of a command: roll and pitch (n, 2), with a thrust (n, 3)."""
+    thrust_m_s2 = getattr(outcome, "thrust_m_s2", None)
+    parts = (
+        [outcome.command_rad] if thrust_m_s2 is None else [outcome.command_rad, thrust_m_s2[:, np.newaxis]]
+    )
+    return np.concatenate(parts, axis=1, dtype=np.float64)
+
+
+class ThrustController:
+    """n controllers of the height, compiled or in NumPy, behind the interface of the closed loop."""
+
+    def __init__(self, controller: Any) -> None:
+        self.controller = controller
+        level = len(method_of(controller.settings).level_target)
+        self._columns = [*range(level), *range(6, 8 if level == len(TARGET) else 9)]
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
+        """Tell the controllers the thrusts that are no NaN, and return the next commands."""
+        if not np.isnan(thrust_acceleration_m_s2).all():
+            self.controller.set_thrust(thrust_acceleration_m_s2)
+        return self.controller.step(state, np.ascontiguousarray(target[:, self._columns]))
+
+    def wrap(self, _engine: Any, inner: Any) -> Any:
+        """Return the same in the engine: `nmpc_host_step` has this interface."""
+        return replace(inner, lifts=True)
+
+
+def flown(controller: Any) -> Any:
+    """Return a controller as the closed loop calls it."""
+    settings = getattr(controller, "settings", None)
+    is_lifting = getattr(settings, "height", None) is not None
+    return ThrustController(controller) if is_lifting else controller
+
+
+def innermost(controller: Any) -> Any:
+    """Return the controller inside all wrappers."""
+    while hasattr(controller, "controller"):
+        controller = controller.controller
+    return controller
+
+
+def lifts(controller: Any) -> bool:
+    """Return whether a controller, as the closed loop calls it, commands the thrust."""
+    while not isinstance(controller, ThrustController):
+        if not hasattr(controller, "controller"):
+            return False
+        controller = controller.controller
+    return True

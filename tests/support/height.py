@@ -1,0 +1,78 @@
+"""Settings with a height: corners, then random ones of a seed."""
+
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.settings.model import Settings
+from tests.support.quadratic import ONE_MOVE, TWO_MOVES, case_values, settings_of
+from tests.support.strategies import Values
+
+CRAZYFLIE: Final[Values] = TWO_MOVES | {
+    "height.lag_s": 0.072,
+    "height.delay_s": 0.005,
+    "height.thrust_max_m_s2": 15.2,
+    "height.descent_m_s": 1.5,
+}
+"""The Crazyflie's thrust."""
+
+HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
+    CRAZYFLIE | {"target.acceleration": "given", "observer.age_s": 0.01, "observer.outage_s": 0.05},
+    CRAZYFLIE
+    | {
+        "target.acceleration": "tracked",
+        "limits.speed_m_s": 1.5,
+        "limits.fence.floor_m": -0.5,
+        "limits.fence.ceiling_m": 1.5,
+        "observer.outage_s": 0.03,
+        "model.roll_trim_rad": 0.02,
+    },
+    ONE_MOVE
+    | {
+        "height.learn": "acceleration",
+        "model.attitude": "measured",
+        "height.learn_limit": 0.1,
+        "height.descent_m_s": 1.2,
+    },
+    CRAZYFLIE | {"height.learn": "none", "height.delay_s": 0.0, "limits.braking_m_s2": 2.0},
+    CRAZYFLIE
+    | {
+        "target.acceleration": "given",
+        "limits.fence.x_min_m": -1.5,
+        "limits.fence.x_max_m": 2.0,
+        "damping.pitch_rate_feedback_s": 0.02,
+        "height.learn_limit": 0.6,
+        "ranges.position_m": 5.0,
+        "ranges.velocity_m_s": 2.0,
+    },
+)
+"""One move and two, all that can be learnt, with and without tracker, limits, fence, age and feedback."""
+
+
+def height_case(index: int, scalar: str) -> Settings:
+    """Make the valid settings number `index` with a height."""
+    return settings_of(_values(index) | {"code.scalar": scalar})
+
+
+def _values(index: int) -> Values:
+    if index < len(HEIGHT_CORNERS):
+        return HEIGHT_CORNERS[index]
+    rng = np.random.default_rng(index)
+    level: dict[str, Any] = case_values(index)
+    shortest_s = max(0.08, 0.5 * level["horizon.ramp_s"])
+    values = level | {
+        "height.lag_s": float(10.0 ** rng.uniform(-2, -0.7)),
+        "height.delay_s": float(rng.choice([0.0, 0.005, 0.04])),
+        "height.response_time_s": shortest_s * float(rng.uniform(1, 3)),
+        "height.velocity_weight_s": float(rng.choice([0.0, 0.15, 0.5])),
+        "height.thrust_min_m_s2": float(rng.uniform(0.5, 4)),
+        "height.thrust_max_m_s2": float(rng.uniform(14, 40)),
+        "height.climb_m_s": float(rng.uniform(0.1, 0.4)),
+        "height.descent_m_s": float(rng.uniform(0.1, 0.3)),
+        "height.learn": str(rng.choice(["gain", "gain", "acceleration", "none"])),
+        "height.learn_limit": float(rng.uniform(0, 0.6)),
+        "height.disturbance_noise": float(10.0 ** rng.uniform(-1, 1)),
+    }
+    if rng.random() < 0.4:
+        values |= {"limits.fence.floor_m": -1.0, "limits.fence.ceiling_m": float(rng.uniform(0, 3))}
+    return values
