@@ -12,7 +12,7 @@ from mambo_sil.verify import tape_replay
 from mambo_sil.verify.calls import (
     NULL_COMMAND,
     NULL_SELF,
-    UNWRITTEN_RAD,
+    UNWRITTEN,
     ApiFunction,
     answers,
     calls,
@@ -75,7 +75,7 @@ def test_the_reference_answers_as_the_interface_promises() -> None:
     assert list(made["status"]) == [0, 2, 1, 1, 0, 2, 0]
     assert made["command_rad"][0].tobytes() == made["command_rad"][1].tobytes()
     assert np.all(made["command_rad"][2] == 0)
-    assert np.all(made["command_rad"][3:5] == UNWRITTEN_RAD)
+    assert np.all(made["command_rad"][3:5] == UNWRITTEN)
     assert np.all(made["command_rad"][5] == 0)
     assert made[6].tobytes() == made[0].tobytes()
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.inputs import Status, choose
-from mambo_codegen.methods.limits_constants import LIMITS
-from mambo_codegen.numbers.representation import ACCELERATION, COMMAND, STATE, TARGET, THRUST
+from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.step_rows import StepRows
 
 Tape = NDArray[Any]
 """A sequence of calls, an array of `call_type`."""
@@ -23,8 +23,8 @@ Tape = NDArray[Any]
 Outcomes = NDArray[Any]
 """The outcomes of the calls of a tape, an array of `outcome_type`."""
 
-UNWRITTEN_RAD: Final = 9.0
-"""Value of the command before each call; it remains if the call does not write."""
+UNWRITTEN: Final = 9.0
+"""Value of the command before each call, in the numbers of the C; it remains if the call does not write."""
 
 NULL_SELF: Final = 1
 NULL_FIRST: Final = 2
@@ -35,7 +35,8 @@ NULL_COMMAND: Final = 8
 class ApiFunction(IntEnum):
     """The function of the C interface that a call calls.
 
-    SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost, SET_LIMITS with limits.
+    SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost, SET_LIMITS with limits, SET_THRUST
+    with a height.
     """
 
     STEP = 0
@@ -44,6 +45,7 @@ class ApiFunction(IntEnum):
     SET_COMMAND = 2
     INIT = 3
     SET_LIMITS = 4
+    SET_THRUST = 5
 
 
 _POINTERS: Final = {
@@ -52,32 +54,33 @@ _POINTERS: Final = {
     ApiFunction.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
     ApiFunction.INIT: NULL_SELF,
     ApiFunction.SET_LIMITS: NULL_SELF | NULL_FIRST,
+    ApiFunction.SET_THRUST: NULL_SELF,
 }
 
-_LIMITS_BIT: Final = 64
-"""SET_LIMITS is written as SET_WEIGHTS with this bit."""
-
-
-def step_quantities(method: Method) -> tuple[str, ...]:
-    """Return the quantities of a step's numbers: state, target, thrust, and the acceleration if given."""
-    return (*STATE, *TARGET, *THRUST, *(ACCELERATION if len(method.target) > len(TARGET) else ()))
+_OTHER_BIT: Final = 64
+_WRITTEN_AS: Final = {
+    ApiFunction.SET_LIMITS: ApiFunction.SET_WEIGHTS | _OTHER_BIT,
+    ApiFunction.SET_THRUST: ApiFunction.INIT | _OTHER_BIT,
+}
+"""How functions are written for which two bits are too few."""
 
 
 def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
     """Return the quantities of the numbers that each function reads."""
     return {
-        ApiFunction.STEP: step_quantities(method),
-        ApiFunction.RESET: COMMAND,
+        ApiFunction.STEP: StepRows(method).quantities,
+        ApiFunction.RESET: method.command,
         ApiFunction.SET_WEIGHTS: method.setter_quantities,
-        ApiFunction.INIT: COMMAND,
-        ApiFunction.SET_LIMITS: LIMITS,
+        ApiFunction.INIT: method.command,
+        ApiFunction.SET_LIMITS: method.limiting.quantities if method.limiting else (),
+        ApiFunction.SET_THRUST: THRUST,
     }
 
 
 def call_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
     method = method_of(settings)
-    return np.dtype([("call", np.uint8), ("values", method.numbers.scalar, len(step_quantities(method)))])
+    return np.dtype([("call", np.uint8), ("values", method.numbers.scalar, len(StepRows(method).quantities))])
 
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
@@ -99,8 +102,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
 def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
     """Return a call of `function` for each row of values (n, k); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
-    code = ApiFunction.SET_WEIGHTS | _LIMITS_BIT if function == ApiFunction.SET_LIMITS else function
-    made["call"] = code | (nulls << 2)
+    made["call"] = _WRITTEN_AS.get(function, function) | (nulls << 2)
     method = method_of(settings)
     quantities = _quantities(method)[function][: values.shape[1]]
     made["values"][:, : values.shape[1]] = method.numbers.quantize(values, quantities)
@@ -134,17 +136,24 @@ class _Runs:
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
         self._method = method_of(settings)
-        self._quantities = _quantities(self._method)
+        self._quantities, self._rows = _quantities(self._method), StepRows(self._method)
         self._controller: Any = self._method.reference_controller(n)
         self._fresh = self._controller.memory
+        self._others = {
+            function: written
+            for function, written in _WRITTEN_AS.items()
+            if (self._method.has_height if function == ApiFunction.SET_THRUST else self._method.limiting)
+        }
+        self._level: dict[str, Any] = {"command_rad": 0}
+        if self._method.has_height:
+            self._level["thrust_m_s2"] = self._controller.outcome["thrust_m_s2"][0]
 
     def make(self, now: Tape) -> Outcomes:
         """Make one call (n,) on each controller, and return the outcomes (n,)."""
         controller = self._controller
         function = now["call"] & 3
-        if self._method.limiting is not None:
-            is_limits = (function == ApiFunction.SET_WEIGHTS) & ((now["call"] & _LIMITS_BIT) != 0)
-            function = np.where(is_limits, np.uint8(ApiFunction.SET_LIMITS), function)
+        for wanted, written in self._others.items():
+            function = np.where((now["call"] & (3 | _OTHER_BIT)) == written, np.uint8(wanted), function)
         nulls = (now["call"] >> 2) & 15
         null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
 
@@ -156,8 +165,8 @@ class _Runs:
             return status
 
         def step(values: NDArray[Any]) -> NDArray[np.int64]:
-            target = np.concatenate([values[:, 7:11], values[:, 12:]], axis=1)
-            status: NDArray[np.int64] = controller.step(values[:, 0:7], target, values[:, 11]).status
+            inputs = self._rows.split(values)
+            status: NDArray[np.int64] = controller.step(inputs.state, inputs.target, inputs.thrust).status
             return status
 
         set_other = getattr(controller, self._method.setter)
@@ -165,20 +174,23 @@ class _Runs:
         with np.errstate(all="ignore"):
             resets = call(ApiFunction.RESET, controller.reset)
             others = call(ApiFunction.SET_WEIGHTS, set_other)
-            limits = np.zeros_like(others)
-            if self._method.limiting is not None:
+            limits, thrusts = np.zeros_like(others), np.zeros_like(others)
+            if ApiFunction.SET_LIMITS in self._others:
                 limits = call(ApiFunction.SET_LIMITS, controller.set_limits)
+            if ApiFunction.SET_THRUST in self._others:
+                thrusts = call(ApiFunction.SET_THRUST, lambda values: controller.set_thrust(values[:, 0]))
             steps = call(ApiFunction.STEP, step)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, np.zeros_like(steps), limits])
+        status = np.choose(function, [steps, resets, others, np.zeros_like(steps), limits, thrusts])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)
         writes = (function == ApiFunction.STEP) & ((nulls & NULL_COMMAND) == 0)
-        level = ((nulls & NULL_SELF) != 0)[:, None]
-        sent_rad = np.where(level, 0, outcome["command_rad"])
-        outcome["command_rad"] = np.where(writes[:, None], sent_rad, UNWRITTEN_RAD)
+        for name, level in self._level.items():
+            column = (slice(None), *[None] * (outcome[name].ndim - 1))
+            sent = np.where(((nulls & NULL_SELF) != 0)[column], level, outcome[name])
+            outcome[name] = np.where(writes[column], sent, UNWRITTEN)
         return outcome
 
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS, Scalar
-from mambo_codegen.numbers.representation import COMMAND, WEIGHTS
+from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.calls import (
@@ -25,9 +24,9 @@ from mambo_sil.verify.calls import (
     Tape,
     answers,
     calls,
-    step_quantities,
 )
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
+from mambo_sil.verify.step_rows import POSITION, TILT, VELOCITY, YAW, StepRows
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -59,12 +58,14 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     Every fourth tape holds each input for two steps. In every fifth tape the drone is so close to the target
     that the last bits of the prediction constants matter.
     """
-    rng = np.random.default_rng(0)
-    draws = [_rows(inputs) for inputs in random_steps(settings, n, 8, rng)]
+    rng, method = np.random.default_rng(0), method_of(settings)
+    rows = StepRows(method)
+    draws = [rows.join(inputs) for inputs in random_steps(settings, n, 8, rng)]
     with np.errstate(invalid="ignore"):
         for drawn in draws:
-            drawn[::5, 0:4] = drawn[::5, 7:11] + (1e-3 * (drawn[::5, 0:4] - drawn[::5, 7:11]))
-            drawn[::5, 4:6] *= 1e-3
+            state, target = drawn[::5, 0:4], drawn[::5, rows.target]
+            drawn[::5, 0:4] = target + (1e-3 * (state - target))
+            drawn[::5, TILT] *= 1e-3
     steps = [
         np.where((np.arange(n) % 4 == 3)[:, None], draws[index // 2 * 2], drawn)
         for index, drawn in enumerate(draws)
@@ -74,21 +75,34 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
     weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
     weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
+    limits = random_limits(settings, n, rng) if method.limiting else None
+    if method.has_height:
+        command = np.concatenate([command, _random_thrusts(settings, n, rng)], axis=1)
     columns = [
-        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[:3]),
+        *(calls(settings, ApiFunction.STEP, drawn) for drawn in steps[:3]),
         calls(settings, ApiFunction.RESET, command),
-        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[3:5]),
+        *(calls(settings, ApiFunction.STEP, drawn) for drawn in steps[3:5]),
         calls(settings, ApiFunction.SET_WEIGHTS, weights)
-        if method_of(settings).weight_limits
+        if method.weight_limits
         else calls(settings, ApiFunction.SET_COMMAND, command[::-1]),
+        *([] if limits is None else [calls(settings, ApiFunction.SET_LIMITS, limits)]),
+        calls(settings, ApiFunction.STEP, steps[5]),
         *(
-            [calls(settings, ApiFunction.SET_LIMITS, random_limits(settings, n, rng))]
-            if method_of(settings).limiting
+            [calls(settings, ApiFunction.SET_THRUST, _random_thrusts(settings, n, rng))]
+            if method.has_height
             else []
         ),
-        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[5:]),
+        *(calls(settings, ApiFunction.STEP, drawn) for drawn in steps[6:]),
     ]
     return list(np.stack(columns, axis=1))
+
+
+def _random_thrusts(settings: Settings, n: int, rng: np.random.Generator) -> Array:
+    """Draw thrusts (n, 1), some beyond the limits of what is commanded, some that are refused."""
+    most_m_s2 = settings.ranges.thrust_acceleration_max_m_s2
+    drawn = rng.uniform(-0.2, 1.02, (n, 1)) * most_m_s2
+    drawn[::6, 0] = rng.choice([np.nan, np.inf, -np.inf, 1.1 * most_m_s2], len(drawn[::6]))
+    return drawn
 
 
 def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array:
@@ -125,40 +139,47 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
     One good step precedes the step with that input, and two follow.
     """
-    ranges, tilt = settings.ranges, settings.limits.tilt_rad
-    symmetric = [
-        *[ranges.position_m] * 2,
-        *[ranges.velocity_m_s] * 2,
-        *[ATTITUDE_LIMIT_RAD] * 2,
-        YAW_LIMIT_RAD,
-        *[ranges.position_m] * 2,
-        *[ranges.velocity_m_s] * 2,
-    ]
-    bounds = [(-limit, limit) for limit in symmetric]
-    most_m_s2 = ranges.thrust_acceleration_max_m_s2
-    bounds.append((ranges.thrust_acceleration_min_m_s2, most_m_s2))
-    quantities = step_quantities(method_of(settings))
-    bounds += [(-most_m_s2, most_m_s2)] * (len(quantities) - len(bounds))
-    for index, (quantity, ends) in enumerate(zip(quantities, bounds, strict=True)):
-        for value in _around(settings, quantity, *ends):
+    ranges, tilt, method = settings.ranges, settings.limits.tilt_rad, method_of(settings)
+    rows, most_m_s2 = StepRows(method), ranges.thrust_acceleration_max_m_s2
+    largest = {
+        "position": ranges.position_m,
+        "velocity": ranges.velocity_m_s,
+        "angle": ATTITUDE_LIMIT_RAD,
+        "yaw": YAW_LIMIT_RAD,
+        "thrust": most_m_s2,
+        "whole": 1.0,
+    }
+    for index, quantity in enumerate(rows.quantities):
+        is_thrust = rows.thrust.start <= index < rows.thrust.stop
+        least = ranges.thrust_acceleration_min_m_s2 if is_thrust else -largest[quantity]
+        for value in _around(settings, quantity, least, largest[quantity]):
             good = _good_steps(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, ApiFunction.STEP, good)
-    weight_limits = method_of(settings).weight_limits
+    weight_limits = method.weight_limits
     pairs: list[tuple[ApiFunction, Sequence[str], Sequence[float], Sequence[float]]] = [
-        (function, COMMAND, (-limit,) * 2, (limit,) * 2)
+        (function, method.command, *_both(*[limit] * 2, *[most_m_s2] * (len(method.command) - 2)))
         for function in (ApiFunction.SET_COMMAND, ApiFunction.RESET)
         for limit in (ATTITUDE_LIMIT_RAD, tilt)
         if function == ApiFunction.RESET or not weight_limits
     ]
     if weight_limits:
         pairs.insert(0, (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), weight_limits))
+    if (height := settings.height) is not None:
+        pairs.append((ApiFunction.SET_THRUST, THRUST, *_both(most_m_s2)))
+        limits_m_s2 = (height.thrust_min_m_s2,), (height.thrust_max_m_s2,)
+        pairs.append((ApiFunction.SET_THRUST, THRUST, *limits_m_s2))
     for function, names, lows, highs in pairs:
-        for index in range(2):
-            for value in _around(settings, names[index], lows[index], highs[index]):
-                pair = np.full((1, 2), 0.1 * tilt)
+        for index, name in enumerate(names):
+            for value in _around(settings, name, lows[index], highs[index]):
+                pair = np.full((1, len(names)), 0.1 * tilt)
                 pair[0, index] = value
                 yield _surround(settings, rng, calls(settings, function, pair))
+
+
+def _both(*limits: float) -> tuple[Sequence[float], Sequence[float]]:
+    """Return the lower and the upper ends of ranges that are symmetric."""
+    return [-limit for limit in limits], limits
 
 
 def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
@@ -170,9 +191,11 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
         (ApiFunction.INIT, NULL_SELF),
         *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
+        *([(ApiFunction.SET_THRUST, NULL_SELF)] if method_of(settings).has_height else []),
     ):
         for nulls in range(pointers + 1):
-            made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)
+            values = [[0.1]] if function == ApiFunction.SET_THRUST else [[0.1, 0.2]]
+            made = calls(settings, function, np.array(values), nulls)
             yield _surround(settings, rng, made)
 
 
@@ -190,7 +213,7 @@ def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
     columns = []
     for yaw in yaws:
         good = _good_steps(settings, rng, len(eighths))
-        good[:, 6] = yaw
+        good[:, YAW] = yaw
         columns.append(calls(settings, ApiFunction.STEP, good))
     return list(np.stack(columns, axis=1))
 
@@ -206,10 +229,9 @@ def _convergence(settings: Settings) -> list[Tape]:
     n, scalar, numbers = 16, _floating(settings), method_of(settings).numbers
     most_tracking, most_effort = method_of(settings).weight_limits
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
-    steps = np.zeros((n, 12))
-    steps[:, 0:2] = near_m * np.linspace(1, 2, n)[:, None]
-    steps[:, 6] = np.linspace(-3, 3, n)
-    steps[:, 11] = hover_thrust(settings)
+    steps = StepRows(method_of(settings)).hovering(n)
+    steps[:, POSITION] = near_m * np.linspace(1, 2, n)[:, None]
+    steps[:, YAW] = np.linspace(-3, 3, n)
 
     def tapes(weights: Floats, effort: Floats) -> list[Tape]:
         pairs = np.stack([weights, effort], axis=1)
@@ -242,9 +264,8 @@ def _zero_errors(settings: Settings) -> Iterator[Tape]:
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):
         for way in (-1, 1):
-            steps = np.zeros((1, 12))
+            steps = StepRows(method_of(settings)).hovering(1)
             steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
-            steps[0, 11] = hover_thrust(settings)
             yield calls(settings, ApiFunction.STEP, steps)
 
 
@@ -254,12 +275,13 @@ def _outages(settings: Settings, rng: np.random.Generator, limit: int) -> Iterat
     Then come good steps again.
     The targets are good in one tape and refused in another, so that both kinds of step are repeated.
     """
+    aimed = StepRows(method_of(settings)).target
     for refused in (1, max(1, limit - 1), limit, limit + 1, limit + 3):
         for target in (0.0, np.nan):
             steps = _good_steps(settings, rng, refused + 6)
-            steps[:, 7:11] = steps[0, 7:11]
+            steps[:, aimed] = steps[0, aimed]
             steps[2 : 2 + refused, 0] = np.nan
-            steps[2 : 2 + refused, 7] += target
+            steps[2 : 2 + refused, aimed.start] += target
             yield calls(settings, ApiFunction.STEP, steps)
 
 
@@ -271,30 +293,25 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
     numbers = method_of(settings).numbers
     if numbers.bits is None:
         return
-    limits = method_of(settings).limits
-    most = np.array(
-        [
-            *[limits.position] * 2,
-            *[limits.velocity] * 2,
-            *[limits.attitude] * 2,
-            limits.yaw,
-            *[limits.position] * 2,
-            *[limits.velocity] * 2,
-            limits.thrust_most,
-        ]
-    )
-    quantities = step_quantities(method_of(settings))
-    most = np.append(most, [limits.thrust_most] * (len(quantities) - len(most)))
-    steps = numbers.to_si(most * rng.choice([-1, 1], (512, len(most))), *quantities)
-    steps[:, 11] = np.abs(steps[:, 11])
-    steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
+    limits, rows = method_of(settings).limits, StepRows(method_of(settings))
+    largest = {
+        "position": limits.position,
+        "velocity": limits.velocity,
+        "angle": limits.attitude,
+        "yaw": limits.yaw,
+        "thrust": limits.thrust_most,
+        "whole": 1,
+    }
+    most = np.array([largest[quantity] for quantity in rows.quantities])
+    steps = numbers.to_si(most * rng.choice([-1, 1], (512, len(most))), *rows.quantities)
+    steps[:, rows.thrust] = np.abs(steps[:, rows.thrust])
+    steps[::2, YAW] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
     yield from calls(settings, ApiFunction.STEP, steps).reshape(-1, 4)
 
     near_rad = settings.limits.tilt_rad - math.ldexp(1, -numbers.bits["angle"])
     signs = np.array(list(itertools.product((-1, 1), repeat=4)))
-    pulled = np.zeros((len(signs), 12))
-    pulled[:, 0:2] = signs[:, 2:] * min(1.0, settings.ranges.position_m)
-    pulled[:, 11] = hover_thrust(settings)
+    pulled = rows.hovering(len(signs))
+    pulled[:, POSITION] = signs[:, 2:] * min(1.0, settings.ranges.position_m)
     columns = (
         calls(settings, ApiFunction.RESET, near_rad * signs[:, :2]),
         calls(settings, ApiFunction.STEP, pulled),
@@ -311,15 +328,17 @@ def _target_motion(settings: Settings) -> Iterator[Tape]:
     tracker, ranges = method_of(settings).tracker, settings.ranges
     if tracker is None:
         return
+    rows = StepRows(method_of(settings))
+    aimed = slice(rows.target.start + VELOCITY.start, rows.target.start + VELOCITY.stop)
 
     def steps(motion: Array) -> Tape:
-        rows = np.zeros((len(motion), 14 if tracker.is_given else 12))
+        made = rows.hovering(len(motion))
         if tracker.is_given:
-            rows[:, 12:] = motion
+            made[:, rows.acceleration] = motion
         else:
-            rows[:, 2:4] = rows[:, 9:11] = np.clip(motion, -ranges.velocity_m_s, ranges.velocity_m_s)
-        rows[:, 0], rows[:, 11] = 1e-3, hover_thrust(settings)
-        return calls(settings, ApiFunction.STEP, rows)
+            made[:, VELOCITY] = made[:, aimed] = np.clip(motion, -ranges.velocity_m_s, ranges.velocity_m_s)
+        made[:, 0] = 1e-3
+        return calls(settings, ApiFunction.STEP, made)
 
     limit = tracker.input_limit
     for value in _around(settings, tracker.input_quantity, -limit, limit):
@@ -337,23 +356,30 @@ def _target_motion(settings: Settings) -> Iterator[Tape]:
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
     """Put a call between good steps; the refused step after it shows the last command."""
     steps = calls(settings, ApiFunction.STEP, _good_steps(settings, rng, 4))
-    refused = calls(settings, ApiFunction.STEP, np.full((1, 12), np.nan))
+    refused = calls(settings, ApiFunction.STEP, np.full((1, len(STATE)), np.nan))
     return np.concatenate([steps[:2], made, refused, steps[2:]])
 
 
 def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
-    """Draw inputs of steps within the ranges (n, k), in the order of `step_quantities`."""
-    ranges = settings.ranges
+    """Draw inputs of steps within the ranges (n, k), in the columns of `StepRows`."""
+    ranges, method = settings.ranges, method_of(settings)
     position_m, speed_m_s = min(1.0, ranges.position_m / 4), min(1.0, ranges.velocity_m_s / 4)
     scale = np.array([position_m] * 2 + [speed_m_s] * 2 + [0.3, 0.3, 3.0])
     state = rng.uniform(-1, 1, (n, 7)) * scale
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-    steps = np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
-    tracker = method_of(settings).tracker
+    thrust = np.clip(rng.uniform(8, 12, n), low, high)
+    tracker = method.tracker
     if tracker and tracker.is_given:
-        steps = np.concatenate([steps, rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit], axis=1)
-    return steps
+        accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit
+        target = np.concatenate([target, accelerations], axis=1)
+    if not method.has_height:
+        return StepRows(method).join(StepInputs(state, target, thrust))
+    own = rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
+    goal = own + 0.1 * rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
+    climbs = rng.uniform(-1, 1, (n, len(method.target) - target.shape[1] - 2))
+    state = np.concatenate([state, own, np.zeros((n, 1))], axis=1)
+    return StepRows(method).join(StepInputs(state, np.concatenate([target, goal, climbs], axis=1), None))
 
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
@@ -374,10 +400,3 @@ def _around(settings: Settings, quantity: str, low: float, high: float) -> Array
 def _floating(settings: Settings) -> Scalar:
     """Return the scalar type, or float64 for fixed point; neighbours of a number are found in it."""
     return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
-
-
-def _rows(inputs: StepInputs) -> Array:
-    """Join the inputs into rows (n, k), in the order of `step_quantities`."""
-    target = inputs.target
-    assert inputs.thrust is not None
-    return np.concatenate([inputs.state, target[:, :4], inputs.thrust[:, None], target[:, 4:]], axis=1)

@@ -122,9 +122,14 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
 static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
 {
     const nmpc_fuzz_call_t call = nmpc_fuzz_decode(bytes);
-    nmpc_command_t command = { NMPC_REPLAY_UNWRITTEN, NMPC_REPLAY_UNWRITTEN };
+    nmpc_command_t command;
     int32_t status;
 
+    command.roll_rad = NMPC_REPLAY_UNWRITTEN;
+    command.pitch_rad = NMPC_REPLAY_UNWRITTEN;
+#ifdef NMPC_FUZZ_SET_THRUST
+    command.thrust_m_s2 = NMPC_REPLAY_UNWRITTEN;
+#endif
     if ((call.function == NMPC_FUZZ_INIT) && ((call.nulls & NMPC_FUZZ_NULL_SELF) == 0U)) {
         status = (int32_t)nmpc_replay_init(self);
     } else {
@@ -165,13 +170,24 @@ static int passes_self_test(nmpc_t *self)
 }
 
 #if defined(NMPC_POSITION_BITS)
+/* With a height a step takes no thrust: it commands one. */
+#ifdef NMPC_FUZZ_SET_THRUST
+#define NMPC_REPLAY_THRUST(thrust_m_s2)
+#else
+#define NMPC_REPLAY_THRUST(thrust_m_s2) (thrust_m_s2),
+#endif
+
 static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_float_command_t *found,
                     const nmpc_command_t *command)
 {
     const float unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
 
     return (status == expected) && (found->roll_rad == ((float)command->roll_rad * unit_rad))
-           && (found->pitch_rad == ((float)command->pitch_rad * unit_rad));
+           && (found->pitch_rad == ((float)command->pitch_rad * unit_rad))
+#ifdef NMPC_FUZZ_SET_THRUST
+           && (found->thrust_m_s2 == ((float)command->thrust_m_s2 / (float)((nmpc_sum_t)1 << NMPC_THRUST_BITS)))
+#endif
+        ;
 }
 
 /* The largest float that does not exceed a number. */
@@ -181,6 +197,30 @@ static float largest_float(nmpc_real_t number, int bits)
     const float found = (float)number * unit;
 
     return (((double)found / (double)unit) > (double)number) ? (found * 0.99999994f) : found;
+}
+
+/* A level command, with a height that of hover. */
+static nmpc_float_command_t level_command(void)
+{
+    nmpc_float_command_t command;
+
+    (void)memset(&command, 0, sizeof(command));
+#ifdef NMPC_FUZZ_SET_THRUST
+    command.thrust_m_s2 = 9.75f;
+#endif
+    return command;
+}
+
+/* The same in numbers. */
+static nmpc_command_t level_numbers(void)
+{
+    nmpc_command_t command;
+
+    (void)memset(&command, 0, sizeof(command));
+#ifdef NMPC_FUZZ_SET_THRUST
+    command.thrust_m_s2 = NMPC_THRUST_ACCELERATION(9.75);
+#endif
+    return command;
 }
 
 /* Half a unit is rounded away from zero, less than half towards it. */
@@ -200,8 +240,10 @@ static int rounds_halves(nmpc_t *self)
               && (self->weights.effort == 1);
 #endif
     for (i = 0; i < 3; i++) {
-        const nmpc_float_command_t last = { given[i] * angle_unit_rad, -given[i] * angle_unit_rad };
+        nmpc_float_command_t last = level_command();
 
+        last.roll_rad = given[i] * angle_unit_rad;
+        last.pitch_rad = -given[i] * angle_unit_rad;
         is_good = is_good && (nmpc_float_reset(self, &last) == NMPC_OK) && (self->command_rad[0] == nearest[i])
                   && (self->command_rad[1] == -nearest[i]);
     }
@@ -214,31 +256,62 @@ static int takes_the_ends(nmpc_t *self)
     const float position_m = largest_float(NMPC_POSITION_RANGE_M, NMPC_POSITION_BITS);
     const float velocity_m_s = largest_float(NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_BITS);
     const float attitude_rad = largest_float(NMPC_ATTITUDE_RANGE_RAD, NMPC_ANGLE_BITS);
-    const nmpc_float_state_t state = { { position_m, -position_m },
-                                       { velocity_m_s, -velocity_m_s },
-                                       attitude_rad,
-                                       -attitude_rad,
-                                       largest_float(NMPC_YAW_RANGE_RAD, NMPC_YAW_BITS) };
-    const nmpc_float_target_t target = { { -position_m, position_m }, { -velocity_m_s, velocity_m_s } };
+    nmpc_float_state_t state;
+    nmpc_float_target_t target;
     const float thrust_m_s2 = largest_float(NMPC_THRUST_ACCELERATION_MAX_M_S2, NMPC_THRUST_BITS);
-    nmpc_float_state_t rolled = state;
-    nmpc_float_state_t pitched = state;
+    nmpc_float_state_t other;
     nmpc_float_command_t command;
+    int is_good = 1;
+    int k;
 
-    rolled.roll_rad = 2.0f * attitude_rad;
-    pitched.pitch_rad = 2.0f * attitude_rad;
-    return (nmpc_float_step(self, &state, &target, thrust_m_s2, &command) == NMPC_OK)
-           && (nmpc_float_step(self, &rolled, &target, thrust_m_s2, &command) == NMPC_BAD_STATE)
-           && (nmpc_float_step(self, &pitched, &target, thrust_m_s2, &command) == NMPC_BAD_STATE);
+    (void)thrust_m_s2;
+    (void)memset(&state, 0, sizeof(state));
+    (void)memset(&target, 0, sizeof(target));
+    for (k = 0; k < 2; k++) {
+        state.position_m[k] = (k == 0) ? position_m : -position_m;
+        state.velocity_m_s[k] = (k == 0) ? velocity_m_s : -velocity_m_s;
+        target.position_m[k] = -state.position_m[k];
+        target.velocity_m_s[k] = -state.velocity_m_s[k];
+    }
+    state.roll_rad = attitude_rad;
+    state.pitch_rad = -attitude_rad;
+    state.yaw_rad = largest_float(NMPC_YAW_RANGE_RAD, NMPC_YAW_BITS);
+#ifdef NMPC_FUZZ_SET_THRUST
+    state.height_m = -position_m;
+    state.climb_m_s = velocity_m_s;
+    target.height_m = position_m;
+    target.climb_m_s = -velocity_m_s;
+#endif
+    is_good = nmpc_float_step(self, &state, &target, NMPC_REPLAY_THRUST(thrust_m_s2) & command) == NMPC_OK;
+    other = state;
+    other.roll_rad = 2.0f * attitude_rad;
+    is_good = is_good
+              && (nmpc_float_step(self, &other, &target, NMPC_REPLAY_THRUST(thrust_m_s2) & command) == NMPC_BAD_STATE);
+    other = state;
+    other.pitch_rad = 2.0f * attitude_rad;
+    is_good = is_good
+              && (nmpc_float_step(self, &other, &target, NMPC_REPLAY_THRUST(thrust_m_s2) & command) == NMPC_BAD_STATE);
+#ifdef NMPC_FUZZ_SET_THRUST
+    other = state;
+    other.height_m = 2.0f * position_m;
+    is_good = is_good && (nmpc_float_step(self, &other, &target, &command) == NMPC_BAD_STATE)
+              && (nmpc_float_set_thrust(self, thrust_m_s2) == NMPC_OK)
+              && (nmpc_float_set_thrust(self, NAN) == NMPC_BAD_THRUST);
+#endif
+    return is_good;
 }
 
 #ifdef NMPC_STORED_NUMBERS
 /* Set the last command of `self` with floats and that of `other` with numbers. */
 static int sets_alike(nmpc_t *self, nmpc_t *other)
 {
-    const nmpc_float_command_t flown = { 0.0625f, -0.125f };
-    const nmpc_command_t flown_numbers = { NMPC_ANGLE(0.0625), NMPC_ANGLE(-0.125) };
+    nmpc_float_command_t flown = level_command();
+    nmpc_command_t flown_numbers = level_numbers();
 
+    flown.roll_rad = 0.0625f;
+    flown.pitch_rad = -0.125f;
+    flown_numbers.roll_rad = NMPC_ANGLE(0.0625);
+    flown_numbers.pitch_rad = NMPC_ANGLE(-0.125);
     return (nmpc_float_set_command(self, NULL) == NMPC_NULL_POINTER)
            && (nmpc_float_set_command(self, &flown) == nmpc_set_command(other, &flown_numbers));
 }
@@ -254,6 +327,11 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
                   && (nmpc_last_estimate(other, &expected) == NMPC_OK) && (found.is_valid == expected.is_valid);
     int axis;
 
+#ifdef NMPC_FUZZ_SET_THRUST
+    is_good = is_good
+              && (found.height_m == ((float)expected.height_m / (float)((nmpc_sum_t)1 << NMPC_POSITION_BITS)))
+              && (found.climb_m_s == ((float)expected.climb_m_s / (float)((nmpc_sum_t)1 << NMPC_VELOCITY_BITS)));
+#endif
     for (axis = 0; is_good && (axis < 2); axis++) {
         is_good = (found.position_m[axis]
                    == ((float)expected.position_m[axis] / (float)((nmpc_sum_t)1 << NMPC_POSITION_BITS)))
@@ -291,17 +369,13 @@ static int passes_floats(nmpc_t *self)
 {
     const float position_unit_m = 1.0f / (float)(1L << NMPC_POSITION_BITS);
     const nmpc_real_t gravity_m_s2 = NMPC_THRUST_ACCELERATION(9.75);
-    const nmpc_float_state_t state = { { 0.5f, -0.25f }, { 0.125f, -0.5f }, 0.0625f, -0.03125f, 0.75f };
-    const nmpc_float_target_t target = { { 0.75f * position_unit_m, -0.75f * position_unit_m }, { 0.0f, 0.25f } };
-    const nmpc_state_t state_numbers = { { NMPC_POSITION(0.5), NMPC_POSITION(-0.25) },
-                                         { NMPC_VELOCITY(0.125), NMPC_VELOCITY(-0.5) },
-                                         NMPC_ANGLE(0.0625),
-                                         NMPC_ANGLE(-0.03125),
-                                         NMPC_YAW(0.75) };
-    const nmpc_target_t target_numbers = { { 1, -1 }, { 0, NMPC_VELOCITY(0.25) } };
-    const nmpc_float_command_t last = { 0.125f, -0.25f };
-    const nmpc_command_t last_numbers = { NMPC_ANGLE(0.125), NMPC_ANGLE(-0.25) };
     const float unheld[4] = { NAN, INFINITY, -INFINITY, 2147483648.0f / (float)(1L << NMPC_THRUST_BITS) };
+    nmpc_float_state_t state;
+    nmpc_float_target_t target;
+    nmpc_state_t state_numbers;
+    nmpc_target_t target_numbers;
+    nmpc_float_command_t last = level_command();
+    nmpc_command_t last_numbers = level_numbers();
     nmpc_t other;
     nmpc_command_t command;
     nmpc_float_command_t found;
@@ -309,21 +383,70 @@ static int passes_floats(nmpc_t *self)
     int i;
     int is_good;
 
+    (void)gravity_m_s2;
+    (void)memset(&state, 0, sizeof(state));
+    (void)memset(&target, 0, sizeof(target));
+    (void)memset(&state_numbers, 0, sizeof(state_numbers));
+    (void)memset(&target_numbers, 0, sizeof(target_numbers));
+    state.position_m[0] = 0.5f;
+    state.position_m[1] = -0.25f;
+    state.velocity_m_s[0] = 0.125f;
+    state.velocity_m_s[1] = -0.5f;
+    state.roll_rad = 0.0625f;
+    state.pitch_rad = -0.03125f;
+    state.yaw_rad = 0.75f;
+    target.position_m[0] = 0.75f * position_unit_m;
+    target.position_m[1] = -0.75f * position_unit_m;
+    target.velocity_m_s[1] = 0.25f;
+    state_numbers.position_m[0] = NMPC_POSITION(0.5);
+    state_numbers.position_m[1] = NMPC_POSITION(-0.25);
+    state_numbers.velocity_m_s[0] = NMPC_VELOCITY(0.125);
+    state_numbers.velocity_m_s[1] = NMPC_VELOCITY(-0.5);
+    state_numbers.roll_rad = NMPC_ANGLE(0.0625);
+    state_numbers.pitch_rad = NMPC_ANGLE(-0.03125);
+    state_numbers.yaw_rad = NMPC_YAW(0.75);
+    target_numbers.position_m[0] = 1;
+    target_numbers.position_m[1] = -1;
+    target_numbers.velocity_m_s[1] = NMPC_VELOCITY(0.25);
+    last.roll_rad = 0.125f;
+    last.pitch_rad = -0.25f;
+    last_numbers.roll_rad = NMPC_ANGLE(0.125);
+    last_numbers.pitch_rad = NMPC_ANGLE(-0.25);
+#ifdef NMPC_FUZZ_SET_THRUST
+    state.height_m = 0.5f;
+    state.climb_m_s = -0.25f;
+    state.grounded = 1;
+    target.height_m = 1.0f;
+    target.climb_m_s = 0.125f;
+    state_numbers.height_m = NMPC_POSITION(0.5);
+    state_numbers.climb_m_s = NMPC_VELOCITY(-0.25);
+    state_numbers.grounded = 1;
+    target_numbers.height_m = NMPC_POSITION(1.0);
+    target_numbers.climb_m_s = NMPC_VELOCITY(0.125);
+#endif
+
     nmpc_init(self);
     nmpc_init(&other);
     is_good = (nmpc_float_reset(self, NULL) == NMPC_NULL_POINTER)
-              && (nmpc_float_step(self, &state, &target, 9.75f, NULL) == NMPC_NULL_POINTER)
+              && (nmpc_float_step(self, &state, &target, NMPC_REPLAY_THRUST(9.75f) NULL) == NMPC_NULL_POINTER)
               && (nmpc_float_reset(self, &last) == nmpc_reset(&other, &last_numbers)) && sets_alike(self, &other);
-    expected = nmpc_step(&other, &state_numbers, &target_numbers, gravity_m_s2, &command);
+    expected = nmpc_step(&other, &state_numbers, &target_numbers, NMPC_REPLAY_THRUST(gravity_m_s2) & command);
     is_good = is_good
-              && is_alike(nmpc_float_step(self, &state, &target, 9.75f, &found), expected, &found, &command)
+              && is_alike(nmpc_float_step(self, &state, &target, NMPC_REPLAY_THRUST(9.75f) & found), expected, &found,
+                          &command)
               && tells_alike(self, &other)
-              && is_alike(nmpc_float_step(self, NULL, &target, 9.75f, &found), NMPC_NULL_POINTER, &found, &command)
-              && is_alike(nmpc_float_step(self, &state, NULL, 9.75f, &found), NMPC_NULL_POINTER, &found, &command);
+              && is_alike(nmpc_float_step(self, NULL, &target, NMPC_REPLAY_THRUST(9.75f) & found), NMPC_NULL_POINTER,
+                          &found, &command)
+              && is_alike(nmpc_float_step(self, &state, NULL, NMPC_REPLAY_THRUST(9.75f) & found), NMPC_NULL_POINTER,
+                          &found, &command);
     for (i = 0; i < 4; i++) {
+#ifdef NMPC_FUZZ_SET_THRUST
+        is_good = is_good && (nmpc_float_set_thrust(self, unheld[i]) == NMPC_BAD_THRUST);
+#else
         is_good = is_good
                   && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found),
                               (expected == NMPC_OK) ? NMPC_BAD_THRUST : expected, &found, &command);
+#endif
     }
     return is_good && rounds_halves(self) && takes_the_ends(self);
 }

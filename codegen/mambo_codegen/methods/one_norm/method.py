@@ -37,7 +37,6 @@ class OneNorm(OneNormConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_weights"
-    setter_quantities: ClassVar[tuple[str, ...]] = WEIGHTS
     digested: ClassVar[tuple[str, ...]] = (
         "status",
         "iterations",
@@ -83,6 +82,11 @@ class OneNorm(OneNormConstants, Method):
     def _limits_results(self) -> tuple[StepResult, ...]:
         stored = self.limits_stored
         return StepResult("limits", stored, (len(stored),)), StepResult("missed"), StepResult("active")
+
+    @property
+    def setter_quantities(self) -> tuple[str, ...]:
+        """The quantities of the weights."""
+        return WEIGHTS
 
     def tested_numbers(self, step: OneNormStep) -> tuple[float, ...]:
         """Return cost and gradient by the first move (2,)."""

@@ -420,8 +420,10 @@ class QuadraticController:
             "missed": memory.missed,
             "saturated": self.saturated,
             "command_rad": memory.command_rad,
+            **({} if memory.height is None else {"thrust_m_s2": memory.height.thrust_m_s2}),
             "stored": self.stored,
-        } | ({"active": memory.limits.active} if self._limits else {})
+            **({"active": memory.limits.active} if self._limits else {}),
+        }
 
     @property
     def stored_limits(self) -> Real:

@@ -18,7 +18,7 @@ from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
-from mambo_codegen.numbers.representation import COMMAND, THRUST
+from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.key import Refusal
 
 _WORK: tuple[int, int] = (50, 1)
@@ -45,7 +45,6 @@ class Quadratic(QuadraticConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_command"
-    setter_quantities: ClassVar[tuple[str, ...]] = COMMAND
     digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS)
@@ -81,6 +80,11 @@ class Quadratic(QuadraticConstants, Method):
             *((StepResult("active"),) if self.limiting else ()),
             *((StepResult("thrust_m_s2", THRUST),) if self.has_height else ()),
         )
+
+    @property
+    def setter_quantities(self) -> tuple[str, ...]:
+        """The quantities of a command."""
+        return self.command
 
     def tested_numbers(self, step: QuadraticStep) -> tuple[float, ...]:
         """Return all stored numbers."""
