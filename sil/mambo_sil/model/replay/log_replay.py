@@ -20,6 +20,7 @@ from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.signals import (
     COMMANDS,
     DEGREE,
+    HEIGHT,
     TAKE_OVERS,
     TARGET,
     TARGET_ACCELERATION,
@@ -30,6 +31,11 @@ from mambo_sil.model.identify.signals import (
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
 
 STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
+HEIGHT_STATE: Final = (HEIGHT, "vz_m_s")
+"""What a controller of the height reads besides; z points down, the signals of its target up."""
+TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
+_ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
+"""Signals that are read only where the controller needs them."""
 _APP: Final = {
     "x_m": Column("nmpc.x"),
     "y_m": Column("nmpc.y", -1.0),
@@ -57,6 +63,10 @@ _OTHER: Final[dict[str, tuple[Column, ...]]] = {
     "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
     "target_ax_m_s2": (Column("target_ax_m_s2"), Column("ctrltarget.ax")),
     "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
+    "vz_m_s": (Column("seen_vz_m_s"), Column("vz_m_s"), Column("stateEstimate.vz", -1.0)),
+    "target_height_m": (Column("target_height_m"), Column("ctrltarget.z")),
+    "target_climb_m_s": (Column("target_climb_m_s"), Column("ctrltarget.vz")),
+    "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
     TAKE_OVERS: (Column(TAKE_OVERS),),
@@ -98,16 +108,21 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     """Replay the log at `path`; `columns` has those that the user named.
 
     The controller starts level, without an estimate, as after nmpc_init(). If the log counts take-overs, it
-    is reset to the present roll and pitch at the beginning and at each of them. Raises LogError.
+    is reset to the present roll and pitch at the beginning and at each of them. One of the height is in the
+    air, and is not told what a mixer made of its thrust, which no log shows. Raises LogError.
     """
-    is_given = settings.target.acceleration == "given"
-    wanted = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
-    log = _read(path, columns, (*STATE, *wanted))
+    is_given, lifts = settings.target.acceleration == "given", settings.height is not None
+    wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
+    wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if lifts else ()
+    measured = (*STATE, *HEIGHT_STATE) if lifts else STATE
+    log = _read(path, columns, (*measured, *wanted))
     time_s, resampled = _updates(log, settings.horizon.update_period_s)
     if len(time_s) < 2:
         raise LogError((f"{log.name}: has no two updates of {settings.horizon.update_period_s:g} s",))
     inputs = _interpolated if resampled else _held
-    state, target = inputs(log, STATE, time_s), inputs(log, wanted, time_s)
+    state, target = inputs(log, measured, time_s), inputs(log, wanted, time_s)
+    if lifts:
+        state = np.column_stack([state[:, : len(STATE)], -state[:, len(STATE) :], np.zeros(len(time_s))])
     thrust_m_s2 = (
         _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
     )
@@ -116,8 +131,10 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     steps = []
     for k in range(len(time_s)):
         if begins[k]:
-            controller.reset(state[k : k + 1, 4:6])
-        steps.append(controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]))
+            held = state[k : k + 1, 4:6]
+            controller.reset(np.column_stack([held, thrust_m_s2[k]]) if lifts else held)
+        thrust = None if lifts else thrust_m_s2[k]
+        steps.append(controller.step(state[k : k + 1], target[k : k + 1], thrust))
     return LogReplay(
         time_s,
         _held(log, COMMANDS, time_s),
@@ -133,9 +150,7 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...]) ->
     is_ulog = path.suffix.lower() == ".ulg"
     if is_ulog and columns:
         raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
-    known = {
-        name: each for name, each in SIGNALS.items() if name in wanted or name not in TARGET_ACCELERATION
-    }
+    known = {name: each for name, each in SIGNALS.items() if name in wanted or name not in _ASKED}
     log = read_ulog(path) if is_ulog else read_csv(path, columns, known)
     missing = [name for name in wanted if name not in log.signals]
     if missing and is_ulog:
