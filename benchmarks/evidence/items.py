@@ -206,6 +206,15 @@ ITEMS: Final = (
         pictures={f"limits-{name}.png": f"pictures/limits-{name}.png" for name in ("step", "fence")},
     ),
     Item(
+        name="height",
+        commands=(f"python -m benchmarks.height {RESULTS}/height/pictures",),
+        controllers=(f"{_HERE}/height.toml",),
+        paths=(*_FLIGHT, "benchmarks/height.py", f"{_HERE}/height.toml", _STYLE),
+        read=read_printed,
+        tables={"height": printed},
+        pictures={"height-helix.png": "pictures/height-helix.png"},
+    ),
+    Item(
         name="footprint",
         commands=(
             f"mambo-nmpc footprint mambo -o {RESULTS}/footprint/float32",

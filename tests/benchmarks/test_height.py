@@ -1,0 +1,52 @@
+"""What the evidence of the height promises, and its file of settings."""
+
+import numpy as np
+import pytest
+
+from benchmarks.height import (
+    DRONE,
+    LOOPS,
+    SETTINGS,
+    drawn,
+    gust,
+    prepared_take_off,
+    settings_of,
+    swing,
+    weight,
+)
+from mambo_codegen.settings import controller_toml
+from mambo_sil.model.derive.derived_settings import controller_text
+
+
+def test_the_settings_are_those_that_design_writes() -> None:
+    """For the Crazyflie, but for the comments."""
+    derived = controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived")
+    assert settings_of(height=True) == derived == controller_toml.read(SETTINGS)
+    assert settings_of(height=False) == derived.model_copy(update={"height": None})
+
+
+@pytest.mark.long
+def test_the_third_axis_keeps_its_promises() -> None:
+    """Height and place on the circle with swing, take-off, weight and gust; and it beats every loop there."""
+    rms_m, place_m = swing(None)
+    assert rms_m <= 0.002
+    assert place_m <= 0.005
+    late_m, heavy_late_m = prepared_take_off(None)
+    assert late_m <= 0.01
+    assert heavy_late_m <= 0.08
+    drop_m, rest_m, rise_m = weight(None)
+    assert drop_m <= 0.07
+    assert rest_m <= 0.002
+    assert rise_m <= 0.05
+    worst_m, left_m = gust(None)
+    assert worst_m <= 0.04
+    assert left_m <= 0.002
+    assert all(rms_m < swing(loop)[0] for loop in LOOPS)
+
+
+def test_drones_are_drawn_alike_for_every_law() -> None:
+    """By their seed alone."""
+    one, again, other = drawn(5, 1), drawn(5, 1), drawn(5, 2)
+    for name, values in vars(one).items():
+        assert np.array_equal(values, getattr(again, name))
+    assert not np.array_equal(one.mass, other.mass)
