@@ -43,7 +43,9 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
     It is INCOMPLETE if the drone strays without any fault, because then no recovery can be judged.
     """
     limit = method_of(settings).tilt_limit_rad
-    ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
+    flown = scenarios(settings)
+    may_crash = {scenario.name for scenario in flown if scenario.may_crash}
+    ending = {scenario.name for scenario in flown if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []
     for verdict in verdicts:
@@ -52,7 +54,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
             wrong.append(f"{where}: a command of {verdict.largest_command_rad:g} rad")
         if not verdict.expected:
             wrong.append(f"{where}: statuses {verdict.statuses}")
-        if verdict.end is End.CRASHED and not strays:
+        if verdict.end is End.CRASHED and not strays and verdict.fault not in may_crash:
             wrong.append(f"{where}: crashed")
         if verdict.end is End.AWAY and not strays and verdict.fault in ending:
             wrong.append(f"{where}: did not recover")
@@ -69,8 +71,10 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
     back = [verdict for verdict in verdicts if verdict.end is End.BACK]
     slowest = max((v for v in back if v.fault in ending), key=lambda verdict: verdict.recovery_s)
+    crashes = sorted({verdict.fault for verdict in verdicts if verdict.end is End.CRASHED})
+    lost = f"no crash but of {' and '.join(crashes)}, which the height may have" if crashes else "no crash"
     return (
-        f"{len(verdicts)} faults: no crash, command at most "
+        f"{len(verdicts)} faults: {lost}, command at most "
         f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
         f"the last {slowest.recovery_s:.1f} s after '{slowest.fault}'"
     )
