@@ -72,7 +72,11 @@ def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
     back = [verdict for verdict in verdicts if verdict.end is End.BACK]
     slowest = max((v for v in back if v.fault in ending), key=lambda verdict: verdict.recovery_s)
     crashes = sorted({verdict.fault for verdict in verdicts if verdict.end is End.CRASHED})
-    lost = f"no crash but of {' and '.join(crashes)}, which the height may have" if crashes else "no crash"
+    lost = (
+        f"no crash but of {' and '.join(crashes)}, in which nothing is known of the height"
+        if crashes
+        else "no crash"
+    )
     return (
         f"{len(verdicts)} faults: {lost}, command at most "
         f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "

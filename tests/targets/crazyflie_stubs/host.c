@@ -7,6 +7,7 @@
 #include "controller_pid.h"
 #include "debug.h"
 #include "log.h"
+#include "power_distribution.h"
 #include "supervisor.h"
 #include "task.h"
 
@@ -33,6 +34,7 @@ void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorD
 
 uint32_t xTaskGetTickCount(void) { return host_time_ms; }
 bool supervisorIsFlying(void) { return host_is_flying; }
+float powerDistributionGetMaxThrust(void) { return 0.48f; }
 
 logVarId_t logGetVarId(const char *group, const char *name)
 {

@@ -38,8 +38,14 @@ typedef struct {
     vector_t velocity;
 } state_t;
 
+typedef enum {
+    controlModeLegacy = 0,
+    controlModeForceTorque
+} control_mode_t;
+
 typedef struct {
     float thrust;
+    control_mode_t controlMode;
 } control_t;
 
 typedef enum {

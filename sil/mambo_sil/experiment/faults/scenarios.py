@@ -63,7 +63,8 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """Return the faults; their magnitudes depend on the input ranges of `settings`.
 
     Faults of the weights are there with a 1-norm only, those of the limits with limits only. With a height
-    the state that is wrong for 5 s is wrong for the thrust too, which a stock loop takes from the truth.
+    a state that is missing to the end, or wrong for 5 s, is so for the thrust too, which a stock loop takes from
+    the truth.
     """
     lifts = settings.height is not None
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
@@ -82,9 +83,14 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
         FaultScenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
         FaultScenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
-        FaultScenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),
+        FaultScenario("state NaN to the end", TO_THE_END, outage, answers=bad_state, may_crash=lifts),
         FaultScenario(
-            f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True
+            f"state NaN to the end, {levels_out}",
+            TO_THE_END,
+            outage,
+            answers=bad_state,
+            levelled=True,
+            may_crash=lifts,
         ),
         FaultScenario("x infinite, 1 s", 1.0, SetState(range(1), math.inf), answers=bad_state),
         FaultScenario("vy minus infinite, 1 s", 1.0, SetState(range(3, 4), -math.inf), answers=bad_state),
