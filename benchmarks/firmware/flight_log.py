@@ -14,6 +14,10 @@ VARIABLES: Final = (
     *("step", "takeOvers", "age", "status", "x", "y", "vx", "vy", "inRoll", "inPitch", "inYaw"),
     *("targetX", "targetY", "targetVx", "targetVy", "targetAx", "targetAy", "outRoll", "outPitch"),
 )
+OF_HEIGHTS: Final = (
+    *("z", "vz", "grounded", "targetZ", "targetVz", "targetAz", "outThrust", "startThrust", "level"),
+)
+"""What an app that flies the height logs besides."""
 DURATION_S: Final = 30.0
 
 
@@ -27,7 +31,8 @@ def write_log(job: Job, path: Path) -> None:
     last = laboratory.log("nmpc.step")
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["Timestamp", *(f"nmpc.{name}" for name in VARIABLES)])
+        known = [name for name in (*VARIABLES, *OF_HEIGHTS) if not np.isnan(laboratory.log(f"nmpc.{name}"))]
+        writer.writerow(["Timestamp", *(f"nmpc.{name}" for name in known)])
         for time_ms in range(round(1000 * DURATION_S)):
             if time_ms % 10 == 0:
                 laboratory.full_state(*stream.motion(np.array([0.001 * time_ms]))[0])
@@ -35,5 +40,5 @@ def write_log(job: Job, path: Path) -> None:
             if laboratory.log("nmpc.step") != last:
                 last = laboratory.log("nmpc.step")
                 writer.writerow(
-                    [laboratory.time_ms, *(repr(laboratory.log(f"nmpc.{name}")) for name in VARIABLES)]
+                    [laboratory.time_ms, *(repr(laboratory.log(f"nmpc.{name}")) for name in known)]
                 )

@@ -33,6 +33,9 @@ TICKS_PER_UPDATE: Final = 10
 """Ticks of the firmware's loop, 1 ms each, in an update period."""
 DEGREES: Final = 180.0 / math.pi
 
+TURNED: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.pi / 6.0])
+"""A state at rest in the origin, heading to the left by 30 degrees."""
+
 _TYPES = "".join(
     line for line in (STUBS / "stabilizer_types.h").read_text("utf-8").splitlines(True) if line[0] != "#"
 )
@@ -90,7 +93,8 @@ class Crazyflie:
         self.setpoint: Any = _INTERFACE.new("setpoint_t *")
         self.state: Any = state
         self.time_ms = self.ticks = 1000
-        self._control, self._sensors = _INTERFACE.new("control_t *"), _INTERFACE.new("sensorData_t *")
+        self.output: Any = _INTERFACE.new("control_t *")
+        self._sensors = _INTERFACE.new("sensorData_t *")
         state.position.z = 1.0
         library.host_is_flying = True
         library.host_variances = [0.0, 0.0]
@@ -131,7 +135,7 @@ class Crazyflie:
     def tick(self) -> tuple[float, float]:
         """Call the app for the next millisecond; return roll and pitch of what flies, in degrees."""
         self.host.host_time_ms = self.time_ms
-        self.host.controllerOutOfTree(self._control, self.setpoint, self._sensors, self.state, self.ticks)
+        self.host.controllerOutOfTree(self.output, self.setpoint, self._sensors, self.state, self.ticks)
         self.time_ms += 1
         self.ticks += 1
         return self.flown.attitude.roll, self.flown.attitude.pitch

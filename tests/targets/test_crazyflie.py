@@ -25,6 +25,7 @@ from tests.support.crazyflie import (
     FIRMWARE_FLAGS,
     LIBRARY,
     STUBS,
+    TURNED,
     Built,
     Crazyflie,
     Fleet,
@@ -53,26 +54,25 @@ FRAME_MUTANTS = {
     "roll": ("roll_rad = RAD_PER_DEG * state", "roll_rad = -RAD_PER_DEG * state"),
     "pitch": ("pitch_rad = RAD_PER_DEG * state", "pitch_rad = -RAD_PER_DEG * state"),
     "yaw": ("yaw_rad = -RAD_PER_DEG * state", "yaw_rad = RAD_PER_DEG * state"),
-    "target x": ("target.position_m[0] = x;", "target.position_m[0] = -x;"),
-    "target y": ("target.position_m[1] = -y;", "target.position_m[1] = y;"),
-    "target vx": ("velocity_m_s[0] = rests ? 0.0f : vx", "velocity_m_s[0] = rests ? 0.0f : -vx"),
-    "target vy": ("velocity_m_s[1] = rests ? 0.0f : -vy", "velocity_m_s[1] = rests ? 0.0f : vy"),
+    "target x": ("target.position_m[0] = p[0];", "target.position_m[0] = -p[0];"),
+    "target y": ("target.position_m[1] = -p[1];", "target.position_m[1] = p[1];"),
+    "target vx": ("velocity_m_s[0] = v[0];", "velocity_m_s[0] = -v[0];"),
+    "target vy": ("velocity_m_s[1] = -v[1];", "velocity_m_s[1] = v[1];"),
     "command roll": (": (DEG_PER_RAD * (float)command.roll", ": (-DEG_PER_RAD * (float)command.roll"),
     "command pitch": (": (DEG_PER_RAD * (float)command.pitch", ": (-DEG_PER_RAD * (float)command.pitch"),
 }
 # What carries a set-point on until the next one, 100 ms later.
 AGE_MUTANTS = {
     "no age": ("0.001f * (float)((age_ms", "0.0f * (float)((age_ms"),
-    "acceleration x": ("angles.velocity.x + (0.5f * age_s *", "angles.velocity.x - (0.5f * age_s *"),
-    "acceleration y": ("angles.velocity.y + (0.5f * age_s *", "angles.velocity.y - (0.5f * age_s *"),
-    "velocity x": ("(age_s * (angles.velocity.x +", "(2.0f * age_s * (angles.velocity.x +"),
+    "acceleration": ("from_m_s[k] + (0.5f * age_s *", "from_m_s[k] - (0.5f * age_s *"),
+    "velocity": ("(age_s * (from_m_s[k] +", "(2.0f * age_s * (from_m_s[k] +"),
 }
 
 
 # The acceleration where the settings let the caller give it.
 GIVEN_MUTANTS = {
-    "given x": ("rests ? 0.0f : ax", "rests ? 0.0f : -ax"),
-    "given y": ("rests ? 0.0f : -ay", "rests ? 0.0f : ay"),
+    "given x": ("acceleration_m_s2[0] = a[0];", "acceleration_m_s2[0] = -a[0];"),
+    "given y": ("acceleration_m_s2[1] = -a[1];", "acceleration_m_s2[1] = a[1];"),
 }
 
 
@@ -156,8 +156,8 @@ def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
         30.0,
         app.host.modeAbs,
     )
-    app.update(np.zeros(7))
-    assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
+    app.update(TURNED)
+    assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, pytest.approx(30.0))
     assert (app.flown.mode.z, app.flown.mode.yaw) == (app.host.modeAbs, app.host.modeAbs)
     assert (app.flown.mode.roll, app.flown.mode.pitch) == (app.host.modeAbs, app.host.modeAbs)
 

@@ -74,7 +74,7 @@ def test_an_estimate_without_variances_is_taken_as_it_is(built: Built) -> None:
 def test_a_slow_stream_of_set_points_is_carried_on_by_its_jerk(built: Built) -> None:
     """Five set-points a second on a circle: the target stays within 1 cm, without jerk it does not."""
     app = built.app()
-    without = built.mutant("no jerk", "acceleration[0] + (age_s * jerk[0])", "acceleration[0]")
+    without = built.mutant("no jerk", "acceleration[k] + (age_s * jerk[k])", "acceleration[k]")
     circle, worst = Circle(1.0, 1.8), []
     for one in (app, without):
         one.modes("modeAbs")

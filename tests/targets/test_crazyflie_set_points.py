@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.support.crazyflie import Built, Crazyflie, content, flown_since, send
+from tests.support.crazyflie import TURNED, Built, Crazyflie, content, flown_since, send
 
 
 def test_a_slow_set_point_is_carried_on_for_half_a_second(built: Built) -> None:
@@ -82,7 +82,7 @@ def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, bu
     app.setpoint.mode.yaw = app.host.modeAbs
     app.setpoint.position.z, app.setpoint.attitude.yaw = 1.25, 30.0
     send(app, 0.5)
-    flown_since(app, np.zeros(7), 2)
+    flown_since(app, TURNED, 2)
     refused = app.logged("refused")
     part, member = number.split(".")
     for value in (math.nan, math.inf):
@@ -92,7 +92,7 @@ def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, bu
         flown_since(app, np.zeros(7), 10)
         assert app.logged("status") == 3
         assert app.logged("targetX") == 0.5
-        assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
+        assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, pytest.approx(30.0))
         setattr(getattr(app.setpoint, part), member, 0.0)
     assert app.logged("refused") == refused + 20
 
@@ -113,17 +113,17 @@ def test_every_kind_of_set_point_flies_in_one_mode(built: Built) -> None:
     app = built.app()
     app.modes("modeAbs")
     app.setpoint.mode.yaw = app.host.modeAbs
-    app.setpoint.attitude.yaw = 50.0
-    app.update(np.zeros(7))
+    app.setpoint.attitude.yaw = 30.0
+    app.update(TURNED)
     first = content(app.flown)
     app.setpoint.mode.yaw, app.setpoint.mode.quat = app.host.modeDisable, app.host.modeAbs
     app.setpoint.attitude.yaw = 0.0
-    app.setpoint.attitudeQuaternion.w = math.cos(math.radians(25.0))
-    app.setpoint.attitudeQuaternion.z = math.sin(math.radians(25.0))
+    app.setpoint.attitudeQuaternion.w = math.cos(math.radians(15.0))
+    app.setpoint.attitudeQuaternion.z = math.sin(math.radians(15.0))
     app.update(np.zeros(7))
     assert content(app.flown) == first
     assert app.flown.mode.quat == app.host.modeDisable
-    assert app.flown.attitude.yaw == pytest.approx(50.0, abs=1e-4)
+    assert app.flown.attitude.yaw == pytest.approx(30.0, abs=1e-4)
 
 
 def test_a_heading_is_carried_on_by_its_rate(built: Built) -> None:
@@ -131,11 +131,28 @@ def test_a_heading_is_carried_on_by_its_rate(built: Built) -> None:
     app = built.app()
     app.modes("modeAbs")
     app.setpoint.mode.yaw = app.host.modeAbs
-    app.setpoint.attitude.yaw, app.setpoint.attitudeRate.yaw = 50.0, 100.0
+    app.setpoint.attitude.yaw, app.setpoint.attitudeRate.yaw = 30.0, 100.0
     send(app, 0.0)
+    app.place(TURNED)
     for _ in range(101):
         app.tick()
-    assert app.flown.attitude.yaw == pytest.approx(60.0)
+    assert app.flown.attitude.yaw == pytest.approx(40.0)
+
+
+def test_the_heading_turns_slowly_and_the_short_way(built: Built) -> None:
+    """By 4 rad/s at most from where the drone points, also across south."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.setpoint.mode.yaw, app.setpoint.attitude.yaw = app.host.modeAbs, -170.0
+    app.place(np.array([0, 0, 0, 0, 0, 0, math.radians(-160.0)]))
+    headings = []
+    for _ in range(200):
+        send(app, 0.0)
+        app.tick()
+        headings.append(app.flown.attitude.yaw)
+    turned = np.unwrap(headings, period=360.0) - 160.0
+    assert np.diff(turned, prepend=0.0).max() == pytest.approx(math.degrees(0.004), rel=1e-3)
+    assert turned[-1] == pytest.approx(30.0, abs=1e-3)
 
 
 def test_on_the_ground_it_flies_level(built: Built) -> None:

@@ -1,5 +1,7 @@
 """The inputs of a step as one row of numbers, as calls of the C interface have them."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,7 +54,7 @@ class StepRows:
         thrust = np.zeros((n, 0)) if inputs.thrust is None else inputs.thrust[:, None]
         return np.concatenate([inputs.state, target[:, :level], thrust, target[:, level:]], axis=1)
 
-    def split(self, rows: NDArray[np.floating]) -> StepInputs:
+    def split(self, rows: NDArray[Any]) -> StepInputs:
         """Return the inputs of rows (n, k)."""
         target = np.concatenate([rows[:, self.target], rows[:, self.thrust.stop :]], axis=1)
         thrust = rows[:, self.thrust]

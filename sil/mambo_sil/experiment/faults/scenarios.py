@@ -63,8 +63,8 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """Return the faults; their magnitudes depend on the input ranges of `settings`.
 
     Faults of the weights are there with a 1-norm only, those of the limits with limits only. With a height
-    a state that is missing to the end, or wrong for 5 s, is so for the thrust too, which a stock loop takes from
-    the truth.
+    a state that is missing to the end, or wrong for 5 s, is so for the thrust too, which a stock loop takes
+    from the truth.
     """
     lifts = settings.height is not None
     jump_m = min(100.0, settings.ranges.position_m / 2.0)

@@ -24,7 +24,14 @@ TARGET: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
 TARGET_ACCELERATION: Final = ("target_ax_m_s2", "target_ay_m_s2")
 TAKE_OVERS: Final = "take_overs"
 """How often the controller has begun anew, at the present attitude."""
-OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS)
+START_THRUST: Final = "start_thrust_m_s2"
+"""The thrust over mass with which it did."""
+GROUNDED: Final = "grounded"
+"""Whether the controller was told that the floor may carry the drone."""
+LEVELLED: Final = "levelled"
+"""Whether its caller flew level instead of the tilt that it computed."""
+OF_HEIGHTS: Final = (START_THRUST, GROUNDED, LEVELLED)
+OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS, *OF_HEIGHTS)
 """Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
 pitch is positive with the nose up."""
 

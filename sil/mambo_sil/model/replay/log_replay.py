@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +20,10 @@ from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.signals import (
     COMMANDS,
     DEGREE,
+    GROUNDED,
     HEIGHT,
+    LEVELLED,
+    START_THRUST,
     TAKE_OVERS,
     TARGET,
     TARGET_ACCELERATION,
@@ -50,9 +53,17 @@ _APP: Final = {
     "target_vy_m_s": Column("nmpc.targetVy", -1.0),
     "target_ax_m_s2": Column("nmpc.targetAx"),
     "target_ay_m_s2": Column("nmpc.targetAy", -1.0),
+    HEIGHT: Column("nmpc.z", -1.0),
+    "vz_m_s": Column("nmpc.vz", -1.0),
+    "target_height_m": Column("nmpc.targetZ"),
+    "target_climb_m_s": Column("nmpc.targetVz"),
+    "target_climb_acceleration_m_s2": Column("nmpc.targetAz"),
     "roll_command_rad": Column("nmpc.outRoll"),
     "pitch_command_rad": Column("nmpc.outPitch"),
     TAKE_OVERS: Column("nmpc.takeOvers"),
+    START_THRUST: Column("nmpc.startThrust"),
+    GROUNDED: Column("nmpc.grounded"),
+    LEVELLED: Column("nmpc.level"),
 }
 """What the app of the Crazyflie logs of each step."""
 _OTHER: Final[dict[str, tuple[Column, ...]]] = {
@@ -69,7 +80,7 @@ _OTHER: Final[dict[str, tuple[Column, ...]]] = {
     "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
-    TAKE_OVERS: (Column(TAKE_OVERS),),
+    **{name: (Column(name),) for name in (TAKE_OVERS, START_THRUST, GROUNDED, LEVELLED)},
 }
 SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     name: (
@@ -109,7 +120,8 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
 
     The controller starts level, without an estimate, as after nmpc_init(). If the log counts take-overs, it
     is reset to the present roll and pitch at the beginning and at each of them. One of the height is in the
-    air, and is not told what a mixer made of its thrust, which no log shows. Raises LogError.
+    air where the log does not say that it was on the floor, and is not told what a mixer made of its thrust,
+    which no log shows. Raises LogError.
     """
     is_given, lifts = settings.target.acceleration == "given", settings.height is not None
     wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
@@ -122,19 +134,25 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     inputs = _interpolated if resampled else _held
     state, target = inputs(log, measured, time_s), inputs(log, wanted, time_s)
     if lifts:
-        state = np.column_stack([state[:, : len(STATE)], -state[:, len(STATE) :], np.zeros(len(time_s))])
-    thrust_m_s2 = (
-        _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
-    )
+        own = -state[:, len(STATE) :]
+        state = np.column_stack([state[:, : len(STATE)], own, _held_or(log, GROUNDED, time_s, 0.0)])
+    thrust_m_s2 = _held_or(log, THRUST, time_s, GRAVITY_M_S2)
+    start_m_s2 = _held_or(log, START_THRUST, time_s, thrust_m_s2)
+    levelled = lifts & (_held_or(log, LEVELLED, time_s, 0.0) != 0.0)
     controller = CompiledController(settings)
     begins = _take_overs(log, time_s)
     steps = []
     for k in range(len(time_s)):
         if begins[k]:
             held = state[k : k + 1, 4:6]
-            controller.reset(np.column_stack([held, thrust_m_s2[k]]) if lifts else held)
+            controller.reset(np.column_stack([held, start_m_s2[k]]) if lifts else held)
         thrust = None if lifts else thrust_m_s2[k]
-        steps.append(controller.step(state[k : k + 1], target[k : k + 1], thrust))
+        step = controller.step(state[k : k + 1], target[k : k + 1], thrust)
+        if levelled[k, 0]:
+            level_rad = np.zeros_like(step.command_rad)
+            controller.set_command(np.column_stack([level_rad, step.thrust_m_s2]))
+            step = replace(step, command_rad=level_rad)
+        steps.append(step)
     return LogReplay(
         time_s,
         _held(log, COMMANDS, time_s),
@@ -192,6 +210,13 @@ def _held(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatAr
     signals = [log.signals[name] for name in names]
     places = [np.searchsorted(signal.time_s, time_s, side="right") - 1 for signal in signals]
     return np.stack([signal.value[at] for signal, at in zip(signals, places, strict=True)], axis=1)
+
+
+def _held_or(log: FlightLog, name: str, time_s: FloatArray, other: float | FloatArray) -> FloatArray:
+    """Return a signal at times (k,), held, or `other` where the log has none: (k, 1)."""
+    if name in log.signals:
+        return _held(log, (name,), time_s)
+    return np.broadcast_to(other, (len(time_s), 1))
 
 
 def _interpolated(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
