@@ -1,4 +1,4 @@
-"""The Crazyflie's app with a height: what it reads and flies, on the ground, in the air and at a take-over."""
+"""The Crazyflie's app with a height: what it reads and flies, on the ground, in the air, at a take-over."""
 
 import math
 from pathlib import Path

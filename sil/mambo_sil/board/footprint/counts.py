@@ -121,27 +121,18 @@ class CountingController:
         flash: FlashWait | None = None,
     ) -> None:
         self._emulated = EmulatedController(settings, elf, core, counting=True)
-        self._method = method_of(settings)
+        self.settings = settings
         image = load(elf)
         self._name_of = lru_cache(None)(lambda address: image.name_of(address).partition("+")[0])
         self._model = CycleModel(image, core, flash) if modelled else None
         self.steps: list[CountedStep] = []
 
-    def step(
-        self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray
-    ) -> OneNormStep:
-        """Step once with state (1, 7), target (1, 6) and thrust_acceleration_m_s2 (1,).
+    def set_thrust(self, thrust_m_s2: FloatArray) -> None:
+        """Tell a controller of the height what the drone got; it is not part of a step."""
+        self._emulated.set_thrust(thrust_m_s2)
 
-        A controller of the height holds the height of a target that the drone is at.
-        """
-        if not self._method.has_height:
-            return self._step(state, target, thrust_acceleration_m_s2)
-        level = len(self._method.level_target)
-        still = np.zeros((1, len(self._method.target) - level))
-        goal = np.concatenate([target[:, :level], still], axis=1)
-        return self._step(np.concatenate([state, np.zeros((1, 3))], axis=1), goal, None)
-
-    def _step(self, state: FloatArray, target: FloatArray, thrust: FloatArray | None) -> OneNormStep:
+    def step(self, state: FloatArray, target: FloatArray, thrust: FloatArray | None = None) -> OneNormStep:
+        """Step once with state (1, k), target (1, m) and, without a height, thrust over mass (1,)."""
         before = self._emulated.save()
         self._emulated.machine.take_executed()
         outcome: OneNormStep = self._emulated.step(state, target, thrust)
@@ -169,7 +160,7 @@ class CountingController:
     def retry(self, step: CountedStep, state: FloatArray, target: FloatArray) -> CountedStep:
         """Repeat an earlier step from the instance before it, with another state (1, k) and target (1, m)."""
         self._emulated.restore(step.before)
-        self._step(state, target, step.thrust)
+        self.step(state, target, step.thrust)
         return self.steps.pop()
 
 
