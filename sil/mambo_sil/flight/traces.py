@@ -5,7 +5,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +105,13 @@ class Trace:
         if self.spatial:
             return np.asarray(self.target[..., TARGET_COLUMNS])
         return np.full(self.status.shape, HOVER_HEIGHT_M)
+
+    def in_space(self) -> Self:
+        """Return the trace with the height of its course, also of a level one."""
+        if self.spatial:
+            return self
+        level = np.broadcast_to((HOVER_HEIGHT_M, 0.0), (*self.status.shape, 2))
+        return replace(self, target=np.concatenate([self.target, level], axis=-1))
 
     @property
     def flights(self) -> int:

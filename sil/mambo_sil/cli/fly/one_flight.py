@@ -68,6 +68,8 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         same_bits = None
         if runner.on is not None:
             same_bits = trace.same_bits(simulate(flight, _controller(runner, settings, flight)))
+        if settings.height is not None and runner.controller not in PD_TITLES:
+            trace = trace.in_space()
         write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         summary = FlySummary(**fields | judge(trace, settings, drone) | {"same_bits_as_host": same_bits})
