@@ -214,7 +214,9 @@ def test_what_is_no_suite_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SourceNotFoundError, match=r"nor a file \(did you mean envelope\?\)"):
         load_suite("envelop")
-    with pytest.raises(SourceNotFoundError, match="nor a file; shipped suites are envelope, limits, space"):
+    with pytest.raises(
+        SourceNotFoundError, match="nor a file; shipped suites are envelope, height, limits, space"
+    ):
         load_suite("zzz")
     Path("envelope").write_text("no", "utf-8")
     with pytest.raises(UnreadableFileError, match="envelope: line 1"):
