@@ -9,7 +9,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import curve
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import HOVER_HEIGHT_M
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import CurveName
 from tests.support.heights import height_settings
 
