@@ -88,11 +88,12 @@ class Expected:
         )
         if before < 0 or before in self.without_step:
             return self._held
-        inputs = self._seen[self.used.get(before, before)]
-        if self.settings.height is not None:
-            *inputs, told = inputs
-            self._compiled.set_thrust(told)
-        step = self._compiled.step(*inputs)
+        measured, aim, thrust = self._seen[self.used.get(before, before)]
+        if self.settings.height is None:
+            step = self._compiled.step(measured, aim, thrust)
+        else:
+            self._compiled.set_thrust(thrust)
+            step = self._compiled.step(measured, aim)
         if before in self.lost:
             return self._held
         thrust_m_s2 = getattr(step, "thrust_m_s2", None)
