@@ -158,7 +158,8 @@ def settled_s(errors: FloatArray) -> float:
 def contenders() -> dict[str, Contender]:
     """Return the controllers by title."""
     preset = Controller(presets.preset("crazyflie"))
-    derived = Controller(controller_toml.parse(controller_text(DRONE, DRONE.name), DRONE.name))
+    settings = controller_toml.parse(controller_text(DRONE, DRONE.name), DRONE.name)
+    derived = Controller(settings.model_copy(update={"height": None}))  # the PD holds it, as with the preset
     return {
         "RotorPy, SE3Control": Contender("cmd_motor_speeds", se3),
         "ours, preset `crazyflie`": Contender("cmd_ctatt", lambda: ours(preset, DRONE)),

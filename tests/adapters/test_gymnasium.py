@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mambo_nmpc import ArgumentError
+from mambo_sil.api.simulated import SimulatedDrone
+from mambo_sil.drone.vehicles import vehicle_toml
 from tests.support.tools import require_module
 
 NAME = "mambo_nmpc.adapters.gymnasium:MamboNmpc-v0"
@@ -40,6 +42,32 @@ def test_a_policy_that_aims_at_the_curve_follows_it() -> None:
         assert reward == -info["distance_m"]
     assert info["distance_m"] < 0.5
     assert info["status"] == 0
+
+
+@pytest.mark.parametrize("vehicle", ["crazyflie", "crazyflie-l250"])
+def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
+    """By the thrust of the C, of a drone without [height] by an altitude loop, as where the policy tilts."""
+    for action in ("target", "attitude"):
+        environment = make(action=action, vehicle=vehicle, trajectory="swinging-eight")
+        seen, _ = environment.reset(seed=2)
+        heights, errors = [], []
+        for _ in range(200):
+            aim = (seen[:2] + seen[9:11]) / 5.0 if action == "target" else np.zeros(2)
+            seen, *_ = environment.step(aim)
+            heights.append(seen[2])
+            errors.append(abs(seen[11]))
+        assert max(errors[100:]) < 0.01  # after a start at rest beneath a curve that climbs
+        assert np.ptp(heights) > 0.2
+
+
+def test_a_thrust_that_the_mixer_caps_is_told() -> None:
+    """Beside a large tilt the Crazyflie's motors do not give all that is commanded; at rest they do."""
+    drone = SimulatedDrone(vehicle_toml.load("crazyflie"), 0.01)
+    drone.advance(np.zeros(2), 9.81)
+    assert np.isnan(drone.tell_thrust())
+    drone.advance(np.array([0.5, 0.0]), 15.9)
+    assert 9.0 < drone.tell_thrust() < 15.9
+    assert np.isnan(drone.tell_thrust())
 
 
 def test_a_crash_ends_the_episode() -> None:

@@ -1,20 +1,32 @@
 """The controller object that RotorPy's simulator calls, in that simulator."""
 
 import importlib
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
 from mambo_nmpc import ArgumentError, Controller
 from mambo_nmpc.adapters.rotorpy import RotorpyController
 from tests.support.tools import require_module
 
+MADE = pytest.mark.parametrize(
+    "made",
+    [
+        lambda: Controller.from_preset("crazyflie", vehicle="crazyflie", height="pid", age_s=0.0),
+        lambda: Controller.from_vehicle("crazyflie", age_s=0.0),
+    ],
+    ids=["loop", "axis"],
+)
+"""With an altitude loop, and with the height as an axis of the controller."""
 START_M = np.array([0.0, 0.0, 1.0])
 
 
-def test_a_drone_of_rotorpy_goes_where_it_shall() -> None:
+@MADE
+def test_a_drone_of_rotorpy_goes_where_it_shall(made: Callable[[], Controller]) -> None:
     """A step of 0.4 m forward and 0.2 m to the left and up, in RotorPy's own closed loop."""
     require_module("rotorpy")
     vehicles: Any = importlib.import_module("rotorpy.vehicles.multirotor")
@@ -26,22 +38,22 @@ def test_a_drone_of_rotorpy_goes_where_it_shall() -> None:
     goal_m = np.array([0.4, 0.2, 1.2])
     rest = {name: np.zeros(3) for name in ("x_dot", "x_ddot", "x_dddot", "x_ddddot")}
     flat = {"x": goal_m, **rest, "yaw": 0.3, "yaw_dot": 0.0}
-    controller = Controller.from_vehicle("crazyflie", height="pid", age_s=0.0)
     flown = environments.Environment(
-        vehicle, RotorpyController(controller, quad["mass"]), SimpleNamespace(update=lambda _: flat)
+        vehicle, RotorpyController(made(), quad["mass"]), SimpleNamespace(update=lambda _: flat)
     ).run(t_final=3.0, terminate=False)
     np.testing.assert_allclose(flown["state"]["x"][-1], goal_m, atol=0.05)
     x, y, z, w = flown["state"]["q"][-1]
     np.testing.assert_allclose(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), 0.3, atol=0.03)
 
 
-def test_each_flight_starts_afresh() -> None:
+@MADE
+def test_each_flight_starts_afresh(made: Callable[[], Controller]) -> None:
     """At time 0; thrust in N and attitude are those of the controller."""
-    adapter = RotorpyController(Controller.from_vehicle("crazyflie", height="stock"), 0.03)
+    adapter = RotorpyController(made(), 0.03)
     state = {"x": START_M, "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0])}
     flat = {"x": START_M, "x_dot": np.array([0.5, 0.0, 0.0])}
     first = adapter.update(0.0, state, flat)
-    np.testing.assert_allclose(first["cmd_thrust"], 0.03 * 9.81, rtol=1e-6)
+    np.testing.assert_allclose(first["cmd_thrust"], 0.03 * 9.81, rtol=RECIPROCAL_ERROR)
     assert first["cmd_q"][1] > 0.0  # nose down
     assert (adapter.update(0.01, state, flat)["cmd_q"] != first["cmd_q"]).any()
     assert (adapter.update(0.0, state, flat)["cmd_q"] == first["cmd_q"]).all()

@@ -8,6 +8,7 @@ frames and units of what it returns, and that it refuses what does not fit; how 
 import importlib
 import subprocess
 import sys
+from collections.abc import Callable
 from types import ModuleType, SimpleNamespace
 from typing import Any, Final
 
@@ -41,7 +42,7 @@ def test_a_missing_package_is_named_with_its_command(monkeypatch: pytest.MonkeyP
     for name in ("jax", "gymnasium", "gym_pybullet_drones"):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delitem(sys.modules, "mambo_nmpc.adapters.gymnasium", raising=False)
-    controller = Controller.from_vehicle("crazyflie", height="pid")
+    controller = Controller.from_vehicle("crazyflie")
     for call, command in (
         (
             lambda: attach(simulation(1, 1), controller, curve("hover")),
@@ -68,10 +69,18 @@ def states(worlds: int, drones: int) -> dict[str, Any]:
     return {"position": position, "quaternion": quaternion, "velocity": np.zeros_like(position)}
 
 
-def test_a_crazyflow_simulation_gets_its_attitude_commands() -> None:
+@pytest.mark.parametrize(
+    "controller",
+    [
+        pytest.param(
+            lambda: Controller.from_vehicle("crazyflie-l250", 6, height="pid", age_s=0.0), id="loop"
+        ),
+        pytest.param(lambda: Controller.from_vehicle("crazyflie", 6, age_s=0.0), id="axis"),
+    ],
+)
+def test_a_crazyflow_simulation_gets_its_attitude_commands(controller: Callable[[], Controller]) -> None:
     """Roll, pitch, yaw in rad and thrust in N (worlds, drones, 4); a world that is reset starts afresh."""
-    controller = Controller.from_vehicle("crazyflie-l250", 6, height="pid", age_s=0.0)
-    pilot = CrazyflowPilot(simulation(3, 2), controller, curve("hover"), height_m=1.0, yaw_rad=0.2)
+    pilot = CrazyflowPilot(simulation(3, 2), controller(), curve("hover"), height_m=1.0, yaw_rad=0.2)
     assert pilot.ticks == 5
     first = pilot.command(np.zeros((3, 1), np.int32), **states(3, 2))
     assert first.shape == (3, 2, 4)
@@ -86,7 +95,7 @@ def test_a_crazyflow_simulation_gets_its_attitude_commands() -> None:
 
 def test_a_crazyflow_simulation_that_does_not_fit_is_refused() -> None:
     """By number of drones, or by frequency."""
-    controller = Controller.from_vehicle("crazyflie", 2, height="pid")
+    controller = Controller.from_vehicle("crazyflie", 2)
     with pytest.raises(ArgumentError, match="controller: was made for 2 drones"):
         CrazyflowPilot(simulation(2, 2), controller, curve("hover"), height_m=1.0, yaw_rad=0.0)
     with pytest.raises(ArgumentError, match=r"sim\.freq = 250 must be a multiple of 100 Hz"):
@@ -129,7 +138,8 @@ def _pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("_pybullet")
 def test_a_base_control_gets_thrust_and_attitude() -> None:
     """Thrust in PWM, angles about X, then Y, then Z of the body, and the position error."""
-    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", height="feedforward"))
+    made = Controller.from_preset("crazyflie", vehicle="crazyflie", height="feedforward")
+    control = pybullet_control("cf2x", made)
     assert isinstance(control, DSLPIDControl)
     here, there, rest = np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 1.0]), np.zeros(3)
     turned = Rotation.from_euler("z", 0.5).as_quat()
@@ -151,7 +161,7 @@ def test_a_base_control_gets_thrust_and_attitude() -> None:
 @pytest.mark.usefixtures("_pybullet")
 def test_a_base_control_refuses_what_does_not_fit() -> None:
     """Another control period, and several drones."""
-    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", height="pid"))
+    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie"))
     here, rest = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     with pytest.raises(ArgumentError, match=r"control_timestep = 0\.02 must be 0\.01, the update period"):
         control.computeControl(0.02, here, LEVEL, rest, here)

@@ -2,18 +2,22 @@
 
 import copy
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.heading import slew_heading
+from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import CurvePoint, Trajectory, curve, sample
-from mambo_sil.api import height_hold
+from mambo_sil.api import heading
 from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
@@ -21,6 +25,8 @@ from mambo_sil.model.derive.derived_settings import controller_text
 from tests.support.one_norm import ONE_NORM
 
 DERIVED = controller_toml.parse(controller_text(vehicle_toml.preset("crazyflie"), "x"), "x")
+RECIPROCAL_M_S2 = RECIPROCAL_ERROR * GRAVITY_M_S2
+"""Error of the thrust in hover with `[height]`, whose C divides by products."""
 RNG = np.random.default_rng(5)
 
 
@@ -35,7 +41,13 @@ def aloft(*batch: int, z_m: float = -1.0, yaw_rad: float = 0.0) -> DroneState:
 
 def goal(*batch: int, yaw_rad: float | None = None) -> TargetState:
     """Return targets at rest, a metre above the origin."""
-    return TargetState(aloft(*batch).position_m, np.zeros((*batch, 3)), yaw_rad=yaw_rad)
+    yaws_rad = None if yaw_rad is None else np.full(batch, yaw_rad)
+    return TargetState(aloft(*batch).position_m, np.zeros((*batch, 3)), yaw_rad=yaws_rad)
+
+
+def stock(height: AltitudeName, n: int = 1) -> Controller:
+    """Return controllers beside an altitude loop of the Crazyflie."""
+    return Controller.from_preset("crazyflie", n, vehicle="crazyflie", height=height)
 
 
 def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
@@ -111,11 +123,13 @@ def test_what_does_not_fit_together_is_refused() -> None:
         Controller.from_preset("crazyflie", height="pid")
     with pytest.raises(ArgumentError, match=r"vehicle = 3 must be the path of a vehicle\.toml, or one of cr"):
         Controller.from_vehicle(3)  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="attitude_thrust needs a controller made with height"):
-        Controller.from_vehicle("crazyflie").step(aloft(), goal()).attitude_thrust("NED")
-    pilot = Controller.from_preset("crazyflie", vehicle="crazyflie", height="pid")
+    with pytest.raises(ArgumentError, match=r"attitude_thrust needs settings with \[height\]"):
+        Controller.from_preset("crazyflie").step(aloft(), goal()).attitude_thrust("NED")
+    with pytest.raises(ArgumentError, match=r'height = "pid" must be left out: the settings have \[height\]'):
+        Controller.from_vehicle("crazyflie", height="pid")
+    pilot = stock("pid")
     level = TargetState([0.0, 0.0], [0.0, 0.0])
-    with pytest.raises(ArgumentError, match="target: position_m has no z; height wants x, y, z"):
+    with pytest.raises(ArgumentError, match="target: position_m has no z; the height wants x, y, z"):
         pilot.step(aloft(), level)
     with pytest.raises(ArgumentError, match=r"thrust_acceleration_m_s2 = 9\.0 must be left out"):
         pilot.step(aloft(), goal(), 9.0)
@@ -152,10 +166,15 @@ def test_the_shape_that_goes_in_comes_out(name: str) -> None:
         together.step(DroneState(position, velocity, attitude), flat)
 
 
-def test_some_of_n_are_reset() -> None:
+@pytest.mark.parametrize(
+    "made",
+    [lambda n: stock("pid", n), lambda n: Controller.from_vehicle("crazyflie", n)],
+    ids=["loop", "axis"],
+)
+def test_some_of_n_are_reset(made: Callable[[int], Controller]) -> None:
     """The others, and their heights and headings, go on as before."""
     state, target = aloft(4, z_m=-0.9), goal(4, yaw_rad=1.0)
-    swarm = Controller.from_vehicle("crazyflie", 4, height="pid")
+    swarm = made(4)
     first = swarm.step(state, target)
     other = copy.deepcopy(swarm)
     which = np.array([True, False, False, True])
@@ -173,10 +192,14 @@ def test_some_of_n_are_reset() -> None:
             swarm.reset(which=wrong)
 
 
-@pytest.mark.parametrize("name", ["crazyflie", "mambo-1norm"])
+@pytest.mark.parametrize("name", ["crazyflie", "mambo-1norm", "[height]"])
 def test_a_saved_controller_goes_on_as_the_first(name: str) -> None:
     """Pickled and copied, with what the altitude loop remembers; other C is refused."""
-    first = Controller.from_preset(name, 2, vehicle="crazyflie", height="pid")
+    if name == "[height]":
+        first, other_c = (Controller.from_vehicle("crazyflie", n) for n in (2, 1))
+    else:
+        first = Controller.from_preset(name, 2, vehicle="crazyflie", height="pid")
+        other_c = Controller.from_preset(name)
     state, target = aloft(2, z_m=-0.8), goal(2, yaw_rad=2.0)
     for _ in range(3):
         first.step(state, target)
@@ -187,32 +210,52 @@ def test_a_saved_controller_goes_on_as_the_first(name: str) -> None:
         for field in ("command_rad", "thrust_m_s2", "yaw_rad"):
             assert (getattr(got, field) == getattr(expected, field)).all()
     with pytest.raises(ArgumentError, match="was saved by another version"):
-        Controller.from_preset(name).__setstate__({**first.__getstate__(), "generator": "another"})
+        other_c.__setstate__({**first.__getstate__(), "generator": "another"})
 
 
-def test_the_heading_turns_by_the_shorter_way_at_a_bounded_rate() -> None:
-    """From the measured one, across the south; without a target it stays."""
-    pilot = Controller.from_vehicle("crazyflie", height="stock")
-    state = aloft(yaw_rad=3.0)
-    yaws = [float(pilot.step(state, goal(yaw_rad=-3.0)).yaw_rad or 0.0) for _ in range(20)]
-    step = height_hold.HEADING_RATE_RAD_S * pilot.update_period_s
-    turned = np.unwrap([3.0, *yaws]) - 3.0
-    np.testing.assert_allclose(turned[1:8], step * np.arange(1, 8))
-    np.testing.assert_allclose(turned[-1], 2.0 * np.pi - 6.0)
+@pytest.mark.parametrize("made", [lambda: stock("stock"), lambda: Controller.from_vehicle("crazyflie")])
+def test_the_heading_turns_by_the_shorter_way_at_a_bounded_rate(made: Callable[[], Controller]) -> None:
+    """From the measured one, across the south, by `nmpc_slew_heading`; without a target it stays."""
+    pilot = made()
+    state, most_rad = aloft(yaw_rad=3.0), heading.HEADING_RATE_RAD_S * pilot.update_period_s
+    expected = np.array([3.0])
+    for _ in range(20):
+        expected = slew_heading(method_of(pilot.settings), expected, [-3.0], [most_rad])
+        assert pilot.step(state, goal(yaw_rad=-3.0)).yaw_rad == expected[0]
+    np.testing.assert_allclose(expected, 2.0 * np.pi - 3.0, atol=1e-6)
     pilot.reset()
     assert [pilot.step(state, goal()).yaw_rad for _ in range(2)] == [3.0, 3.0]
 
 
+def test_the_heading_starts_at_the_first_one_in_range() -> None:
+    """Not at what is no number, or out of range, whatever the target."""
+    pilot = Controller.from_vehicle("crazyflie", 3)
+    state = DroneState(
+        [[0.0, 0.0, -1.0]] * 3, np.zeros((3, 3)), [[0, 0, np.nan], [0, 0, 2000.0], [0, 0, 0.5]]
+    )
+    first = pilot.step(state, goal(3, yaw_rad=0.6)).yaw_rad
+    assert first is not None
+    assert np.isnan(first[:2]).all()
+    then = pilot.step(aloft(3, yaw_rad=0.6), goal(3)).yaw_rad
+    assert then is not None
+    assert (then == [0.6, 0.6, first[2]]).all()
+
+
+@pytest.mark.parametrize(
+    ("made", "atol"),
+    [(lambda: stock("stock"), 1e-6), (lambda: Controller.from_vehicle("crazyflie"), RECIPROCAL_M_S2)],
+)
 @pytest.mark.parametrize("frame", FRAMES)
-def test_one_call_gives_an_attitude_and_a_thrust_in_any_frame(frame: FrameName) -> None:
+def test_one_call_gives_an_attitude_and_a_thrust_in_any_frame(
+    frame: FrameName, made: Callable[[], Controller], atol: float
+) -> None:
     """A hover is level with the weight as thrust; below the target it is more."""
     up = -1.0 if frame == "NED" else 1.0
-    pilot = Controller.from_vehicle("crazyflie", height="feedforward")
+    pilot = made()
     state = DroneState.in_frame(frame, [0.0, 0.0, up], [0.0, 0.0, 0.0], [0.0, 0.0, 0.5])
     target = TargetState.in_frame(frame, [0.0, 0.0, up], [0.0, 0.0, 0.0], yaw_rad=0.5)
-    np.testing.assert_allclose(
-        pilot.step(state, target).attitude_thrust(frame), [0.0, 0.0, 0.5, GRAVITY_M_S2], atol=1e-6
-    )
+    hover = [0.0, 0.0, 0.5, GRAVITY_M_S2]
+    np.testing.assert_allclose(pilot.step(state, target).attitude_thrust(frame), hover, atol=atol)
     higher = TargetState.in_frame(frame, [0.0, 0.0, 1.1 * up], [0.0, 0.0, 0.0])
     outcome = pilot.step(state, higher)
     over_mass = outcome.attitude_thrust(frame)[3]
@@ -224,7 +267,7 @@ def test_one_call_gives_an_attitude_and_a_thrust_in_any_frame(frame: FrameName) 
 
 def test_no_number_leaves_thrust_and_heading_as_they_are() -> None:
     """As the C keeps its command."""
-    pilot = Controller.from_vehicle("crazyflie", height="pid")
+    pilot = stock("pid")
     before = pilot.step(aloft(z_m=-0.9), goal(yaw_rad=0.0))
     lost = DroneState([np.nan] * 3, [np.nan] * 3, [np.nan] * 3)
     after = pilot.step(lost, goal())
@@ -237,7 +280,7 @@ def test_a_wrong_mass_leaves_no_error_of_height_with_pid() -> None:
     left = {}
     names: tuple[AltitudeName, ...] = ("stock", "pid")
     for name in names:
-        pilot = Controller.from_vehicle("crazyflie", height=name)
+        pilot = stock(name)
         z, climb = 1.0, 0.0
         for _ in range(700):
             state = DroneState.in_frame("NWU", [0.0, 0.0, z], [0.0, 0.0, climb], [0.0, 0.0, 0.0])

@@ -12,6 +12,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.bundles import place
+from tests.support.heights import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require, require_file
 
@@ -33,6 +34,8 @@ SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": presets.preset("mambo-1norm"),
+    "height": height_settings(),
+    "fixed height": with_option(height_settings("fixed"), "limits.speed_m_s", 2.0),
 }
 
 
@@ -67,8 +70,9 @@ def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Pat
     assert version.startswith("mambo-nmpc ")
     assert self_test == "self-test: all steps equal the reference"
     assert len(lines) == 20
-    north, east, refused = (float(number) for number in re.findall(r"-?[\d.]+", lines[-1]))
-    assert (north, east) == pytest.approx((1.0, 0.0), abs=0.01)
+    *position, refused = (float(number) for number in re.findall(r"-?[\d.]+", lines[-1]))
+    target = (1.0, 0.0, 1.0) if SUBJECTS[name].height else (1.0, 0.0)
+    assert position == pytest.approx(target, abs=0.01)
     assert refused == 0
 
 

@@ -6,7 +6,7 @@ import sys
 import zipfile
 from collections.abc import Sequence
 from ctypes import CDLL
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -17,19 +17,26 @@ import pytest
 from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.heading import slew_heading
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.loop import Flight, PositionController, fly
-from mambo_sil.flight.trajectories import Bernoulli
+from mambo_sil.flight.trajectories import CURVES, Bernoulli
 from tests.support.bundles import place
+from tests.support.heights import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require, require_module
 
 VERSIONS: Final = ("2", "3")
 STATUS, SATURATED = [100], [101]
+MEASURED = ("x", "y", "vx", "vy", "roll", "pitch", "yaw", "height", "climb", "grounded")
+AIMED = ("target_x", "target_y", "target_vx", "target_vy")
+COMMANDED = ("roll_command", "pitch_command")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 SUBJECTS = {
     "mambo": presets.preset("mambo"),
@@ -37,8 +44,9 @@ SUBJECTS = {
     "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
     "1-norm": presets.preset("mambo-1norm"),
     "limits": with_option(presets.preset("mambo"), "limits.speed_m_s", 1.0),
+    "height": height_settings(acceleration="given"),
 }
-OTHERS = ("float64", "1-norm", "given", "limits")
+OTHERS = ("float64", "1-norm", "given", "limits", "height")
 """Subjects whose flights are left to the long tests."""
 
 
@@ -64,12 +72,15 @@ class Outputs:
 
     command_rad: FloatArray
     status: IntArray
+    thrust_m_s2: FloatArray | None = None
 
 
 class Unit:
     """A unit in an unpacked folder, through FMPy, as a position controller of one flight."""
 
-    def __init__(self, folder: Path, version: str, period_s: float) -> None:
+    def __init__(self, folder: Path, version: str, settings: Settings) -> None:
+        self.settings, self._period_s, self._steps = settings, settings.horizon.update_period_s, 0
+        self.reference = {variable.name: place for place, variable in enumerate(fmu_variables(settings))}
         described = import_module("fmpy").read_model_description(str(folder))
         slave = getattr(import_module(f"fmpy.fmi{version}"), f"FMU{version}Slave")
         self._unit: Any = slave(
@@ -86,8 +97,6 @@ class Unit:
             self._unit.setupExperiment(startTime=0.0)
         self._unit.enterInitializationMode()
         self._unit.exitInitializationMode()
-        self._period_s, self._steps = period_s, 0
-        self._is_given = "target_ax" in {variable.name for variable in described.modelVariables}
 
     def advance(self, duration_s: float) -> None:
         """Make a communication step."""
@@ -103,13 +112,30 @@ class Unit:
         """Whether a command is at the tilt limit."""
         return bool(self._unit.getBoolean(SATURATED)[0])
 
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outputs:
+    def read(self, *names: str) -> list[float]:
+        """Return the values of variables by name."""
+        values: list[float] = self.get([self.reference[name] for name in names])
+        return values
+
+    def write(self, **values: float) -> None:
+        """Set variables by name."""
+        self.set([self.reference[name] for name in values], list(values.values()))
+
+    def step(
+        self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray | None = None
+    ) -> Outputs:
         """Set the inputs, make a step of an update period, and return the outputs."""
-        self.set(range(12), [*state[0], *target[0, :4], thrust_acceleration_m_s2[0]])
-        if self._is_given:
-            self.set([14, 15], target[0, 4:])
+        places = dict(zip(MEASURED, state[0], strict=False))
+        given = ("target_ax", "target_ay") if "target_ax" in self.reference else ()
+        if thrust_acceleration_m_s2 is None:
+            heights = ("target_height", "target_climb", *(("target_az",) if given else ()))
+        else:
+            heights, places["thrust_acceleration"] = (), thrust_acceleration_m_s2[0]
+        self.write(**places, **dict(zip((*AIMED, *given, *heights), target[0], strict=False)))
         self.advance(self._period_s)
-        return Outputs(np.array([self.get([12, 13])]), np.array(self.get_status(STATUS)))
+        status, command = np.array(self.get_status(STATUS)), np.array([self.read(*COMMANDED)])
+        thrust = np.array(self.read("thrust_command")) if thrust_acceleration_m_s2 is None else None
+        return Outputs(command, status, thrust)
 
     def close(self) -> None:
         """Release the unit and its library."""
@@ -120,9 +146,11 @@ class Unit:
 def flown(settings: Settings, controller: PositionController) -> list[Any]:
     """Fly a figure of eight, and return every array of the trace."""
     period_s = settings.horizon.update_period_s
-    trace = fly(
-        Flight(Bernoulli(2.0, 0.5), duration_s=2.0, yaw_rad=0.4, update_period_s=period_s), controller
-    )
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=2.0, yaw_rad=0.4, update_period_s=period_s)
+    if settings.height is not None:
+        drone = Vehicle.from_preset("crazyflie")
+        flight = replace(flight, trajectory=CURVES["swinging-eight"](2.0, 0.5), vehicle=drone)
+    trace = fly(flight, controller)
     return [getattr(trace, column.name) for column in fields(trace)]
 
 
@@ -141,7 +169,7 @@ def test_both_units_fly_with_the_bits_of_the_controller_alone(name: str, tmp_pat
     for version in VERSIONS:
         file = folder / f"nmpc_fmi{version}.fmu"
         assert validate(str(file)) == []
-        unit = Unit(unpacked(file, tmp_path / version), version, settings.horizon.update_period_s)
+        unit = Unit(unpacked(file, tmp_path / version), version, settings)
         assert same(flown(settings, unit), alone)
         unit.close()
 
@@ -158,7 +186,7 @@ def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
     objects.mkdir()
     import_module("fmpy.build").build_platform_binary(folder, objects)
     assert list((folder / "binaries").rglob("nmpc.*"))
-    unit = Unit(folder, version, settings.horizon.update_period_s)
+    unit = Unit(folder, version, settings)
     assert same(flown(settings, unit), flown(settings, CompiledController(settings)))
     unit.close()
 
@@ -170,7 +198,7 @@ def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) ->
     folder = unpacked(built(settings, tmp_path / "out") / f"nmpc_fmi{version}.fmu", tmp_path / "unit")
     period_s = settings.horizon.update_period_s
     starts = [variable.start for variable in fmu_variables(settings)]
-    one, other = Unit(folder, version, period_s), Unit(folder, version, period_s)
+    one, other = Unit(folder, version, settings), Unit(folder, version, settings)
     assert one.get(range(len(starts))) == starts
     one.set([7], [3.0])
     other.set([7], [3.0])
@@ -201,14 +229,40 @@ def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) ->
     other.close()
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_heading_turns_from_the_measured_one(version: str, tmp_path: Path) -> None:
+    """By nmpc_slew_heading, from the first one in range on, at the rate of the parameter."""
+    settings = SUBJECTS["mambo"]
+    unit = Unit(unpacked(built(settings, tmp_path) / f"nmpc_fmi{version}.fmu", tmp_path), version, settings)
+    period_s = settings.horizon.update_period_s
+    for yaw in (np.nan, 2000.0):
+        unit.write(yaw=yaw, target_yaw=1.0)
+        unit.advance(period_s)
+        assert unit.read("yaw_command") == [0.0]
+    expected = np.array([3.0])
+    unit.write(yaw=3.0, target_yaw=-3.0, heading_rate=2.0)
+    for _ in range(20):
+        unit.advance(period_s)
+        expected = slew_heading(method_of(settings), expected, [-3.0], [2.0 * period_s])
+        assert unit.read("yaw_command") == expected.tolist()
+    unit.reset()
+    unit.write(yaw=0.5)
+    unit.advance(period_s)
+    assert 0.4 < unit.read("yaw_command")[0] < 0.5
+    unit.close()
+
+
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("name", [*SUBJECTS, "fixed"])
+@pytest.mark.parametrize("name", [*SUBJECTS, "fixed", "fixed height"])
 def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp_path: Path) -> None:
     """All warnings on and fatal; an importer finds each function of the standard's header in the library."""
     require_module("fmpy")
     compiler = require("gcc", "gcc")
-    fixed = with_option(presets.preset("mambo"), "code.scalar", "fixed")
-    settings = fixed if name == "fixed" else SUBJECTS[name]
+    fixed = {
+        "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
+        "fixed height": height_settings("fixed"),
+    }
+    settings = (SUBJECTS | fixed)[name]
     folder = place(render_target(settings, TARGETS["fmu"], with_digest=False), tmp_path)
     headers = Path(str(import_module("fmpy").__file__)).parent / "c-code"
     for version in VERSIONS:

@@ -22,6 +22,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
+from tests.support.heights import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
 
@@ -49,6 +50,8 @@ SUBJECTS = {
     "1-norm": presets.preset("mambo-1norm"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
+    "height": height_settings(acceleration="given"),
+    "fixed height": height_settings("fixed"),
 }
 
 
@@ -67,15 +70,22 @@ class FlightProcess:
         self._process = process
 
     def tick(self, state: FloatArray, target: FloatArray, thrust_n: float) -> FloatArray:
-        """Return pitch, roll, status and refused for [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy]."""
-        x, y, vx, vy, roll, pitch, yaw = state
+        """Return pitch, roll, status, refused, and with a height thrust and whether it is the controller's.
+
+        state:  [x, y, vx, vy, roll, pitch, yaw], with a height [height, climb, 0] behind them.
+        target: [x, y, vx, vy], with a height [height, climb] behind them.
+        """
+        x, y, vx, vy, roll, pitch, yaw, *vertical = state
+        down, falling = (-vertical[0], -vertical[1]) if vertical else (0.0, 0.0)
         ahead, right = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
-        sensors = [x, y, 0.0, yaw, pitch, roll, ahead, right, 0.0, 0.0, 0.0, 0.0, *target[:4], -thrust_n]
+        reference = [*target[:4], *(-target[4:] if vertical else ())]
+        estimate = [x, y, down, yaw, pitch, roll, ahead, right, falling, 0.0, 0.0, 0.0]
+        sensors = [*estimate, *reference, -thrust_n]
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(np.array(sensors, "<f4").tobytes())
         self._process.stdin.flush()
-        return np.frombuffer(self._process.stdout.read(16), "<f4")
+        return np.frombuffer(self._process.stdout.read(24), "<f4")
 
 
 class Processes:
@@ -118,12 +128,13 @@ def build(settings: Settings, folder: Path, right: str = "", wrong: str = "") ->
     files = render_target(settings, TARGETS["mambo"], with_digest=False)
     assert not right or files[BLOCK].count(right) == 1, f"the template moved on: {right}"
     place(files | {BLOCK: files[BLOCK].replace(right, wrong) if right else files[BLOCK]}, folder)
+    references = "-DREFERENCE_NUMBERS=6" if settings.height else "-DREFERENCE_NUMBERS=4"
     shell(
-        *(compiler, *VENDOR_FLAGS, f"-I{STUBS}", f"-I{folder}/src"),
+        *(compiler, *VENDOR_FLAGS, references, f"-I{STUBS}", f"-I{folder}/src"),
         *("-c", STUBS / "stock.c", "-o", folder / "stock.o"),
     )
     shell("make", "-s", "rsedu", f"VENDOR={STUBS}", "STOCK=stock.o", folder=folder)
-    shell(compiler, f"-I{STUBS}", STUBS / "flight_process.c", "-ldl", "-o", folder / "process")
+    shell(compiler, references, f"-I{STUBS}", STUBS / "flight_process.c", "-ldl", "-o", folder / "process")
     return folder
 
 
@@ -168,7 +179,32 @@ def test_lost_states_are_counted_and_end_level(speed_limit_m_s: float, tmp_path:
         outage = [process.tick(np.full(7, np.nan), target, 0.6) for _ in range(400)]
     assert outage[0][0] != 0.0
     assert (outage[104][0] != 0.0) == bool(speed_limit_m_s), "it brakes, after 52 updates"
-    assert list(outage[-1]) == [0.0, 0.0, 2.0, 200.0]
+    assert list(outage[-1])[:4] == [0.0, 0.0, 2.0, 200.0]
+
+
+def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
+    """After a second, above half a metre, as nmpc_reset does it; before, the stock loop's goes through."""
+    settings, mass_kg = height_settings(), NOMINAL.body.mass_kg
+    alone, draw = CompiledController(settings), np.random.default_rng(4)
+    present, begun = np.zeros(2), False
+    with flight_process(build(settings, tmp_path)) as process:
+        for update in range(160):
+            state, target = draw.normal(0.0, 0.1, (2, 10))
+            state[7], state[9], target[4] = (0.44 if update < 120 else 0.55) + 0.01 * state[7], 0.0, 1.0
+            stock_n = mass_kg * (9.81 + state[0]) if update else 0.0
+            if update == 0:
+                alone.reset([[*state[4:6], 0.0]])
+            if not begun:
+                begun = update == 120
+                told = stock_n / mass_kg
+                alone.reset([[*present, told]]) if begun else alone.set_thrust([told])
+            expected = alone.step(state[np.newaxis], target[np.newaxis, :6])
+            present = expected.command_rad[0].astype(np.float64)
+            for tick in range(2):
+                found = process.tick(state, target[:6], stock_n + 0.01 * tick)
+                np.testing.assert_allclose(found[1::-1], present, atol=1e-5)
+                thrust_n = mass_kg * expected.thrust_m_s2[0] if begun else stock_n + 0.01 * tick
+                np.testing.assert_allclose(found[4:], [-thrust_n, begun], atol=1e-5)
 
 
 @pytest.mark.first_is_quick

@@ -10,7 +10,9 @@ from mambo_codegen import boards
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import place
+from tests.support.heights import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
 
@@ -85,10 +87,11 @@ def test_the_component_is_compiled_by_its_cmakelists(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-def test_the_example_of_a_page_compiles(scalar: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("has_height", [False, True])
+def test_the_example_of_a_page_compiles(scalar: str, has_height: bool, tmp_path: Path) -> None:
     """What a README shows is C that a compiler takes."""
-    settings = presets.preset("mambo")
-    settings = settings.model_copy(update={"code": settings.code.model_copy(update={"scalar": scalar})})
+    level = with_option(presets.preset("mambo"), "code.scalar", scalar)
+    settings = height_settings(scalar) if has_height else level
     for name in ("platformio", "espidf"):
         files = render_target(settings, TARGETS[name], with_digest=False)
         example = files["README.md"].partition("```c\n")[2].partition("```")[0]

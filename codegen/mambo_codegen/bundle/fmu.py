@@ -1,14 +1,18 @@
 """The variables of a controller as a functional mock-up unit: names, units, ranges and start values."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.limits_constants import LIMITS
-from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
+
+HEADING_RATE_RAD_S: Final = 4.0
+"""Start value of the rate at which the set-point of the heading turns."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +34,18 @@ class FmuVariable:
 
 
 def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
-    """Return the variables in the order of the C: 12 inputs, 2 outputs, then those of some settings.
+    """Return the variables in the order of the C: 12 inputs, 2 outputs, of some settings, of the heading.
 
     A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place
-    are 6 parameters.
+    are 6 parameters. A height has 5 inputs and an output in place of the thrust, an input for a given
+    acceleration, and 4 limits. The heading has an input, a parameter and an output.
     """
     ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
 
     def symmetric(name: str, unit: str, most: float, description: str) -> FmuVariable:
         return FmuVariable(name, "input", unit, -most, most, 0.0, description)
 
+    has_height = settings.height is not None
     variables = [
         symmetric("x", "m", ranges.position_m, "measured position north"),
         symmetric("y", "m", ranges.position_m, "measured position east"),
@@ -48,21 +54,15 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
         symmetric("roll", "rad", ATTITUDE_LIMIT_RAD, "measured roll, right side down"),
         symmetric("pitch", "rad", ATTITUDE_LIMIT_RAD, "measured pitch, nose up"),
         symmetric("yaw", "rad", YAW_LIMIT_RAD, "measured yaw, clockwise from above"),
+        *(_measured_height(symmetric, settings) if has_height else ()),
         symmetric("target_x", "m", ranges.position_m, "position of the target north"),
         symmetric("target_y", "m", ranges.position_m, "position of the target east"),
         symmetric("target_vx", "m/s", ranges.velocity_m_s, "velocity of the target north"),
         symmetric("target_vy", "m/s", ranges.velocity_m_s, "velocity of the target east"),
-        FmuVariable(
-            "thrust_acceleration",
-            "input",
-            "m/s2",
-            ranges.thrust_acceleration_min_m_s2,
-            ranges.thrust_acceleration_max_m_s2,
-            hover_thrust(settings),
-            "thrust over mass",
-        ),
+        *(_height_of_target(symmetric, settings) if has_height else (_thrust(settings),)),
         FmuVariable("roll_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "roll command"),
         FmuVariable("pitch_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "pitch command"),
+        *_thrust_command(settings),
     ]
     if settings.target.acceleration == "given":
         most_m_s2 = ranges.thrust_acceleration_max_m_s2
@@ -70,6 +70,8 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
             symmetric("target_ax", "m/s2", most_m_s2, "acceleration of the target north"),
             symmetric("target_ay", "m/s2", most_m_s2, "acceleration of the target east"),
         ]
+        if has_height:
+            variables.append(symmetric("target_az", "m/s2", most_m_s2, "acceleration of the target upwards"))
     if limits := method_of(settings).weight_limits:
         tracking, effort = settings.cost.tracking_weight, settings.cost.effort_weight
         most_tracking, most_effort = limits
@@ -98,4 +100,80 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
             FmuVariable(f"fence_{name}", "parameter", "m", -reach_m, reach_m, wall_m, f"{words} in the fence")
             for (name, words), wall_m in zip(ends, walls, strict=True)
         ]
+        variables += _height_limits(settings, limiting.limits[len(LIMITS) :].tolist())
+    rate = (0.0, 100.0, HEADING_RATE_RAD_S, "largest rate of the heading's set-point")
+    variables += [
+        symmetric("target_yaw", "rad", YAW_LIMIT_RAD, "heading of the target"),
+        FmuVariable("heading_rate", "parameter", "rad/s", *rate),
+        FmuVariable(
+            *("yaw_command", "output", "rad", -YAW_LIMIT_RAD, YAW_LIMIT_RAD, 0.0),
+            "set-point of the heading, on the shortest way from the measured one",
+        ),
+    ]
     return tuple(variables)
+
+
+_Symmetric = Callable[[str, str, float, str], FmuVariable]
+
+
+def _thrust(settings: Settings) -> FmuVariable:
+    """Return the input of a controller without a height."""
+    ranges = settings.ranges
+    return FmuVariable(
+        "thrust_acceleration",
+        "input",
+        "m/s2",
+        ranges.thrust_acceleration_min_m_s2,
+        ranges.thrust_acceleration_max_m_s2,
+        hover_thrust(settings),
+        "thrust over mass",
+    )
+
+
+def _measured_height(symmetric: _Symmetric, settings: Settings) -> list[FmuVariable]:
+    """Return the inputs of a state with a height."""
+    ranges = settings.ranges
+    contact = (0.0, 1.0, 0.0, "1 while the drone touches the floor, else 0")
+    return [
+        symmetric("height", "m", ranges.position_m, "measured height, upwards"),
+        symmetric("climb", "m/s", ranges.velocity_m_s, "measured velocity upwards"),
+        FmuVariable("grounded", "input", "1", *contact),
+    ]
+
+
+def _height_of_target(symmetric: _Symmetric, settings: Settings) -> list[FmuVariable]:
+    """Return the inputs of a target with a height."""
+    ranges = settings.ranges
+    return [
+        symmetric("target_height", "m", ranges.position_m, "height of the target"),
+        symmetric("target_climb", "m/s", ranges.velocity_m_s, "velocity of the target upwards"),
+    ]
+
+
+def _thrust_command(settings: Settings) -> list[FmuVariable]:
+    """Return the output of a controller with a height; none without."""
+    height = settings.height
+    if height is None:
+        return []
+    range_m_s2 = (height.thrust_min_m_s2, height.thrust_max_m_s2)
+    return [FmuVariable("thrust_command", "output", "m/s2", *range_m_s2, GRAVITY_M_S2, "thrust over mass")]
+
+
+def _height_limits(settings: Settings, values: list[float]) -> list[FmuVariable]:
+    """Return the limits of floor, ceiling, climb and descent; none without a height."""
+    if not values:
+        return []
+    reach_m, most_m_s = settings.ranges.position_m, settings.ranges.velocity_m_s
+    floor_m, ceiling_m, climb_m_s, descent_m_s = values
+    return [
+        FmuVariable("floor", "parameter", "m", -reach_m, reach_m, floor_m, "least height in the fence"),
+        FmuVariable("ceiling", "parameter", "m", -reach_m, reach_m, ceiling_m, "largest height in the fence"),
+        FmuVariable(
+            *("climb_limit", "parameter", "m/s", SMALLEST_LIMIT, most_m_s, climb_m_s),
+            "speed limit upwards, refused where the thrust cannot brake it in time",
+        ),
+        FmuVariable(
+            *("descent_limit", "parameter", "m/s", SMALLEST_LIMIT, most_m_s, descent_m_s),
+            "speed limit downwards, refused where the thrust cannot brake it in time",
+        ),
+    ]

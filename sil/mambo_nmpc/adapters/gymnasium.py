@@ -13,6 +13,7 @@ from mambo_sil.api.simulated import LOST_M, SimulatedDrone
 from mambo_sil.api.states import TargetState
 from mambo_sil.arguments import require, require_choice, require_number
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.names import CurveName
 
 gymnasium: Any = packages.load("gymnasium", "pip install gymnasium")
@@ -27,7 +28,9 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
     """A drone that is to follow a curve, in steps of the controller's update period.
 
     action:      (2,) in -1..1: "attitude" commands roll and pitch, as shares of the tilt limit; "target" sets
-                 x and y of a position at rest, as shares of `reach_m`, to which the generated C flies.
+                 x and y of a position at rest, as shares of `reach_m`, to which the generated C flies. The
+                 height is that of the curve: held by the C with "target" and `[height]` in the settings, else
+                 by an altitude loop.
     observation: (15,) position, velocity, roll, pitch, yaw, then position and velocity of the curve less
                  those of the drone, in NWU: x ahead, y left, z up.
     reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode.
@@ -72,12 +75,19 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         """Hold a command, or fly to a target, for one update period."""
         scaled, said = self._scale * np.clip(np.asarray(action, np.float64), -1.0, 1.0), {}
         command_rad = command_in_frame("NWU", scaled)
+        height_m, climb_m_s, acceleration_m_s2 = (float(part[2]) for part in self._now)
+        lift: Vertical | float = Vertical(-height_m, climb_m_s, acceleration_m_s2)
         if self._action == "target":
-            target = TargetState(vectors_to_ned("NWU", scaled), [0.0, 0.0])
-            outcome = self._controller.step(self._drone.state, target, self._drone.thrust_m_s2)
+            target = TargetState.in_frame("NWU", [*scaled, height_m], [0.0, 0.0, climb_m_s])
+            if has_height := self._controller.settings.height is not None:
+                self._controller.set_thrust(self._drone.tell_thrust())
+            known_m_s2 = None if has_height else self._drone.thrust_m_s2
+            outcome = self._controller.step(self._drone.state, target, known_m_s2)
             command_rad = outcome.command_rad
+            if outcome.thrust_m_s2 is not None:
+                lift = float(outcome.thrust_m_s2)
             said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
-        self._drone.advance(command_rad, *(part[2] for part in self._now))
+        self._drone.advance(command_rad, lift)
         self._steps += 1
         observation, info = self._observe({name: int(x) for name, x in said.items() if x is not None})
         crashed = self._drone.crashed

@@ -9,26 +9,37 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import STATE, THRUST
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
+from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
+from mambo_sil.api.heading import Heading
 from mambo_sil.api.height_hold import HeightHold
 from mambo_sil.api.options import ControllerOptions, with_options
 from mambo_sil.api.outcome import StepOutcome
 from mambo_sil.api.states import DroneState, TargetState
-from mambo_sil.arguments import as_numbers, is_whole, of_shape, require, require_kind, require_path
+from mambo_sil.arguments import (
+    as_numbers,
+    is_whole,
+    of_shape,
+    require,
+    require_choice,
+    require_kind,
+    require_path,
+)
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
+from mambo_sil.flight.names import ALTITUDE_NAMES
 from mambo_sil.model.derive.derived_settings import controller_text
 
 LARGEST_N: Final = 1_000_000
 
-_RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active")
+_RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active", "thrust_m_s2")
 """The results of a step in C that a program gets."""
 
 
@@ -51,6 +62,7 @@ class Controller:
         self._inputs = self._empty_inputs()
         self._step = self._compiled.stepper(self._inputs, self._outcome)
         self._height = height
+        self._heading = Heading(self._compiled)
 
     @classmethod
     def from_vehicle(cls, vehicle: str | Path, n: int = 1, **options: Unpack[ControllerOptions]) -> Self:
@@ -69,6 +81,7 @@ class Controller:
         """Return controllers with the settings of a preset; raises SourceNotFoundError.
 
         vehicle: the drone of the altitude loop that `height` names; without `height` it has no use.
+        height:  only where the settings have no `[height]`.
         """
         require_kind("name", name, str, f"one of {', '.join(presets.names())}")
         return cls._made(
@@ -86,7 +99,7 @@ class Controller:
     ) -> Self:
         """Return controllers with the settings of a controller.toml.
 
-        vehicle: as for `from_preset`.
+        vehicle, height: as for `from_preset`.
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
         require_path("path", path, "a controller.toml")
@@ -97,7 +110,12 @@ class Controller:
     def _made(cls, settings: Settings, n: int, drone: VehicleFile | None, options: ControllerOptions) -> Self:
         """Return controllers with options; raises ArgumentError."""
         changed = with_options(settings, options)
-        controller, name = cls(changed, n), options.get("height")
+        name = options.get("height")
+        if name is not None:
+            require_choice("height", name, ALTITUDE_NAMES)
+            rule = "be left out: the settings have [height], so the controller itself commands the thrust"
+            require(changed.height is None, "height", name, rule)
+        controller = cls(changed, n)
         if name is not None:
             if drone is None:
                 raise ArgumentError(
@@ -118,68 +136,94 @@ class Controller:
 
         state, target: in batches of the same shape, of n drones together.
         thrust_acceleration_m_s2: thrust over mass, of the shape of the batch or one value for all; without it
-                                  9.81. With `height` the controller knows it.
+                                  9.81. With `[height]` in the settings, or `height`, it is commanded.
 
         Raises ArgumentError for records of another number of drones, for other shapes, for targets without
         acceleration where the settings have `target.acceleration = "given"`, and for states or targets
-        without z where an altitude loop holds the height.
+        without z where the thrust is commanded.
         """
         batch = self._batch(state, target)
-        thrust_m_s2 = yaw_rad = None
-        if self._height is None:
+        flies_height = self._method.has_height or self._height is not None
+        if flies_height:
+            left_out, rule = thrust_acceleration_m_s2 is None, "be left out: the step commands it"
+            require(left_out, "thrust_acceleration_m_s2", thrust_acceleration_m_s2, rule)
+            _require_z(state, target)
+        aims = self._aims(target)
+        found: dict[str, Any] = {}
+        if self._height is not None:
+            thrusts = self._height.step(state, target)
+            found["thrust_m_s2"] = thrusts.reshape(batch)
+        else:
             given = GRAVITY_M_S2 if thrust_acceleration_m_s2 is None else thrust_acceleration_m_s2
             thrusts = of_shape("thrust_acceleration_m_s2", given, (), batch).reshape(-1)
-        else:
-            left_out = thrust_acceleration_m_s2 is None
-            rule = "be left out: an altitude loop commands it"
-            require(left_out, "thrust_acceleration_m_s2", thrust_acceleration_m_s2, rule)
-            thrusts, yaws = self._height.step(state, target)
-            thrust_m_s2, yaw_rad = thrusts.reshape(batch), yaws.reshape(batch)
-        aims = self._aims(target)
-        states, targets, thrust_numbers = self._inputs
+        states, targets, *thrust_numbers = self._inputs
         with np.errstate(over="ignore"):  # infinity, which the C refuses
-            places = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
-            self._write(states, STATE, places)
-            self._write(targets, self._method.target, _columns(*aims))
-            thrust_numbers[:] = self._method.numbers.quantize(thrusts[:, np.newaxis], THRUST)[:, 0]
+            self._write(states, self._method.state, self._places(state))
+            self._write(targets, self._method.target, aims)
+            for numbers in thrust_numbers:
+                numbers[:] = self._method.numbers.quantize(thrusts[:, np.newaxis], THRUST)[:, 0]
         self._step()
-        return StepOutcome(
-            **{name: self._in_si(name, batch) for name in _RETURNED if name in self._outcome},
-            thrust_m_s2=thrust_m_s2,
-            yaw_rad=yaw_rad,
-        )
+        found |= {name: self._in_si(name, batch) for name in _RETURNED if name in self._outcome}
+        if flies_height:
+            wanted_rad = None if target.yaw_rad is None else target.yaw_rad.reshape(-1)
+            yaws = self._heading.turn(state.attitude_rad[..., 2].reshape(-1), wanted_rad)
+            found["yaw_rad"] = yaws.reshape(batch)
+        return StepOutcome(**found)
 
-    def reset(self, command_rad: ArrayLike = (0.0, 0.0), which: ArrayLike | None = None) -> NDArray[np.int64]:
+    def reset(
+        self,
+        command_rad: ArrayLike = (0.0, 0.0),
+        which: ArrayLike | None = None,
+        *,
+        thrust_m_s2: ArrayLike | None = None,
+    ) -> NDArray[np.int64]:
         """Forget the past; the drones hold the attitudes of `command_rad`, one pair for all or (..., 2).
 
         Call it before the first step after a pause. `which` chooses drones by truth values, of the shape of a
-        batch. Returns a status (n,), 0 unless a command is refused.
+        batch. `thrust_m_s2`, one value for all or (...), is the thrust over mass that the drones have, with
+        `[height]` only; without it that of hover. Returns a status (n,), 0 unless a command is refused.
         """
-        commands, chosen = self._commands(command_rad), self._chosen(which)
+        if thrust_m_s2 is None and self._method.has_height:
+            thrust_m_s2 = hover_thrust(self.settings)
+        commands, chosen = self._commands(command_rad, thrust_m_s2), self._chosen(which)
         saved = self._compiled.instances.copy()
         status = self._compiled.reset(commands)
         self._compiled.instances[~chosen] = saved[~chosen]
         if self._height is not None:
             self._height.reset(chosen)
+        self._heading.reset(chosen)
         return np.where(chosen, status, 0)
 
-    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+    def set_command(self, command_rad: ArrayLike, thrust_m_s2: ArrayLike | None = None) -> NDArray[np.int64]:
         """Tell that `command_rad`, one pair for all or (..., 2), was sent in place of the last commands.
 
-        Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function.
+        With `[height]` in the settings `thrust_m_s2`, one value for all or (...), was sent beside it.
+        Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function, and for a
+        thrust that is missing or has no use.
         """
         if self._method.setter != "set_command":
             norm = self.settings.cost.norm
             raise ArgumentError(
                 f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
             )
-        return self._compiled.set_command(self._commands(command_rad))
+        return self._compiled.set_command(self._commands(command_rad, thrust_m_s2))
+
+    def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
+        """Tell that the drones got another thrust over mass than the last step commanded, as a mixer caps it.
+
+        One value for all or (...); NaN for a drone that got its command. Returns a status (n,), not 0 with
+        NaN or out of range. Raises ArgumentError without `[height]` in the settings.
+        """
+        if not self._method.has_height:
+            raise ArgumentError("set_thrust needs settings with [height]")
+        return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
 
     def __getstate__(self) -> dict[str, Any]:
         return {
             "settings": self.settings,
             "n": self.n,
             "height": self._height,
+            "yaw_rad": self._heading.yaw_rad,
             "generator": generator_digest(),
             "instances": self._compiled.instances.tobytes(),
         }
@@ -190,6 +234,7 @@ class Controller:
         if (state["generator"], len(state["instances"])) != (generator_digest(), instances.nbytes):
             raise ArgumentError("state: was saved by another version, whose C may keep other numbers")
         instances[:] = np.frombuffer(state["instances"], np.uint8).reshape(instances.shape)
+        self._heading.yaw_rad = state["yaw_rad"]
 
     def _batch(self, state: DroneState, target: TargetState) -> tuple[int, ...]:
         """Return the shape of the batch; raises ArgumentError for records that do not fit."""
@@ -203,25 +248,35 @@ class Controller:
             raise ArgumentError(f"target: has a batch of shape {target.batch}; that of the state is {batch}")
         return batch
 
-    def _aims(self, target: TargetState) -> list[NDArray[np.float64]]:
-        """Return what the controller knows of its target; raises ArgumentError if it is not told enough."""
+    def _places(self, state: DroneState) -> list[FloatArray]:
+        """Return the columns of states, those of the height upwards."""
+        columns = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
+        if self._method.has_height:
+            contact = state.grounded.reshape(-1).astype(np.float64)
+            columns += [*_heights(state.position_m, state.velocity_m_s), contact]
+        return columns
+
+    def _aims(self, target: TargetState) -> list[FloatArray]:
+        """Return the columns of targets; raises ArgumentError if the controller is not told enough."""
         aims = [target.position_m, target.velocity_m_s]
         if self.settings.target.acceleration == "given":
-            if target.acceleration_m_s2 is None:
+            acceleration = target.acceleration_m_s2
+            if acceleration is None:
                 raise ArgumentError(
                     'target: acceleration_m_s2 is missing; the settings have target.acceleration = "given"'
                 )
-            aims.append(target.acceleration_m_s2)
-        return aims
+            if self._method.has_height and acceleration.shape[-1] != 3:
+                raise ArgumentError("target: acceleration_m_s2 has no z; [height] wants x, y, z (..., 3)")
+            aims.append(acceleration)
+        return _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
 
     def _empty_inputs(self) -> list[NDArray[Any]]:
-        """Return the arrays that the C reads: states (n, 7), targets (n, 4) or (n, 6), thrusts (n,)."""
-        shapes = (self.n, len(STATE)), (self.n, len(self._method.target)), (self.n,)
-        return [np.empty(shape, self._method.numbers.scalar) for shape in shapes]
+        """Return the arrays that the C reads: states and targets (n, k), thrusts (n,) without `[height]`."""
+        shapes = (self.n, len(self._method.state)), (self.n, len(self._method.target)), (self.n,)
+        used = shapes[:2] if self._method.has_height else shapes
+        return [np.empty(shape, self._method.numbers.scalar) for shape in used]
 
-    def _write(
-        self, numbers: NDArray[Any], quantities: Sequence[str], columns: list[NDArray[np.float64]]
-    ) -> None:
+    def _write(self, numbers: NDArray[Any], quantities: Sequence[str], columns: list[FloatArray]) -> None:
         """Write columns (n,) in SI units into numbers (n, k) of the C."""
         if self._method.numbers.bits is not None:
             numbers[:] = self._method.numbers.quantize(np.stack(columns, axis=-1), quantities)
@@ -236,14 +291,28 @@ class Controller:
         owned = values.astype(values.dtype if result.quantities else result.count_type)
         return owned.reshape((*batch, *result.shape))
 
-    def _commands(self, command_rad: ArrayLike) -> NDArray[np.float64]:
-        """Return commands (n, 2) of one pair, or of a batch; raises ArgumentError."""
+    def _commands(self, command_rad: ArrayLike, thrust_m_s2: ArrayLike | None) -> FloatArray:
+        """Return commands (n, 2), with `[height]` (n, 3), of one or of a batch; raises ArgumentError."""
         array = as_numbers("command_rad", command_rad)
         if array.shape == (2,):
-            return np.broadcast_to(array, (self.n, 2))
-        if array.shape[-1:] != (2,) or array.size != 2 * self.n:
+            array = np.broadcast_to(array, (self.n, 2))
+        elif array.shape[-1:] != (2,) or array.size != 2 * self.n:
             raise ArgumentError(f"command_rad: has shape {array.shape}; it must be (2,) or {(self.n, 2)}")
-        return array.reshape(self.n, 2)
+        angles = array.reshape(self.n, 2)
+        if not self._method.has_height:
+            left_out, rule = thrust_m_s2 is None, "be left out: the settings have no [height]"
+            require(left_out, "thrust_m_s2", thrust_m_s2, rule)
+            return angles
+        if thrust_m_s2 is None:
+            raise ArgumentError("thrust_m_s2 is missing; the settings have [height]")
+        return np.column_stack([angles, self._thrusts(thrust_m_s2)])
+
+    def _thrusts(self, thrust_m_s2: ArrayLike) -> FloatArray:
+        """Return thrusts (n,) of one value, or of a batch; raises ArgumentError."""
+        array = as_numbers("thrust_m_s2", thrust_m_s2)
+        if array.ndim and array.size != self.n:
+            raise ArgumentError(f"thrust_m_s2: has shape {array.shape}; it must be () or {(self.n,)}")
+        return np.broadcast_to(array.reshape(-1), self.n)
 
     def _chosen(self, which: ArrayLike | None) -> NDArray[np.bool_]:
         """Return which drones (n,) are meant; raises ArgumentError."""
@@ -255,10 +324,23 @@ class Controller:
         return array.reshape(self.n)
 
 
-def _columns(*batches: NDArray[np.float64], count: int = 2) -> list[NDArray[np.float64]]:
+def _columns(*batches: FloatArray, count: int = 2) -> list[FloatArray]:
     """Return the first columns (n,) of each of several batches of vectors."""
     flat = [values.reshape(-1, values.shape[-1]) for values in batches]
     return [values[:, column] for values in flat for column in range(count)]
+
+
+def _heights(*batches: FloatArray) -> list[FloatArray]:
+    """Return minus z (n,) of each of several batches of vectors: up is positive in the C."""
+    return [-values[..., 2].reshape(-1) for values in batches]
+
+
+def _require_z(state: DroneState, target: TargetState) -> None:
+    """Raise ArgumentError unless positions and velocities have z."""
+    for record, kind in ((state, "state"), (target, "target")):
+        for name in ("position_m", "velocity_m_s"):
+            if getattr(record, name).shape[-1] != 3:
+                raise ArgumentError(f"{kind}: {name} has no z; the height wants x, y, z (..., 3)")
 
 
 def _read_vehicle(vehicle: str | Path) -> VehicleFile:

@@ -27,7 +27,8 @@ class ControllerOptions(TypedDict, total=False):
     fence_m: tuple[float, float, float, float]
     """Least and largest x, least and largest y (`[limits.fence]`), north and east."""
     height: AltitudeName
-    """The altitude loop that commands the thrust: "stock", "feedforward" or "pid"."""
+    """The altitude loop that commands the thrust where the settings have no `[height]`: "stock",
+    "feedforward" or "pid"."""
 
 
 KEYS: Final = {

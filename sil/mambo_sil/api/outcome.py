@@ -23,7 +23,7 @@ class StepOutcome:
     cost:        (...) of the plan; None with a quadratic cost, as the next.
     plan_rad:    (..., control, 2) the moves.
     active:      (...) the limits that act (`mambo_codegen.methods.limits_constants.ActiveLimit`), if any.
-    thrust_m_s2: (...) thrust over mass; None without `height`, as the next.
+    thrust_m_s2: (...) thrust over mass; None without `[height]` in the settings and `height`, as the next.
     yaw_rad:     (...) heading.
     """
 
@@ -33,7 +33,7 @@ class StepOutcome:
     cost: NDArray[Any] | None = None
     plan_rad: NDArray[Any] | None = None
     active: NDArray[np.int64] | None = None
-    thrust_m_s2: FloatArray | None = None
+    thrust_m_s2: NDArray[Any] | None = None
     yaw_rad: FloatArray | None = None
 
     def attitude_thrust(
@@ -42,13 +42,15 @@ class StepOutcome:
         """Return roll, pitch, yaw and thrust (..., 4), angles in a frame by name.
 
         The thrust is over the mass, in m/s^2; with `mass_kg` in N; with `most_thrust_m_s2`, the largest
-        thrust over the mass, a share of it, at most 1. Raises ArgumentError without `height`.
+        thrust over the mass, a share of it, at most 1. Raises ArgumentError without a thrust.
         """
         if self.thrust_m_s2 is None or self.yaw_rad is None:
-            raise ArgumentError('attitude_thrust needs a controller made with height, such as height = "pid"')
+            raise ArgumentError(
+                'attitude_thrust needs settings with [height], or a controller made with height = "pid", say'
+            )
         if mass_kg is not None and most_thrust_m_s2 is not None:
             raise ArgumentError(f"mass_kg = {mass_kg!r} must be left out with most_thrust_m_s2, or that")
-        thrust = self.thrust_m_s2
+        thrust = np.asarray(self.thrust_m_s2, np.float64)
         if mass_kg is not None:
             require_number("mass_kg", mass_kg, 0.001, 1000.0)
             thrust = thrust * mass_kg

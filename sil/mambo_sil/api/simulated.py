@@ -11,13 +11,14 @@ from mambo_sil.drone.plant.vehicle import Vehicle, truth
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.crashes import least_level
+from mambo_sil.flight.thrust_delivery import ThrustDelivery
 
 LOST_M = 100.0
 """A drone this far from the origin along any axis is lost."""
 
 
 class SimulatedDrone:
-    """The plant of the command `fly` without sensors, whose altitude loop has feed-forward."""
+    """The plant of the command `fly` without sensors; its altitude loop, if it is asked, has feed-forward."""
 
     def __init__(self, drone: VehicleFile, update_period_s: float) -> None:
         self.drone, self._vehicle = drone, Vehicle.of(drone)
@@ -29,20 +30,31 @@ class SimulatedDrone:
         hover_command = airframe_of(self.drone).hover_command
         self._state = self._vehicle.at_rest(position_m[:, np.newaxis], 0.0, hover_command)
         self._altitude = AltitudeLoop(AltitudeLaw("feedforward"), self.drone, 1)
+        self._delivery = ThrustDelivery(self.drone, 1)
         self._thrust_n = np.array([self.drone.weight_n])
 
-    def advance(
-        self, command_rad: FloatArray, height_m: float, climb_m_s: float, acceleration_m_s2: float
-    ) -> None:
-        """Hold roll and pitch (2,) for one update period, with heading 0; the altitude loop does the rest."""
-        wanted = Vertical(-height_m, climb_m_s, acceleration_m_s2)
+    def advance(self, command_rad: FloatArray, lift: Vertical | float) -> None:
+        """Hold roll and pitch (2,) for one update period, with heading 0.
+
+        lift: what the altitude loop is to follow, or a thrust over mass in its place.
+        """
+        most_n = self.drone.altitude.thrust_max_n
         with np.errstate(all="ignore"):
             for _ in range(self._ticks):
                 seen = truth(self._state)
-                self._thrust_n = self._altitude.thrust_n(wanted, seen)
-                self._state = self._vehicle.step(
+                if isinstance(lift, Vertical):
+                    wanted_n = self._thrust_n = self._altitude.thrust_n(lift, seen)
+                else:
+                    wanted_n = np.array([self.drone.body.mass_kg * lift])
+                    self._thrust_n = np.clip(wanted_n, -most_n, most_n)
+                self._state, given_n = self._vehicle.advance(
                     self._state, command_rad[:, np.newaxis], self._thrust_n, 0.0, seen=seen
                 )
+                self._delivery.note(wanted_n, given_n)
+
+    def tell_thrust(self) -> float:
+        """Return the thrust over mass of the last periods if the mixer capped it, else NaN."""
+        return float(self._delivery.tell()[0])
 
     @property
     def state(self) -> DroneState:
@@ -52,7 +64,7 @@ class SimulatedDrone:
 
     @property
     def thrust_m_s2(self) -> float:
-        """The thrust over the mass that the altitude loop last demanded."""
+        """The thrust over the mass that was last demanded."""
         return float(self._thrust_n[0]) / self.drone.body.mass_kg
 
     @property

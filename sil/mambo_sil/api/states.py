@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mambo_sil.api.frames import FrameName, attitude_to_ned, vectors_to_ned, yaw_to_ned
-from mambo_sil.arguments import as_numbers
+from mambo_sil.arguments import as_numbers, require
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError
 
@@ -25,8 +25,16 @@ class DroneState:
     """Along the same axes (..., 2) or (..., 3)."""
     attitude_rad: FloatArray
     """Roll (right side down), pitch (nose up), yaw (clockwise from above) (..., 3)."""
+    grounded: NDArray[np.bool_]
+    """Whether the drone touches the floor (...); read with `[height]` in the settings only."""
 
-    def __init__(self, position_m: ArrayLike, velocity_m_s: ArrayLike, attitude_rad: ArrayLike) -> None:
+    def __init__(
+        self,
+        position_m: ArrayLike,
+        velocity_m_s: ArrayLike,
+        attitude_rad: ArrayLike,
+        grounded: ArrayLike = False,
+    ) -> None:
         position = _vectors("position_m", position_m)
         batch = position.shape[:-1]
         object.__setattr__(self, "position_m", position)
@@ -34,16 +42,26 @@ class DroneState:
         attitude = as_numbers("attitude_rad", attitude_rad)
         _require_shape("attitude_rad", attitude, (*batch, 3))
         object.__setattr__(self, "attitude_rad", attitude)
+        contact = np.asarray(grounded)
+        good = contact.dtype == np.bool_ and contact.shape in ((), batch)
+        require(good, "grounded", grounded, f"be a truth value, or such of shape {batch}")
+        object.__setattr__(self, "grounded", np.broadcast_to(contact, batch))
 
     @classmethod
     def in_frame(
-        cls, frame: FrameName, position_m: ArrayLike, velocity_m_s: ArrayLike, attitude_rad: ArrayLike
+        cls,
+        frame: FrameName,
+        position_m: ArrayLike,
+        velocity_m_s: ArrayLike,
+        attitude_rad: ArrayLike,
+        grounded: ArrayLike = False,
     ) -> Self:
         """Return the states of drones in another frame; the arrays have the shapes of a DroneState."""
         return cls(
             vectors_to_ned(frame, position_m, "position_m"),
             vectors_to_ned(frame, velocity_m_s, "velocity_m_s"),
             attitude_to_ned(frame, attitude_rad),
+            grounded,
         )
 
     def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -72,8 +90,8 @@ class TargetState:
     velocity_m_s: FloatArray
     """Along the same axes (..., 2) or (..., 3)."""
     acceleration_m_s2: FloatArray | None
-    """Along the same axes (..., 2) or (..., 3). x and y are read, and then needed, with
-    `target.acceleration = "given"` only, z by the altitude loop, if there."""
+    """Along the same axes (..., 2) or (..., 3). Read, and then needed, with `target.acceleration = "given"`
+    only, z of it with `[height]`; z is read by the altitude loop too, if there."""
     yaw_rad: FloatArray | None
     """Heading (...), or None to keep that of the first step."""
 

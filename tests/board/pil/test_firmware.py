@@ -3,9 +3,12 @@
 import json
 import os
 import subprocess
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mambo_codegen import boards
@@ -16,7 +19,11 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.elf import load
 from mambo_sil.board.firmware.firmware_build import ENTRY, builder
 from mambo_sil.board.firmware.stack import bound_stack
+from mambo_sil.board.pil.board_controller import BoardController
+from mambo_sil.board.pil.connection import Connection
+from mambo_sil.board.pil.serial_port import open_port
 from tests.support.command import run
+from tests.support.heights import height_settings
 from tests.support.serial_line import Line, build_firmware, serial_line
 from tests.support.tools import require_module, without_compilers_of_boards
 
@@ -86,6 +93,53 @@ def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
     with serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line:
         summary = flown(line, "given.toml", "--duration-s", "0.2")
     demand_same_bits(summary, 21, "host process")
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("board", "scalar", "acceleration"),
+    [
+        ("host", "float32", "tracked"),
+        pytest.param("host", "float64", "given", marks=pytest.mark.long),
+        pytest.param("host", "fixed", "given", marks=pytest.mark.long),
+        pytest.param("crazyflie", "float32", "given", marks=pytest.mark.long),
+        pytest.param("mega", "fixed", "tracked", marks=pytest.mark.long),
+    ],
+)
+def test_a_height_flies_bit_for_bit(board: str, scalar: str, acceleration: str, tmp_path: Path) -> None:
+    """On a course in space, from the floor."""
+    settings = height_settings(scalar, acceleration)
+    (tmp_path / "height.toml").write_text(to_toml(settings), "utf-8")
+    course = ("--trajectory", "take-off-and-landing", "--size-m", "1", "--vehicle", "crazyflie")
+    with serial_line(build_firmware(settings, board, tmp_path / "pil")) as line:
+        summary = flown(line, "height.toml", *course, "--yaw-rad", "1", "--duration-s", "0.4")
+    names = {"host": "host process", "crazyflie": "STM32F405", "mega": "Arduino Mega 2560"}
+    demand_same_bits(summary, 41, names[board])
+
+
+@pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
+def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path: Path) -> None:
+    """It changes the next step, on the board as on the desk; without one the command stands."""
+    settings = height_settings(scalar, "given")
+    replies = []
+    for told in (False, True):
+        draw = np.random.default_rng(3)
+        with (
+            serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line,
+            closing(Connection("line", partial(open_port, line.port, 500000), settings, say=print)) as board,
+        ):
+            controller = BoardController(settings, board)
+            for step in range(20):
+                state, target = draw.normal(0.0, 0.3, (1, 10)), draw.normal(0.0, 0.3, (1, 9))
+                state[0, 9] = step % 2
+                if told and step == 10:
+                    controller.set_thrust([4.0])
+                controller.step(state, target)
+        assert (len(controller.replies), controller.different) == (20, [])
+        replies.append([reply.bits for reply in controller.replies])
+    silent, told_of = replies
+    assert silent[:10] == told_of[:10]
+    assert silent[10] != told_of[10]
 
 
 def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_endless_noise_is_not_kept() -> None:
 
 def test_a_payload_that_is_too_long_is_a_mistake() -> None:
     """The buffers on the board are not longer."""
-    with pytest.raises(ValueError, match="at most 128 bytes, not 129"):
+    with pytest.raises(ValueError, match="at most 192 bytes, not 193"):
         encode(bytes(LONGEST_PAYLOAD + 1))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -19,11 +20,13 @@ from mambo_sil.board.pil.pil_report import real_time_of, real_time_text, wall_cl
 from mambo_sil.board.pil.serial_messages import NAMED_STEPS, OUT_OF_STEP, REPLY, Kind, StepReply, TimedReply
 from mambo_sil.board.pil.timed import OLDEST_INPUTS, Arrival, TimedController
 from mambo_sil.drone.plant.link import NOT_CALLED, Link
+from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import BoardError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.trajectories import CURVES
+from tests.support.heights import height_settings
 from tests.support.lockstep import LockstepPort, TimedFaults, build_lockstep
 from tests.support.serial_line import edited
 
@@ -66,19 +69,36 @@ class Expected:
     def __post_init__(self) -> None:
         """Begin with a command of zero."""
         self._compiled, self._seen = CompiledController(self.settings), list[tuple[ArrayLike, ...]]()
-        self._held = BoardStep(np.zeros((1, 2)), np.array([NOT_CALLED]))
+        hover = None if self.settings.height is None else np.array([GRAVITY_M_S2])
+        self._held = BoardStep(np.zeros((1, 2)), np.array([NOT_CALLED]), hover)
+        self._told: ArrayLike = [np.nan]
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> BoardStep:
+    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+        """Keep it for the next step, with a height."""
+        self._told = thrust_m_s2
+
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> BoardStep:
         """Return what the drone is commanded from this update on."""
         before = len(self._seen) - 1
-        self._seen.append((state, target, thrust_acceleration_m_s2))
+        told, self._told = self._told, [np.nan]
+        self._seen.append(
+            (state, target, told if thrust_acceleration_m_s2 is None else thrust_acceleration_m_s2)
+        )
         if before < 0 or before in self.without_step:
             return self._held
-        step = self._compiled.step(*self._seen[self.used.get(before, before)])
+        measured, aim, thrust = self._seen[self.used.get(before, before)]
+        if self.settings.height is None:
+            step = self._compiled.step(measured, aim, thrust)
+        else:
+            self._compiled.set_thrust(thrust)
+            step = self._compiled.step(measured, aim)
         if before in self.lost:
             return self._held
-        self._held = BoardStep(step.command_rad, np.array([NOT_CALLED]))
-        return BoardStep(step.command_rad, step.status)
+        thrust_m_s2 = getattr(step, "thrust_m_s2", None)
+        self._held = BoardStep(step.command_rad, np.array([NOT_CALLED]), thrust_m_s2)
+        return BoardStep(step.command_rad, step.status, thrust_m_s2)
 
 
 def flown(
@@ -123,6 +143,19 @@ def test_every_scalar_type_and_norm_flies_by_the_boards_clock(
         controller = TimedController(settings, board)
         assert fly(flight, controller).same_bits(fly(flight, Expected(settings)))
     assert (len(controller.replies), controller.different) == (20, [])
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("scalar", ["float32", pytest.param("float64", marks=pytest.mark.long)])
+def test_a_height_flies_by_the_boards_clock(scalar: str, tmp_path: Path) -> None:
+    """Two metres up at once, which the mixer caps now and then: with the bits of the delayed flight."""
+    settings = height_settings(scalar)
+    curve, vehicle = CURVES["height-step"](2.0, 0.5), Vehicle.from_preset("crazyflie")
+    flight = Flight(curve, duration_s=0.5, vehicle=vehicle, yaw_rad=np.array([1.5]))
+    with closing(connect(build_lockstep(settings, tmp_path), settings=settings)) as board:
+        controller = TimedController(settings, board)
+        assert fly(flight, controller).same_bits(fly(flight, Expected(settings)))
+    assert (len(controller.replies), controller.different) == (50, [])
 
 
 def at(numbers: set[int], change: Callable[[bytes], bytes]) -> Callable[[int, bytes], bytes]:

@@ -2,9 +2,13 @@
 #ifndef HAL_H
 #define HAL_H
 
+#ifndef REFERENCE_NUMBERS
+#define REFERENCE_NUMBERS 4
+#endif
+
 typedef struct {
     float estimate[12]; /* X Y Z yaw pitch roll dx dy dz p q r */
-    float reference[4];
+    float reference[REFERENCE_NUMBERS];
     float thrust;
 } HAL_acquisition_t;
 
@@ -13,6 +17,8 @@ typedef struct {
     float roll;
     float status;
     float refused;
+    float thrust;
+    float has_taken_over;
 } HAL_command_t;
 
 #endif

@@ -15,4 +15,8 @@ void stock_fly(const nmpc_mambo_Y_t *angles, HAL_command_t *motors)
     motors->roll = angles->roll;
     motors->status = (float)angles->status;
     motors->refused = (float)angles->refused;
+#ifdef NMPC_HAS_HEIGHT
+    motors->thrust = angles->thrust;
+    motors->has_taken_over = (float)angles->has_taken_over;
+#endif
 }

@@ -7,65 +7,127 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods import Method, Step, method_of
-from mambo_codegen.numbers.representation import COMMAND
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.representation import COMMAND, THRUST
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.serial_messages import StepReply
 from mambo_sil.drone.plant.arrays import IntArray
-from mambo_sil.flight.controllers.compiled import CompiledController, as_arrays
+from mambo_sil.flight.controllers.compiled import CompiledController, as_array, as_arrays
 
 
 @dataclass(frozen=True)
 class BoardStep:
-    """The result of one step: command_rad (1, 2) and status (1,)."""
+    """The result of one step: command_rad (1, 2), status (1,), and with a height thrust_m_s2 (1,)."""
 
     command_rad: NDArray[np.floating]
     status: IntArray
+    thrust_m_s2: NDArray[np.floating] | None = None
+
+    @classmethod
+    def of(cls, method: Method, reply: StepReply, status: int) -> "BoardStep":
+        """Return the command of a reply with a status."""
+        numbers, count = method.numbers, len(COMMAND)
+        sent = np.frombuffer(reply.command, np.dtype(numbers.scalar).newbyteorder("<"))
+        command = sent.astype(numbers.scalar)[np.newaxis]
+        return cls(
+            numbers.to_si(command[:, :count], *COMMAND),
+            np.array([status]),
+            numbers.to_si(command[:, count], *THRUST) if method.has_height else None,
+        )
+
+    @classmethod
+    def level(cls, method: Method, status: int) -> "BoardStep":
+        """Return level attitude, with a height at the thrust of hover."""
+        thrust_m_s2 = np.array([GRAVITY_M_S2]) if method.has_height else None
+        return cls(np.zeros((1, 2)), np.array([status]), thrust_m_s2)
 
 
-class BoardController:
+@dataclass(frozen=True, eq=False)
+class BoardInputs:
+    """The inputs of one step: state (1, k), target (1, m), and thrust_m_s2 (1,).
+
+    With a height that is what the drone got in place of the last command, NaN for the command itself.
+    """
+
+    state: ArrayLike
+    target: ArrayLike
+    thrust_m_s2: ArrayLike
+
+    def body(self, method: Method) -> bytes:
+        """Return what is sent to a board."""
+        thrust = None if method.has_height else self.thrust_m_s2
+        numbers = as_arrays(method, 1, self.state, self.target, thrust)
+        if method.has_height:
+            numbers.append(as_array(method.numbers, self.thrust_m_s2, THRUST, (1,)))
+        return b"".join(as_bytes(values) for values in numbers)
+
+    def step(self, controller: CompiledController) -> Step:
+        """Return the step of a controller on the desk."""
+        if controller.settings.height is None:
+            step: Step = controller.step(self.state, self.target, self.thrust_m_s2)
+        else:
+            controller.set_thrust(self.thrust_m_s2)
+            step = controller.step(self.state, self.target)
+        return step
+
+
+class ToldThrust:
+    """The thrust of the next step of a controller on a board: that of the call, or told with a height."""
+
+    def __init__(self) -> None:
+        self._told: ArrayLike = np.array([np.nan])
+
+    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+        """Tell which thrust over mass (1,) the drone got in place of the last command."""
+        self._told = thrust_m_s2
+
+    def inputs(self, state: ArrayLike, target: ArrayLike, thrust_m_s2: ArrayLike | None) -> BoardInputs:
+        """Return the inputs of the next step, whose thrust is None with a height."""
+        told, self._told = self._told, np.array([np.nan])
+        return BoardInputs(state, target, told if thrust_m_s2 is None else thrust_m_s2)
+
+
+class BoardController(ToldThrust):
     """One controller on a board, called as soon as the desk has the next inputs.
 
     `replies` holds those of all steps, `different` the numbers of the steps whose bits are not the desk's.
     """
 
     def __init__(self, settings: Settings, board: Connection) -> None:
+        super().__init__()
+        self.settings = settings
         self._board, self._desk, self._method = board, CompiledController(settings), method_of(settings)
         self.replies: list[StepReply] = []
         self.different: list[int] = []
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> BoardStep:
-        """Compute the next command from state (1, 7), target (1, k) and thrust_acceleration_m_s2 (1,).
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> BoardStep:
+        """Compute the next command; the inputs are those of `CompiledController.step`, of one drone.
 
-        `CompiledController.step` explains k.
         Raises BoardError if the board is lost.
         """
-        inputs = as_arrays(self._method, 1, state, target, thrust_acceleration_m_s2)
-        reply = self._board.step(b"".join(as_bytes(values) for values in inputs))
-        desk = self._desk.step(state, target, thrust_acceleration_m_s2)
+        inputs = self.inputs(state, target, thrust_acceleration_m_s2)
+        reply = self._board.step(inputs.body(self._method))
+        desk = inputs.step(self._desk)
         if reply.bits != desk_bits(self._method, desk):
             self.different.append(len(self.replies))
         self.replies.append(reply)
-        return BoardStep(command_of(self._method, reply), np.array([reply.status]))
-
-
-def command_of(method: Method, reply: StepReply) -> NDArray[np.floating]:
-    """Return roll and pitch (1, 2) of a reply, in rad."""
-    numbers = method.numbers
-    command = np.frombuffer(reply.command, np.dtype(numbers.scalar).newbyteorder("<"))
-    return numbers.to_si(command.astype(numbers.scalar)[np.newaxis], *COMMAND)
+        return BoardStep.of(self._method, reply, reply.status)
 
 
 def desk_bits(method: Method, step: Step) -> tuple[int, bytes, int]:
     """Return the `StepReply.bits` of a board that has the bits of `step`."""
-    counts, outcome = b"", b""
+    counts, outcome, command = b"", b"", b""
     for one in method.results:
         values = getattr(step, one.name)
         if not one.quantities:
             counts += bytes([int(values[0])])
-        elif one.name != "command_rad":
+        elif one.name in ("command_rad", "thrust_m_s2"):
+            command += as_bytes(method.numbers.from_si(values, *one.quantities))
+        else:
             outcome += as_bytes(method.numbers.from_si(values, *one.quantities))
-    command = as_bytes(method.numbers.from_si(step.command_rad, *COMMAND))
     return counts[0], command, zlib.crc32(outcome + counts[1:])
 
 

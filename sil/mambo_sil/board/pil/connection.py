@@ -13,12 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from mambo_codegen import __version__
 from mambo_codegen.bundle.bundle import GENERATOR
 from mambo_codegen.errors import echo
-from mambo_codegen.methods import method_of
+from mambo_codegen.methods import Method, method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.serial_frames import Receiver, encode, frame_bytes
 from mambo_sil.board.pil.serial_messages import (
@@ -77,7 +75,7 @@ class Connection:
         patience: Patience | None = None,
     ) -> None:
         self.name, self._open, self._settings, self._say = echo(name), open_port, settings, say
-        self._number_bytes = np.dtype(method_of(settings).numbers.scalar).itemsize
+        self._command_bytes = command_bytes(method_of(settings))
         self.patience = patience or Patience()
         self.faults = Counter[str]()
         self.round_trips_s: list[float] = []
@@ -177,8 +175,8 @@ class Connection:
 
     def _ask_step(self, number: int, inputs: bytes) -> StepReply:
         started, repeated = time.perf_counter(), self.faults["repeated"]
-        expected = step_reply_bytes(self._number_bytes)
-        reply = StepReply.parse(self._ask(Kind.STEP, number, inputs, expected), self._number_bytes)
+        expected = step_reply_bytes(self._command_bytes)
+        reply = StepReply.parse(self._ask(Kind.STEP, number, inputs, expected), self._command_bytes)
         if reply is None:
             raise BoardError(f"--port {self.name}: the board answers a step with numbers of another size")
         if repeated == self.faults["repeated"]:
@@ -292,6 +290,12 @@ class Connection:
                 time.sleep(_REOPEN_PAUSE_S)
             else:
                 return
+
+
+def command_bytes(method: Method) -> int:
+    """Return the length of a command on the line."""
+    number_bytes, _ = method.numbers.bytes
+    return len(method.command) * number_bytes
 
 
 def _reason(error: OSError) -> str:

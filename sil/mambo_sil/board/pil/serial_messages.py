@@ -77,16 +77,16 @@ class StepReply:
 
     status: int
     command: bytes
-    """Roll and pitch, as the C holds them."""
+    """Roll and pitch, with a height the thrust too, as the C holds them."""
     outcome_crc: int
     """CRC-32 of every bit that the step left in the controller."""
     cycles: int
     stack_bytes: int
 
     @classmethod
-    def parse(cls, body: bytes, number_bytes: int) -> Self | None:
-        """Return the result in the body of a reply, with numbers of `number_bytes`; None if it is none."""
-        shape = struct.Struct(f"<B{2 * number_bytes}sIIH")
+    def parse(cls, body: bytes, command_bytes: int) -> Self | None:
+        """Return the result in the body of a reply, with a command of that length; None if it is none."""
+        shape = struct.Struct(f"<B{command_bytes}sIIH")
         return cls(*shape.unpack(body)) if len(body) == shape.size else None
 
     @property
@@ -112,13 +112,13 @@ class TimedReply:
     """Lowest bytes of the numbers of the inputs of this step, and of the NAMED_STEPS - 1 before it."""
 
     @classmethod
-    def parse(cls, body: bytes, number_bytes: int) -> Self | None:
-        """Return the result in the body of a reply, with numbers of `number_bytes`; None if it is none."""
+    def parse(cls, body: bytes, command_bytes: int) -> Self | None:
+        """Return the result in the body of a reply, with a command of that length; None if it is none."""
         shape = struct.Struct(f"<II{NAMED_STEPS}s")
-        step = StepReply.parse(body[: -shape.size], number_bytes)
+        step = StepReply.parse(body[: -shape.size], command_bytes)
         return None if step is None else cls(step, *shape.unpack(body[-shape.size :]))
 
 
-def step_reply_bytes(number_bytes: int) -> int:
-    """Return the length of the payload that answers a step, with numbers of `number_bytes`."""
-    return HEAD_BYTES + 1 + 2 * number_bytes + 10
+def step_reply_bytes(command_bytes: int) -> int:
+    """Return the length of the payload that answers a step, with a command of that length."""
+    return HEAD_BYTES + 1 + command_bytes + 10

@@ -15,13 +15,12 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.board_controller import BoardStep, as_bytes, command_of, desk_bits
-from mambo_sil.board.pil.connection import NO_FLIGHT, Connection
+from mambo_sil.board.pil.board_controller import BoardInputs, BoardStep, ToldThrust, desk_bits
+from mambo_sil.board.pil.connection import NO_FLIGHT, Connection, command_bytes
 from mambo_sil.board.pil.serial_messages import (
     DAMAGED,
     NAMED_STEPS,
@@ -33,11 +32,10 @@ from mambo_sil.board.pil.serial_messages import (
 )
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.errors import BoardError
-from mambo_sil.flight.controllers.compiled import CompiledController, as_arrays
+from mambo_sil.flight.controllers.compiled import CompiledController
 
 OLDEST_INPUTS: Final = 250
 """Inputs in a row that a board may not receive before the flight ends: a reply names them modulo 256."""
-_Inputs = tuple[ArrayLike, ArrayLike, ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Arrival:
         return self.number + 1 + self.reply.overruns
 
 
-class TimedController:
+class TimedController(ToldThrust):
     """One controller on a board, called by the clock of the board.
 
     `arrivals` holds the replies that came, `different` the numbers of those whose bits are not the desk's.
@@ -64,13 +62,15 @@ class TimedController:
     """
 
     def __init__(self, settings: Settings, board: Connection) -> None:
+        super().__init__()
+        self.settings = settings
         self._board, self._desk, self._method = board, CompiledController(settings), method_of(settings)
-        self._number_bytes = np.dtype(self._method.numbers.scalar).itemsize
+        self._command_bytes = command_bytes(self._method)
         self._update = 0
         self._heard = deque[tuple[int, int, bytes]]()
-        self._sent: list[_Inputs] = []
+        self._sent: list[BoardInputs] = []
         self._last_request = (Kind.START, 0, b"")
-        self._held = BoardStep(np.zeros((1, 2)), np.array([NOT_CALLED]))
+        self._held = BoardStep.level(self._method, NOT_CALLED)
         self.arrivals: list[Arrival] = []
         self.different: list[int] = []
         self.late_inputs = self.lost_replies = 0
@@ -80,14 +80,16 @@ class TimedController:
         """The results of the steps whose replies came."""
         return [arrival.reply.step for arrival in self.arrivals]
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> BoardStep:
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> BoardStep:
         """Wait for the end of the board's period; return its command, or the last one if the period has none.
 
-        The next step gets state (1, 7), target (1, k) and thrust_acceleration_m_s2 (1,), as
-        `CompiledController.step` explains. The first call starts the clock, and returns a command of zero.
+        The next step gets the inputs, which are those of `CompiledController.step`, of one drone. The first
+        call starts the clock, and returns level attitude, with a height at the thrust of hover.
         Raises BoardError if the board is lost, or if its steps can no longer be followed.
         """
-        inputs = (state, target, thrust_acceleration_m_s2)
+        inputs = self.inputs(state, target, thrust_acceleration_m_s2)
         update, self._update = self._update, self._update + 1
         if update == 0:
             self._send(Kind.START, inputs)
@@ -105,14 +107,12 @@ class TimedController:
         if newest.period > update:
             return self._held
         result = newest.reply.step
-        command_rad = command_of(self._method, result)
-        self._held = BoardStep(command_rad, np.array([NOT_CALLED]))
-        return BoardStep(command_rad, np.array([result.status]))
+        self._held = BoardStep.of(self._method, result, NOT_CALLED)
+        return BoardStep.of(self._method, result, result.status)
 
-    def _send(self, kind: Kind, inputs: _Inputs) -> None:
+    def _send(self, kind: Kind, inputs: BoardInputs) -> None:
         """Send the next inputs."""
-        arrays = as_arrays(self._method, 1, *inputs)
-        self._last_request = (kind, len(self._sent), b"".join(as_bytes(values) for values in arrays))
+        self._last_request = (kind, len(self._sent), inputs.body(self._method))
         self._board.tell(*self._last_request)
         self._sent.append(inputs)
 
@@ -139,7 +139,7 @@ class TimedController:
         elif kind == OUT_OF_STEP:
             raise self._lost("the board was restarted; check its supply")
         elif kind == Kind.START | REPLY:
-            reply = TimedReply.parse(body, self._number_bytes)
+            reply = TimedReply.parse(body, self._command_bytes)
             if reply is None:
                 raise self._lost("the board replies with numbers of another size")
             if number >= self._steps:
@@ -178,7 +178,7 @@ class TimedController:
     def _follow(self, arrived: Arrival, used: list[int]) -> None:
         """Make the board's steps with the inputs of these numbers, and compare the one that is known."""
         for number in used:
-            desk = self._desk.step(*self._sent[number])
+            desk = self._sent[number].step(self._desk)
         if arrived.reply.step.bits != desk_bits(self._method, desk):
             self.different.append(arrived.number)
 

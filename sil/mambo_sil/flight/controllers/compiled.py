@@ -52,7 +52,8 @@ def as_array(
     if given.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
     with np.errstate(over="ignore"):  # infinity, which the C refuses
-        return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
+        quantized = numbers.quantize(given.reshape(-1, len(quantities)), quantities)
+    return np.ascontiguousarray(quantized).reshape(shape)
 
 
 def empty_outcome(method: Method, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
@@ -76,6 +77,8 @@ def setter_quantities(method: Method, setter: Setter) -> Sequence[str]:
         return WEIGHTS
     return method.limiting.quantities if method.limiting else LIMITS
 
+
+_YAW: Final = ("yaw",)
 
 DIRT = b"\xa5"
 """Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
@@ -137,6 +140,18 @@ class CompiledController:
         if not self._method.has_height:
             raise ValueError("the settings have no height")
         return self._set_each(self._library.nmpc_host_set_thrust, np.asarray(thrust_m_s2)[:, None], THRUST)
+
+    def slew_heading(
+        self, previous_rad: ArrayLike, wanted_rad: ArrayLike, most_change_rad: float
+    ) -> NDArray[np.float64]:
+        """Return what `nmpc_slew_heading` returns (n,) for previous and wanted headings (n,)."""
+        previous, wanted = (
+            as_array(self._numbers, given, _YAW, (self.n,)) for given in (previous_rad, wanted_rad)
+        )
+        turned, most = np.empty_like(previous), as_array(self._numbers, [most_change_rad], _YAW, (1,))
+        addresses = map(_address, (previous, wanted, most, turned))
+        self._library.nmpc_host_slew_heading(self.n, *addresses)
+        return self._numbers.to_si(turned, *_YAW).astype(np.float64)
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; returns a status (n,).

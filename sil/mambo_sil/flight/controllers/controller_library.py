@@ -29,6 +29,8 @@ DECLARATIONS: Final = """
     void nmpc_host_set_thrust(void *controllers, int n, const void *thrust, int *status);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
     void nmpc_host_limits_active(const void *controllers, int n, int *active);
+    void nmpc_host_slew_heading(int n, const void *previous, const void *wanted, const void *most_change,
+                                void *next);
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
                            double thrust_acceleration_m_s2, double *command);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);

@@ -90,6 +90,16 @@ void nmpc_host_limits_active(const nmpc_t *controllers, int n, int *active)
 }
 #endif
 
+void nmpc_host_slew_heading(int n, const nmpc_real_t *previous_rad, const nmpc_real_t *wanted_rad,
+                            const nmpc_real_t *most_change_rad, nmpc_real_t *next_rad)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        next_rad[i] = nmpc_slew_heading(previous_rad[i], wanted_rad[i], most_change_rad[0]);
+    }
+}
+
 #ifdef NMPC_ANGLE_BITS
 /* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
 static nmpc_real_t number_of(double value, int bits)

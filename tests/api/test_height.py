@@ -1,0 +1,127 @@
+"""Controllers with the height as a third axis, from a program."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
+from mambo_nmpc.curves import curve
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
+from mambo_sil.flight.names import CurveName
+from tests.support.heights import height_settings
+
+RNG = np.random.default_rng(8)
+REST = np.zeros((2, 3))
+STATE, GOAL = DroneState([0, 0, -1], [0, 0, 0], [0, 0, 0]), TargetState([0, 0, -1], [0, 0, 0])
+
+
+@pytest.mark.parametrize("acceleration", ["tracked", "given"])
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleration: str) -> None:
+    """Through reset, set_command and set_thrust; z points down, the height of the C up."""
+    settings = height_settings(scalar, acceleration)
+    ours, theirs = Controller(settings, 2), CompiledController(settings, 2)
+    columns = slice(None) if acceleration == "given" else slice(2)
+    position, velocity, attitude, *aims = RNG.normal(0.0, 0.2, (6, 2, 3))
+    for grounded in (np.array([False, True]), np.zeros(2, np.bool_)):
+        state = [position[:, :2], velocity[:, :2], attitude, -position[:, 2:], -velocity[:, 2:]]
+        target = [aim[:, :2] for aim in aims[columns]] + [-aim[:, 2:] for aim in aims[columns]]
+        for _ in range(3):
+            expected = theirs.step(np.column_stack([*state, grounded]), np.column_stack(target))
+            found = ours.step(DroneState(position, velocity, attitude, grounded), TargetState(*aims))
+            assert (found.command_rad == expected.command_rad).all()
+            assert (found.thrust_m_s2 == expected.thrust_m_s2).all()
+            assert (found.status == 0).all()
+        assert (ours.set_thrust([10.0, np.nan]) == theirs.set_thrust([10.0, np.nan])).all()
+        assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
+        assert (ours.set_command((0.1, 0.0), 11.0) == theirs.set_command([[0.1, 0.0, 11.0]] * 2)).all()
+        assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
+        assert (ours.reset((0.1, 0.0), thrust_m_s2=[9.0, 8.0]) == 0).all()
+        theirs.reset([[0.1, 0.0, 9.0], [0.1, 0.0, 8.0]])
+        assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
+
+
+def test_a_reset_hovers_unless_a_thrust_is_told() -> None:
+    """The first command after it is that of a new controller."""
+    ours, new = Controller.from_vehicle("crazyflie"), Controller.from_vehicle("crazyflie")
+    above = TargetState([0.0, 0.0, -1.01], np.zeros(3))
+    first = thrust_of(new, above)
+    assert thrust_of(ours, above) == first
+    assert thrust_of(ours, above) != first
+    ours.reset()
+    assert thrust_of(ours, above) == first
+    ours.reset(thrust_m_s2=12.0)
+    assert thrust_of(ours, above) != first
+
+
+def thrust_of(pilot: Controller, target: TargetState, state: DroneState | None = None) -> float:
+    """Return the thrust of a step at 1 m, or in another state."""
+    thrust = pilot.step(state or STATE, target).thrust_m_s2
+    assert thrust is not None
+    return float(thrust)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda it: it.step(DroneState([0, 0], [0, 0], [0, 0, 0]), GOAL), "state: position_m has no z"),
+        (lambda it: it.step(STATE, TargetState([0, 0, 0], [0, 0])), "target: velocity_m_s has no z"),
+        (lambda it: it.step(STATE, GOAL, 9.81), r"thrust_acceleration_m_s2 = 9\.81 must be left out"),
+        (lambda it: it.set_command((0.0, 0.0)), r"thrust_m_s2 is missing; the settings have \[height\]"),
+        (lambda it: it.set_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
+        (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "grounded = 1 must be a truth value"),
+        (lambda _: DroneState(REST, REST, REST, [True] * 3), r"grounded = .* or such of shape \(2,\)"),
+    ],
+)
+def test_wrong_arguments_are_refused(call: Any, message: str) -> None:
+    """By name, with what to do."""
+    with pytest.raises(ArgumentError, match=message):
+        call(Controller.from_vehicle("crazyflie"))
+
+
+def test_what_needs_a_height_says_so() -> None:
+    """And a given acceleration has three components."""
+    level = Controller.from_preset("crazyflie")
+    with pytest.raises(ArgumentError, match=r"set_thrust needs settings with \[height\]"):
+        level.set_thrust(9.81)
+    with pytest.raises(
+        ArgumentError, match=r"thrust_m_s2 = 9\.0 must be left out: the settings have no \[hei"
+    ):
+        level.reset(thrust_m_s2=9.0)
+    given = Controller.from_vehicle("crazyflie", acceleration="given")
+    with pytest.raises(ArgumentError, match="target: acceleration_m_s2 has no z"):
+        given.step(STATE, TargetState([0, 0, -1], [0, 0, 0], [0, 0]))
+
+
+def test_a_wrong_mass_leaves_no_error_of_height() -> None:
+    """On a point mass of 1.2 times the weight: the gain of the thrust is learnt."""
+    pilot, z, climb = Controller.from_vehicle("crazyflie"), 1.0, 0.0
+    for _ in range(500):
+        state = DroneState.in_frame("NWU", [0.0, 0.0, z], [0.0, 0.0, climb], [0.0, 0.0, 0.0])
+        climb += 0.01 * (thrust_of(pilot, GOAL, state) / 1.2 - GRAVITY_M_S2)
+        z += 0.01 * climb
+    assert abs(z - 1.0) < 0.001
+
+
+def test_a_target_on_the_floor_gets_the_least_thrust_there() -> None:
+    """While the drone touches it; in the air it does not."""
+    pilot, at_rest = Controller.from_vehicle("crazyflie"), np.zeros(3)
+    on_it, below = DroneState(at_rest, at_rest, at_rest, True), TargetState(at_rest, at_rest)
+    assert pilot.settings.height is not None
+    least = pilot.settings.height.thrust_min_m_s2
+    np.testing.assert_allclose([thrust_of(pilot, below, on_it) for _ in range(3)], least, rtol=1e-6)
+    assert thrust_of(pilot, GOAL, on_it) > least
+
+
+def test_flights_in_space_follow_the_height() -> None:
+    """By `fly`; a level curve at its height."""
+    controller, vehicle = Controller.from_vehicle("crazyflie", age_s=0.0), Vehicle.from_preset("crazyflie")
+    names: tuple[CurveName, ...] = ("helix", "circle")
+    for name in names:
+        flown = fly(controller, vehicle, curve(name, 1.0, 1.0), duration_s=6.0)
+        assert not flown.crashed.any()
+        target = flown.trace.target[:, 0, 4] if name == "helix" else HOVER_HEIGHT_M
+        assert np.abs(flown.trace.position_m[300:, 0, 2] + np.broadcast_to(target, 601)[300:]).max() < 0.01
