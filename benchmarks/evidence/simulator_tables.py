@@ -1,0 +1,148 @@
+"""Tables and pictures of the flights in crazyflow and RotorPy."""
+
+import json
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.evidence.item import Figures
+from benchmarks.evidence.tables import Row
+from benchmarks.markdown import table
+from benchmarks.simulators.missions import MISSIONS
+from mambo_sil.results.number_format import three_digits
+from mambo_sil.results.pictures import save
+from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
+
+SIMULATORS: Final = ("crazyflow", "rotorpy")
+LARGEST_IS_BEST: Final = ("heading", "payload")
+"""Missions whose score is a height."""
+L250: Final = ("cf2x_L250, first principles", "cf2x_L250, fitted")
+PRESET: Final = "ours, preset `crazyflie`"
+NEAREST: Final = "ours, `design` of the nearest drone"
+BOUNDLESS: Final = "the same without limits"
+FOUND: Final = "ours, `identify`, then `design`"
+OURS_ON_PICTURE: Final = FOUND
+THEIRS_ON_PICTURE: Final = ("Mellinger with the target's acceleration", "SE3Control")
+Cell = Mapping[str, Any]
+
+
+def read_simulators(results: Path) -> Figures:
+    """Return the scores by simulated drone, controller and mission."""
+    found: Figures = {}
+    for name in SIMULATORS:
+        found |= json.loads((results / name / "figures.json").read_text("utf-8"))
+    return found
+
+
+def median(cell: Cell) -> float | None:
+    """Return the median over the seeds; None if half of them or more crashed or never arrived."""
+    scores = [float("inf") if score is None else score for score in cell["noise"]]
+    found = statistics.median(scores)
+    return found if found < float("inf") else None
+
+
+def through_noise(figures: Figures) -> str:
+    """Return medians over the seeds, and the least and the largest."""
+    return _by_drone(figures, median, _spread)
+
+
+def with_truth(figures: Figures) -> str:
+    """Return the scores with true states."""
+    return _by_drone(figures, lambda cell: cell["truth"], lambda cell: _number(cell["truth"]))
+
+
+def _by_drone(figures: Figures, key: Callable[[Cell], float | None], text: Callable[[Cell], str]) -> str:
+    """Return a row for each controller, below one with the name of the drone; the best are bold."""
+    rows: list[Row] = []
+    for drone, challengers in figures.items():
+        rows.append({"": f"**{drone}**"} | dict.fromkeys((each.title for each in MISSIONS.values()), ""))
+        best = {name: _best(name, [key(cells[name]) for cells in challengers.values()]) for name in MISSIONS}
+        for title, cells in challengers.items():
+            row = {"": title}
+            for name, mission in MISSIONS.items():
+                cell = text(cells[name])
+                row[mission.title] = f"**{cell}**" if key(cells[name]) == best[name] else cell
+            rows.append(row)
+    return table(rows)
+
+
+def _best(mission: str, scores: Sequence[float | None]) -> float | None:
+    known = [score for score in scores if score is not None]
+    choose = max if mission in LARGEST_IS_BEST else min
+    return choose(known) if known else -1.0
+
+
+def _number(score: float | None) -> str:
+    return "lost" if score is None else three_digits(score)
+
+
+def _spread(cell: Cell) -> str:
+    """Return median, least and largest; how many were lost, if any."""
+    known = [score for score in cell["noise"] if score is not None]
+    if not known:
+        return "lost"
+    lost = len(cell["noise"]) - len(known)
+    ends = f"{three_digits(min(known))}..{three_digits(max(known))}" + (f", {lost} lost" if lost else "")
+    return f"{_number(median(cell))} ({ends})"
+
+
+def unrest(figures: Figures) -> str:
+    """Return the mean change of a command of roll or pitch in one step, through noise on the eight."""
+    titles = list(dict.fromkeys(title for challengers in figures.values() for title in challengers))
+    rows = []
+    for title in titles:
+        row = {"change of a command in 10 ms, mrad": title}
+        for drone, challengers in figures.items():
+            row[drone] = (
+                three_digits(1e3 * challengers[title]["eight"]["unrest_rad"]) if title in challengers else "-"
+            )
+        rows.append(row)
+    return table(rows)
+
+
+def aims(figures: Figures) -> str:
+    """Return the figures of cf2x_L250 that were aimed at."""
+    rows = [
+        ("eight: RMSE, mm; by preset, `design`, identified", "eight", (PRESET, NEAREST, FOUND)),
+        ("circle: RMSE, mm; by preset, `design`, identified", "circle", (PRESET, NEAREST, FOUND)),
+        ("step of 1 m: within 5 cm, s; by `design` without limits, with them", "step", (BOUNDLESS, NEAREST)),
+        ("eight, heading by 2 rad: least height, m; by `design`", "heading", (NEAREST,)),
+    ]
+    return table(
+        [
+            {"cf2x_L250, through noise": title}
+            | {
+                drone.partition(", ")[2]: ", ".join(
+                    _number(median(figures[drone][who][mission])) for who in challengers
+                )
+                for drone in L250
+            }
+            for title, mission, challengers in rows
+        ]
+    )
+
+
+def draw_simulators(results: Path) -> None:
+    """Draw the circle in crazyflow and in RotorPy through noise, of their controller and of ours."""
+    for simulator, drone in (("crazyflow", L250[0]), ("rotorpy", "RotorPy")):
+        paths = np.load(results / simulator / f"{drone}.npz")
+        with style():
+            figure = Figure(figsize=(PAGE_INCHES, 2.6), layout="constrained")
+            plan, height = figure.subplots(1, 2, width_ratios=(1, 1.4))
+            mission = MISSIONS["circle"]
+            times_s, target = mission.times_s, mission.targets()
+            plan.plot(*target[:, :2].T, color=TARGET, linewidth=BROAD)
+            theirs = next(title for title in THEIRS_ON_PICTURE if title in paths)
+            for title, colour in ((theirs, VERMILION), (OURS_ON_PICTURE, BLUE)):
+                path = paths[title]
+                plan.plot(*path[:, :2].T, color=colour, linewidth=0.7)
+                distance_m = np.linalg.norm(path[:, :2] - target[:, :2], axis=1)
+                height.plot(times_s, 100.0 * distance_m, color=colour, label=title)
+            plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{drone}: circle, 1.5 rad/s, noise")
+            height.set(xlabel="time, s", ylabel="distance, cm", yscale="log", ylim=(0.05, 200.0))
+            height.legend()
+            save(figure, results / f"simulators-{simulator}")

@@ -1,0 +1,101 @@
+"""The benchmark of simulators: its scores, its laws and its tables; the simulators are not installed here."""
+
+import numpy as np
+import pytest
+
+from benchmarks.evidence.simulator_tables import aims, median, through_noise, unrest, with_truth
+from benchmarks.simulators.missions import AWAY_S, MISSIONS, Flight3d, Mission
+from benchmarks.simulators.pilots import Challenger, OurSettings, Sight, laws
+from mambo_codegen.settings import presets
+from mambo_sil.drone.vehicles import vehicle_toml
+
+CRAZYFLIE = vehicle_toml.preset("crazyflie")
+
+
+def flown(mission: Mission, *shifts_m: tuple[float, float, float]) -> Flight3d:
+    """Return drones at a constant distance from their target."""
+    position_m = mission.targets()[:, np.newaxis, :3] + np.array(shifts_m)
+    return Flight3d(position_m, np.ones(position_m.shape[:2]))
+
+
+def test_flights_are_judged_by_their_distance_or_their_height() -> None:
+    """A curve by its root mean square in mm, a push by its largest; a crash has no score."""
+    eight, push, heading = MISSIONS["eight"], MISSIONS["push"], MISSIONS["heading"]
+    shifts = (0.03, 0.04, 0.0), (0.0, 0.0, -0.2), (0.0, 0.0, -1.0)
+    assert eight.scores(flown(eight, *shifts)) == pytest.approx([50.0, 0.0, None])
+    assert push.scores(flown(push, *shifts)) == pytest.approx([50.0, 0.0, None])
+    assert heading.scores(flown(heading, *shifts)) == pytest.approx([1.0, 0.8, None])
+    tilted = flown(eight, shifts[0])
+    tilted.level[100] = 0.1
+    assert eight.scores(tilted) == [None]
+    lost = flown(eight, shifts[0])
+    lost.position_m[700:] = np.nan
+    assert eight.scores(lost) == [None]
+
+
+def test_a_step_is_judged_by_the_time_to_5_cm() -> None:
+    """From the step on, for good; a drone that does not arrive has no score."""
+    step = MISSIONS["step"]
+    late = flown(step, (0.0, 0.0, 0.0))
+    late.position_m[100:250, 0, 0] = 0.9  # until 2.49 s
+    assert step.scores(late) == pytest.approx([1.5])
+    assert step.scores(flown(step, (0.06, 0.0, 0.0))) == [None]
+
+
+@pytest.mark.parametrize("name", ["step", "far step"])
+def test_a_planned_step_is_smooth_and_ends_at_rest(name: str) -> None:
+    """Its velocity and acceleration are its derivatives."""
+    mission = MISSIONS[name]
+    planned, jump = mission.targets(planned=True), mission.targets()
+    np.testing.assert_allclose(planned[[0, -1]], jump[[0, -1]], atol=1e-9)
+    for rate, of in ((slice(3, 6), slice(0, 3)), (slice(6, 9), slice(3, 6))):
+        np.testing.assert_allclose(np.gradient(planned[:, of], 0.01, axis=0), planned[:, rate], atol=0.05)
+
+
+def test_things_happen_when_they_should() -> None:
+    """A push for 5 s, a weight and a heading for good."""
+    push, payload, heading = (MISSIONS[name] for name in ("push", "payload", "heading"))
+    assert [push.force_m_s2(time_s)[0] for time_s in (4.0, 6.0, 11.0)] == [0.0, 1.0, 0.0]
+    assert payload.force_m_s2(AWAY_S + 1.0)[2] < -1.0
+    assert heading.targets()[[0, -1], 9].tolist() == [0.0, 2.0]
+
+
+def test_every_pilot_flies_towards_its_target() -> None:
+    """Forward and left of it, and up; with a true state and through noise."""
+    target = np.array([0.5, 0.3, 1.1, *np.zeros(7)])
+    seen = Sight(np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((2, 3)), np.zeros((2, 3)))
+    challengers: dict[str, Challenger] = {
+        **laws(CRAZYFLIE),
+        "ours": OurSettings(presets.preset("crazyflie"), CRAZYFLIE),
+    }
+    assert len(challengers) == 4
+    for challenger in challengers.values():
+        for noisy in (False, True):
+            command = challenger.pilot(2, 0.03, noisy=noisy).command(seen, target)
+            assert command.shape == (2, 4)
+            assert (command[:, 1] > 0.0).all()  # nose down, in NWU
+            assert (command[:, 0] < 0.0).all()
+            assert (command[:, 3] > 0.03 * 9.81).all()
+
+
+def test_tables_show_spread_and_loss() -> None:
+    """The median with its range, how many were lost, and the best of each column."""
+    cell = {"truth": 1.0, "noise": [2.0, 4.0, 3.0, None, 5.0], "unrest_rad": 0.002}
+    gone = {"truth": None, "noise": [None] * 5, "unrest_rad": 0.1}
+    figures = {
+        "RotorPy": {"theirs": dict.fromkeys(MISSIONS, gone), "ours": dict.fromkeys(MISSIONS, cell)},
+    }
+    assert median(cell) == 4.0
+    assert median({"noise": [1.0, None, None]}) is None
+    assert "| ours | **4.00 (2.00..5.00, 1 lost)** |" in through_noise(figures)
+    assert "| theirs | lost |" in with_truth(figures)
+    assert "| ours | 2.00 |" in unrest(figures)
+    challengers = {
+        "ours, preset `crazyflie`": cell,
+        "ours, `design` of the nearest drone": cell,
+        "the same without limits": cell,
+        "ours, `identify`, then `design`": cell,
+    }
+    flights = {who: dict.fromkeys(MISSIONS, score) for who, score in challengers.items()}
+    both = {"cf2x_L250, first principles": flights, "cf2x_L250, fitted": flights}
+    assert aims(both).count("4.00, 4.00, 4.00 | 4.00, 4.00, 4.00") == 2
