@@ -1,4 +1,4 @@
-"""Tables and pictures of the flights in crazyflow and RotorPy."""
+"""Tables of the flights in crazyflow and RotorPy."""
 
 import json
 import statistics
@@ -6,16 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-from matplotlib.figure import Figure
-
 from benchmarks.evidence.item import Figures
 from benchmarks.evidence.tables import Row
 from benchmarks.markdown import table
 from benchmarks.simulators.missions import MISSIONS
 from mambo_sil.results.number_format import three_digits
-from mambo_sil.results.pictures import save
-from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 
 SIMULATORS: Final = ("crazyflow", "rotorpy")
 LARGEST_IS_BEST: Final = ("heading", "payload")
@@ -25,8 +20,6 @@ PRESET: Final = "ours, preset `crazyflie`"
 NEAREST: Final = "ours, `design` of the nearest drone"
 BOUNDLESS: Final = "the same without limits"
 FOUND: Final = "ours, `identify`, then `design`"
-OURS_ON_PICTURE: Final = FOUND
-THEIRS_ON_PICTURE: Final = ("Mellinger with the target's acceleration", "SE3Control")
 Cell = Mapping[str, Any]
 
 
@@ -124,25 +117,3 @@ def aims(figures: Figures) -> str:
             for title, mission, challengers in rows
         ]
     )
-
-
-def draw_simulators(results: Path) -> None:
-    """Draw the circle in crazyflow and in RotorPy through noise, of their controller and of ours."""
-    for simulator, drone in (("crazyflow", L250[0]), ("rotorpy", "RotorPy")):
-        paths = np.load(results / simulator / f"{drone}.npz")
-        with style():
-            figure = Figure(figsize=(PAGE_INCHES, 2.6), layout="constrained")
-            plan, height = figure.subplots(1, 2, width_ratios=(1, 1.4))
-            mission = MISSIONS["circle"]
-            times_s, target = mission.times_s, mission.targets()
-            plan.plot(*target[:, :2].T, color=TARGET, linewidth=BROAD)
-            theirs = next(title for title in THEIRS_ON_PICTURE if title in paths)
-            for title, colour in ((theirs, VERMILION), (OURS_ON_PICTURE, BLUE)):
-                path = paths[title]
-                plan.plot(*path[:, :2].T, color=colour, linewidth=0.7)
-                distance_m = np.linalg.norm(path[:, :2] - target[:, :2], axis=1)
-                height.plot(times_s, 100.0 * distance_m, color=colour, label=title)
-            plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{drone}: circle, 1.5 rad/s, noise")
-            height.set(xlabel="time, s", ylabel="distance, cm", yscale="log", ylim=(0.05, 200.0))
-            height.legend()
-            save(figure, results / f"simulators-{simulator}")

@@ -4,9 +4,9 @@ Plant, attitude response and Mellinger controller are crazyflow's: `first_princi
 its Mellinger attitude loop, `so_rpy_rotor_drag` responses that were fitted to flights of real Crazyflies.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,13 +17,13 @@ from crazyflow.control.mellinger import state2attitude
 from crazyflow.sim import Sim
 from scipy.spatial.transform import Rotation
 
-from benchmarks.simulators.identified import LogRow, identified, manoeuvre
+from benchmarks.simulators.identified import SENSORS, LogRow, identified, identified_settings, manoeuvre
 from benchmarks.simulators.missions import HEIGHT_M, MISSIONS, STEP_S, Flight3d, Mission, Score
 from benchmarks.simulators.pilots import Challenger, OurSettings, Pilot, Sight, laws
 from mambo_codegen.settings import presets
 from mambo_nmpc import Controller
 from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
-from mambo_sil.api.options import with_options
+from mambo_sil.api.options import ControllerOptions, with_options
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
@@ -41,6 +41,8 @@ VEHICLES: Final = {
     "cf21B_500": "crazyflie-brushless",
 }
 """The shipped drone that is nearest to each drone of crazyflow."""
+BOUNDLESS: Final[ControllerOptions] = {"speed_m_s": 0.0, "braking_m_s2": 0.0}
+"""Options without limits of speed and braking."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +58,21 @@ class SimulatedCrazyflie:
         return f"{self.drone}, {MODELS[self.model]}"
 
     def simulation(self, worlds: int) -> Any:
-        """Return a simulation with attitude control."""
-        return Sim(
-            n_worlds=worlds, drone=self.drone, dynamics=self.model, control=Control.attitude, freq=FREQ_HZ
-        )
+        """Return a simulation with attitude control at its start; each number of worlds is compiled once."""
+        simulation = self._compiled(worlds)
+        simulation.reset()
+        return simulation
 
     @cached_property
     def mass_kg(self) -> float:
         """The mass that the simulation has."""
         return float(np.ravel(self.simulation(1).data.params.mass)[0])
+
+    @lru_cache(maxsize=2)  # noqa: B019 - as many as one simulated drone needs
+    def _compiled(self, worlds: int) -> Any:
+        return Sim(
+            n_worlds=worlds, drone=self.drone, dynamics=self.model, control=Control.attitude, freq=FREQ_HZ
+        )
 
 
 @dataclass(frozen=True)
@@ -108,16 +116,17 @@ def fly(
     """Return the flights of each challenger, with the truth, then with each seed, and commands (k, w, 4)."""
     each = 1 + len(SEEDS)
     worlds = each * len(challengers)
-    simulation, hands = world.simulation(worlds), []
+    simulation, hands, starts_m = world.simulation(worlds), [], np.empty((worlds, 3))
     for number, challenger in enumerate(challengers):
-        first = each * number
+        first, targets = each * number, mission.targets(planned=challenger.planned)
+        starts_m[first : first + each] = targets[0, :3]
         groups = (((first, first + 1), False), ((first + 1, first + each), True))
         for rows, noisy in (
             groups if isinstance(challenger, OurSettings) else (((first, first + each), True),)
         ):
             pilot = challenger.pilot(rows[1] - rows[0], world.mass_kg, noisy=noisy)
-            hands.append((rows, pilot, mission.targets(planned=challenger.planned)))
-    place(simulation, np.broadcast_to(mission.targets()[0, :3], (worlds, 3)), world.mass_kg)
+            hands.append((rows, pilot, targets))
+    place(simulation, starts_m, world.mass_kg)
     noisy_rows = np.arange(worlds) % each > 0
     times_s = mission.times_s
     position_m = np.empty((len(times_s), worlds, 3))
@@ -205,7 +214,8 @@ def fly_log(world: SimulatedCrazyflie) -> list[LogRow]:
     simulation, targets = world.simulation(1), manoeuvre(HEIGHT_M)
     place(simulation, targets[:1, :3], world.mass_kg)
     pilot = OurSettings(presets.preset("crazyflie"), CRAZYFLIE).pilot(1, world.mass_kg, noisy=True)
-    rows, every, suite = [], np.array([True]), None
+    rows: list[LogRow] = []
+    every, suite = np.array([True]), None
     for step, target in enumerate(targets):
         true = sight(simulation)
         suite = suite or MocapSuite(
@@ -231,21 +241,30 @@ def challengers_of(world: SimulatedCrazyflie, folder: Path) -> dict[str, Challen
     name = f"{world.drone}-{world.model}"
     text, found = identified(fly_log(world), folder / f"{name}.csv")
     (folder / f"{name}.toml").write_text(text, "utf-8")
-    nearest = VEHICLES[world.drone]
-    derived = Controller.from_vehicle(nearest).settings
-    boundless = with_options(derived, {"speed_m_s": 0.0, "braking_m_s2": 0.0})
+    derived = Controller.from_vehicle(VEHICLES[world.drone]).settings
+    calm = identified_settings(text.partition(SENSORS)[0])
     return {
         "Mellinger with the target's acceleration": Mellinger(world.drone),
         "Mellinger without it": Mellinger(world.drone, acceleration=False),
-        "Mellinger, steps as polynomials": Mellinger(world.drone, planned=True),
+        "Mellinger with it, planned starts and steps": Mellinger(world.drone, planned=True),
         **laws(CRAZYFLIE),
         "ours, preset `crazyflie`": OurSettings(presets.preset("crazyflie"), CRAZYFLIE),
         "ours, `design crazyflie`": OurSettings(Controller.from_vehicle("crazyflie").settings, CRAZYFLIE),
         "ours, `design` of the nearest drone": OurSettings(derived, CRAZYFLIE),
-        "the same without limits": OurSettings(boundless, CRAZYFLIE),
+        "the same without limits": OurSettings(with_options(derived, BOUNDLESS), CRAZYFLIE),
         "the same, height by `pid`": OurSettings(derived, CRAZYFLIE, "pid"),
         "ours, `identify`, then `design`": OurSettings(found, CRAZYFLIE),
+        "identified, without limits": OurSettings(with_options(found, BOUNDLESS), CRAZYFLIE),
+        "identified, without `[sensors]`": OurSettings(calm, CRAZYFLIE),
     }
+
+
+def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
+    """Yield title, scores and paths of each drone with each model."""
+    for drone in VEHICLES:
+        for model in MODELS:
+            world = SimulatedCrazyflie(drone, model)
+            yield world.title, *measure(world, folder)
 
 
 def measure(world: SimulatedCrazyflie, folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:

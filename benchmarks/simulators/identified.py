@@ -34,7 +34,7 @@ LogRow = Sequence[float]
 
 def manoeuvre(height_m: float) -> FloatArray:
     """Return the targets (k, 10) of the manoeuvre of `identify`, in NWU, every 10 ms."""
-    times_s = STEP_S * np.arange(round(DURATION_S / STEP_S) + 1)
+    times_s = np.asarray(STEP_S * np.arange(round(DURATION_S / STEP_S) + 1), np.float64)
     north_m, east_m = reference_m(times_s)
     targets = np.zeros((len(times_s), 10))
     for axis, values in enumerate((north_m, -east_m)):
@@ -56,5 +56,10 @@ def identified(rows: Sequence[LogRow], path: Path) -> tuple[str, Settings]:
     if not summary.good:
         raise ValueError(f"{path}: {summary.verdicts}")
     text = vehicle_text(summary) + SENSORS
+    return text, identified_settings(text)
+
+
+def identified_settings(text: str) -> Settings:
+    """Return the settings that `design` derives from a vehicle.toml."""
     drone = vehicle_toml.parse(text, "identified", "identified")
-    return text, controller_toml.parse(controller_text(drone, "identified"), "identified")
+    return controller_toml.parse(controller_text(drone, "identified"), "identified")

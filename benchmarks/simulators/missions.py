@@ -6,7 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.curves import Bernoulli, Circle, Hover, PositionStep, Trajectory, sample
+from mambo_nmpc.curves import Bernoulli, Circle, CurvePoint, Hover, PositionStep, Trajectory, sample
+from mambo_sil.api.height_hold import HEADING_RATE_RAD_S
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import STEP_TIME_S
 
@@ -14,6 +15,8 @@ STEP_S: Final = 0.01
 HEIGHT_M: Final = 1.0
 AWAY_S: Final = 5.0
 """Time from which a flight on a curve is judged, and at which something happens to a drone."""
+START_S: Final = 4.0
+"""Time in which a planned flight on a curve gets from rest to the rate of the curve."""
 PUSH_S: Final = 5.0
 SETTLED_M: Final = 0.05
 LEAST_HEIGHT_M: Final = 0.05
@@ -43,7 +46,7 @@ class Mission:
     push_m_s2:   force along x over the mass, from `AWAY_S` on for `PUSH_S`.
     weight_m_s2: force downwards over the mass, from `AWAY_S` on.
     score:       of distances from the target (k,), heights (k,) and times (k,).
-    planned_s:   duration of the step as a polynomial, for controllers that need one.
+    planned_s:   duration of the step as a polynomial, for controllers that get a planned one; 0 for curves.
     """
 
     title: str
@@ -58,16 +61,46 @@ class Mission:
     @property
     def times_s(self) -> FloatArray:
         """The times of the commands (k,)."""
-        return STEP_S * np.arange(round(self.duration_s / STEP_S) + 1)
+        return np.asarray(STEP_S * np.arange(round(self.duration_s / STEP_S) + 1), np.float64)
 
     def targets(self, *, planned: bool = False) -> FloatArray:
-        """Return position, velocity, acceleration and heading (k, 10) in NWU; a step may be a polynomial."""
+        """Return position, velocity, acceleration and heading (k, 10) in NWU.
+
+        planned: steps are polynomials, curves begin at rest, and the heading turns at a limited rate.
+        """
         times_s = self.times_s
-        parts = sample(self.trajectory, times_s, "NWU", height_m=HEIGHT_M)
-        if planned and self.planned_s:
-            parts = _planned(parts.position_m[-1], times_s - STEP_TIME_S, self.planned_s)
         heading_rad = np.where(times_s >= AWAY_S, self.heading_rad, 0.0)
+        if not planned:
+            parts = sample(self.trajectory, times_s, "NWU", height_m=HEIGHT_M)
+        else:
+            parts = self._planned_step(times_s) if self.planned_s else self._planned_start(times_s)
+            turned_rad = HEADING_RATE_RAD_S * np.maximum(times_s - AWAY_S, 0.0)
+            heading_rad = np.minimum(turned_rad, heading_rad)
         return np.concatenate([*parts, heading_rad[:, np.newaxis]], axis=1)
+
+    def _planned_step(self, times_s: FloatArray) -> CurvePoint:
+        """Return the step as the polynomial of 7th order in time that is at rest at both ends."""
+        goal_m = sample(self.trajectory, times_s[-1], "NWU", height_m=HEIGHT_M).position_m
+        tau = np.clip((times_s - STEP_TIME_S) / self.planned_s, 0.0, 1.0)[:, np.newaxis]
+        course = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])
+        way_m = goal_m * [1.0, 1.0, 0.0]
+        return CurvePoint(
+            way_m * course(tau) + goal_m * [0.0, 0.0, 1.0],
+            way_m * course.deriv(1)(tau) / self.planned_s,
+            way_m * course.deriv(2)(tau) / self.planned_s**2,
+        )
+
+    def _planned_start(self, times_s: FloatArray) -> CurvePoint:
+        """Return the curve, which begins at rest where it is after half of `START_S`, and catches up."""
+        share = np.minimum(times_s / START_S, 1.0)[:, np.newaxis]
+        rate, rate_1_s = share**2 * (3.0 - 2.0 * share), 6.0 * share * (1.0 - share) / START_S
+        warped_s = START_S * (0.5 + share[:, 0] ** 3 - 0.5 * share[:, 0] ** 4)
+        now = sample(self.trajectory, np.maximum(warped_s, times_s), "NWU", height_m=HEIGHT_M)
+        return CurvePoint(
+            now.position_m,
+            now.velocity_m_s * rate,
+            now.acceleration_m_s2 * rate**2 + now.velocity_m_s * rate_1_s,
+        )
 
     def force_m_s2(self, time_s: float) -> FloatArray:
         """Return the force over the mass (3,)."""
@@ -79,21 +112,11 @@ class Mission:
         target = self.targets()[:, np.newaxis, :2]
         distances_m = np.linalg.norm(flown.position_m[..., :2] - target, axis=-1)
         heights_m = flown.position_m[..., 2]
-        alive = ((heights_m > LEAST_HEIGHT_M) & (flown.level > LARGEST_TILT)).all(axis=0)
+        alive = np.all((heights_m > LEAST_HEIGHT_M) & (flown.level > LARGEST_TILT), axis=0)
         found = (self.score(*pair, self.times_s) for pair in zip(distances_m.T, heights_m.T, strict=True))
         return [
             score if lives and np.isfinite(score) else None for score, lives in zip(found, alive, strict=True)
         ]
-
-
-def _planned(goal_m: FloatArray, since_s: FloatArray, planned_s: float) -> tuple[FloatArray, ...]:
-    """Return a course from the origin to `goal_m` (3,) at rest: the polynomial of 7th order in time."""
-    tau = np.clip(since_s / planned_s, 0.0, 1.0)
-    shape = np.polynomial.Polynomial([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])
-    way_m = goal_m * [1.0, 1.0, 0.0]
-    rates = (shape.deriv(order)(tau) / planned_s**order if order else shape(tau) for order in range(3))
-    course = [rate[:, np.newaxis] * way_m for rate in rates]
-    return course[0] + goal_m * [0.0, 0.0, 1.0], course[1], course[2]
 
 
 def rms_mm(distances_m: FloatArray, heights_m: FloatArray, times_s: FloatArray) -> float:  # noqa: ARG001 - a score

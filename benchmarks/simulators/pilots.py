@@ -1,6 +1,6 @@
 """Who flies: the generated C with different settings, and laws without a model; all hold the height alike."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
@@ -24,7 +24,7 @@ from mambo_sil.flight.controllers.pd import (
 from mambo_sil.flight.names import AltitudeName
 
 HEIGHT: Final = "feedforward"
-"""The altitude loop, that of vehicle `crazyflie`; the integral of `pid` takes the motors to their limit."""
+"""The altitude loop, that of vehicle `crazyflie`; that of `pid` is too stiff for slow rotors."""
 AGE_S: Final = 0.01
 """Age of a state through noise; a true one is not old."""
 
@@ -56,7 +56,7 @@ class Challenger(Protocol):
 
     @property
     def planned(self) -> bool:
-        """Whether its steps are polynomials."""
+        """Whether its targets are planned: `Mission.targets`."""
         ...
 
     def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> Pilot:
@@ -143,7 +143,6 @@ class _LawPilot:
 def laws(drone: VehicleFile) -> dict[str, Challenger]:
     """Return the laws without a model by title."""
     return {
-        "PD": WithoutModel(replace(TEXTBOOK, acceleration_rad_s2_m=0.0), drone),
         "PD with the target's acceleration": WithoutModel(TEXTBOOK, drone),
         "PID with feed-forward, tuned": WithoutModel(None, drone),
     }

@@ -4,7 +4,8 @@
 `cmd_ctatt`, whose gains are those of `SE3Control`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,18 +33,25 @@ CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")
 DRONE: Final = vehicle_toml.read(Path(__file__).parents[1] / "rotorpy_crazyflie.toml")
 MASS_KG: Final = float(quad_params["mass"])
 State = dict[str, Any]
-SE3: Final = None
-"""In place of an challenger: RotorPy's own controller."""
+
+
+@dataclass(frozen=True)
+class Geometric:
+    """RotorPy's own controller."""
+
+    planned: bool = False
 
 
 def fly(
-    challenger: Challenger | None, mission: Mission, seed: int | None
+    challenger: Challenger | Geometric, mission: Mission, seed: int | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return positions (k, 3), cosines of the tilt (k,), commands (k, 4); a state without seed is true."""
-    vehicle = vehicle_for("cmd_motor_speeds" if challenger is SE3 else "cmd_ctatt")
-    targets, times_s = mission.targets(), mission.times_s
+    vehicle = vehicle_for("cmd_motor_speeds" if isinstance(challenger, Geometric) else "cmd_ctatt")
+    targets, times_s = mission.targets(planned=challenger.planned), mission.times_s
     state = _hover(targets[0, :3])
-    pilot = None if challenger is None else challenger.pilot(1, MASS_KG, noisy=seed is not None)
+    pilot = (
+        None if isinstance(challenger, Geometric) else challenger.pilot(1, MASS_KG, noisy=seed is not None)
+    )
     own, suite = SE3Control(quad_params), None if seed is None else _noise(seed, state)
     places, levels, commands = [], [], []
     for target, time_s in zip(targets, times_s, strict=True):
@@ -51,7 +59,7 @@ def fly(
         places.append(true.position_m[0])
         levels.append(float(np.cos(true.angles_rad[0, 0]) * np.cos(true.angles_rad[0, 1])))
         if not _is_flying(places[-1], levels[-1]):
-            state, left = dict.fromkeys(state, np.full(3, np.nan)), len(times_s) - len(places)
+            left = len(times_s) - len(places)
             places += [np.full(3, np.nan)] * left
             levels += [-1.0] * left
             break
@@ -129,7 +137,8 @@ def fly_log() -> list[LogRow]:
         OurSettings(presets.preset("crazyflie"), CRAZYFLIE).pilot(1, MASS_KG, noisy=True),
         _noise(7, state),
     )
-    rows, ned = [], np.array([1.0, -1.0, -1.0])
+    rows: list[LogRow] = []
+    ned = np.array([1.0, -1.0, -1.0])
     for step, target in enumerate(targets):
         seen, _ = _through(suite, _sight(state), state["w"])
         control, command = _ours(pilot, seen, target)
@@ -141,13 +150,19 @@ def fly_log() -> list[LogRow]:
     return rows
 
 
+def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
+    """Yield title, scores and paths of RotorPy's only drone here."""
+    yield "RotorPy", *measure(folder)
+
+
 def measure(folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """Return the scores by challenger and mission, and the paths of the first seed on the circle (k, 3)."""
     text, found = identified(fly_log(), folder / "rotorpy.csv")
     (folder / "rotorpy.toml").write_text(text, "utf-8")
     described = controller_toml.parse(controller_text(DRONE, DRONE.name), DRONE.name)
-    challengers: dict[str, Challenger | None] = {
-        "SE3Control": SE3,
+    challengers: dict[str, Challenger | Geometric] = {
+        "SE3Control": Geometric(),
+        "SE3Control, planned starts and steps": Geometric(planned=True),
         **laws(CRAZYFLIE),
         "ours, preset `crazyflie`": OurSettings(presets.preset("crazyflie"), CRAZYFLIE),
         "ours, `design crazyflie`": OurSettings(Controller.from_vehicle("crazyflie").settings, CRAZYFLIE),
