@@ -2,13 +2,14 @@
 
 Not in the list are figures that take longer, and those that need another machine or package. `firmware` needs
 a clone of the Crazyflie's firmware, which the environment variable CRAZYFLIE_FIRMWARE names. `simulators`
-needs crazyflow and RotorPy; any value of SIMULATORS says that they are installed.
+and `adapters` need crazyflow and RotorPy; any value of SIMULATORS says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import PurePath
 from typing import Final
 
+from benchmarks.evidence.adapter_pictures import FLOWN, draw_adapters, read_adapters
 from benchmarks.evidence.board_tables import (
     compilers,
     faults,
@@ -279,6 +280,20 @@ ITEMS: Final = (
         },
         pictures={f"firmware-{name}.png": f"flights/firmware-{name}.png" for name in ("paths", "events")},
         variable="CRAZYFLIE_FIRMWARE",
+    ),
+    Item(
+        name="adapters",
+        commands=(f"python -m benchmarks.adapters {RESULTS}/adapters/flights",),
+        controllers=("design crazyflie", "design crazyflie-l250"),
+        paths=(
+            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
+            *("benchmarks/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),
+        ),
+        read=read_adapters,
+        tables={},
+        pictures={f"adapters-{name}.png": f"adapters-{name}.png" for name in FLOWN},
+        draw=draw_adapters,
+        variable="SIMULATORS",
     ),
     Item(
         name="simulators",
