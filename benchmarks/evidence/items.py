@@ -47,6 +47,7 @@ from benchmarks.evidence.simulator_tables import (
     SIMULATORS,
     aims,
     read_simulators,
+    summary,
     through_noise,
     unrest,
     with_truth,
@@ -314,6 +315,7 @@ ITEMS: Final = (
         tables={
             "simulators-noise": through_noise,
             "simulators-truth": with_truth,
+            "simulators-summary": summary,
             "simulators-aims": aims,
             "simulators-unrest": unrest,
         },

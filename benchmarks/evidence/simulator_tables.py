@@ -20,6 +20,32 @@ PRESET: Final = "ours, preset `crazyflie`"
 NEAREST: Final = "ours, `design` of the nearest drone"
 BOUNDLESS: Final = "the same without limits"
 FOUND: Final = "ours, `identify`, then `design`"
+FOUND_BOUNDLESS: Final = "identified, without limits"
+OURS: Final = (PRESET, "ours, `design crazyflie`", NEAREST, FOUND)
+"""The four ways to make the C, as a user does."""
+VARIANTS: Final = ("ours", "the same", "identified")
+"""How the titles of ours begin, with those that show what a part is worth."""
+AIMS: Final = (
+    ("eight: RMSE, mm; `design crazyflie-l250`", "eight", NEAREST, ("6", "10")),
+    ("eight; identified", "eight", FOUND, ("2.0", "1.8")),
+    ("circle: RMSE, mm; `design crazyflie-l250`", "circle", NEAREST, ("15", "20")),
+    ("circle; identified", "circle", FOUND, ("4.0", "4.4")),
+    (
+        "step of 1 m: within 5 cm, s; `design crazyflie-l250` without limits",
+        "step",
+        BOUNDLESS,
+        ("1.0", "1.0"),
+    ),
+    ("step; identified, without limits", "step", FOUND_BOUNDLESS, ("1.0", "1.0")),
+    ("step; identified, with limits", "step", FOUND, ("1.05", "1.05")),
+    (
+        "eight, heading by 2 rad: least height, m; `design crazyflie-l250`",
+        "heading",
+        NEAREST,
+        ("0.85", "0.85"),
+    ),
+)
+"""Title, mission, controller, and the aim from first principles and fitted."""
 Cell = Mapping[str, Any]
 
 
@@ -98,22 +124,38 @@ def unrest(figures: Figures) -> str:
 
 
 def aims(figures: Figures) -> str:
-    """Return the figures of cf2x_L250 that were aimed at."""
-    rows = [
-        ("eight: RMSE, mm; by preset, `design`, identified", "eight", (PRESET, NEAREST, FOUND)),
-        ("circle: RMSE, mm; by preset, `design`, identified", "circle", (PRESET, NEAREST, FOUND)),
-        ("step of 1 m: within 5 cm, s; by `design` without limits, with them", "step", (BOUNDLESS, NEAREST)),
-        ("eight, heading by 2 rad: least height, m; by `design`", "heading", (NEAREST,)),
-    ]
-    return table(
-        [
-            {"cf2x_L250, through noise": title}
-            | {
-                drone.partition(", ")[2]: ", ".join(
-                    _number(median(figures[drone][who][mission])) for who in challengers
-                )
-                for drone in L250
-            }
-            for title, mission, challengers in rows
-        ]
-    )
+    """Return the figures of cf2x_L250 that were aimed at, through noise, beside the aims."""
+    rows: list[Row] = []
+    for title, mission, challenger, aimed in AIMS:
+        row = {"cf2x_L250, through noise": title}
+        for drone, aim in zip(L250, aimed, strict=True):
+            model = drone.partition(", ")[2]
+            row |= {f"{model}: aim": aim, model: _number(median(figures[drone][challenger][mission]))}
+        rows.append(row)
+    return table(rows)
+
+
+def summary(figures: Figures) -> str:
+    """Return the best of the others, and the best and the worst of ours, medians through noise."""
+    rows: list[Row] = []
+    for drone, challengers in figures.items():
+        others = [title for title in challengers if not title.startswith(VARIANTS)]
+        for who, titles, is_best in (
+            ("the best of the others", others, True),
+            ("ours, the best", OURS, True),
+            ("ours, the worst", OURS, False),
+        ):
+            row = {"": drone, "median": who}
+            for name, mission in MISSIONS.items():
+                scores = [median(challengers[title][name]) for title in titles]
+                row[mission.title] = _end(name, scores, is_best=is_best)
+            rows.append(row)
+    return table(rows)
+
+
+def _end(mission: str, scores: Sequence[float | None], *, is_best: bool) -> str:
+    """Return the best or the worst of several scores; one that was lost is the worst."""
+    known = [score for score in scores if score is not None]
+    if not known or not (is_best or len(known) == len(scores)):
+        return _number(None)
+    return _number(max(known) if (mission in LARGEST_IS_BEST) == is_best else min(known))

@@ -3,7 +3,20 @@
 import numpy as np
 import pytest
 
-from benchmarks.evidence.simulator_tables import aims, median, through_noise, unrest, with_truth
+from benchmarks.evidence.item import Figures
+from benchmarks.evidence.simulator_tables import (
+    BOUNDLESS,
+    FOUND_BOUNDLESS,
+    L250,
+    OURS,
+    PRESET,
+    aims,
+    median,
+    summary,
+    through_noise,
+    unrest,
+    with_truth,
+)
 from benchmarks.simulators.missions import AWAY_S, MISSIONS, Flight3d, Mission
 from benchmarks.simulators.pilots import Challenger, OurSettings, Sight, laws
 from mambo_codegen.settings import presets
@@ -42,12 +55,14 @@ def test_a_step_is_judged_by_the_time_to_5_cm() -> None:
     assert step.scores(flown(step, (0.06, 0.0, 0.0))) == [None]
 
 
-@pytest.mark.parametrize("name", ["step", "far step"])
-def test_a_planned_step_is_smooth_and_ends_at_rest(name: str) -> None:
-    """Its velocity and acceleration are its derivatives."""
+@pytest.mark.parametrize("name", ["step", "far step", "eight", "circle", "heading"])
+def test_a_planned_target_is_smooth_and_ends_with_the_others(name: str) -> None:
+    """It begins at rest; its velocity and acceleration are its derivatives."""
     mission = MISSIONS[name]
     planned, jump = mission.targets(planned=True), mission.targets()
-    np.testing.assert_allclose(planned[[0, -1]], jump[[0, -1]], atol=1e-9)
+    np.testing.assert_allclose(planned[-1], jump[-1], atol=1e-9)
+    np.testing.assert_allclose(planned[0, 3:9], 0.0, atol=1e-9)
+    assert np.abs(np.diff(planned[:, 9])).max() < 0.041
     for rate, of in ((slice(3, 6), slice(0, 3)), (slice(6, 9), slice(3, 6))):
         np.testing.assert_allclose(np.gradient(planned[:, of], 0.01, axis=0), planned[:, rate], atol=0.05)
 
@@ -90,12 +105,23 @@ def test_tables_show_spread_and_loss() -> None:
     assert "| ours | **4.00 (2.00..5.00, 1 lost)** |" in through_noise(figures)
     assert "| theirs | lost |" in with_truth(figures)
     assert "| ours | 2.00 |" in unrest(figures)
-    challengers = {
-        "ours, preset `crazyflie`": cell,
-        "ours, `design` of the nearest drone": cell,
-        "the same without limits": cell,
-        "ours, `identify`, then `design`": cell,
-    }
-    flights = {who: dict.fromkeys(MISSIONS, score) for who, score in challengers.items()}
-    both = {"cf2x_L250, first principles": flights, "cf2x_L250, fitted": flights}
-    assert aims(both).count("4.00, 4.00, 4.00 | 4.00, 4.00, 4.00") == 2
+
+
+def test_tables_show_best_worst_and_aims() -> None:
+    """Of others and of ours; variants that show what a part is worth are neither."""
+    scores = dict(zip(("Mellinger", *OURS, BOUNDLESS), (5.0, 1.0, 2.0, 3.0, 4.0, 9.0), strict=True))
+    lost = {name: {"noise": [None, 1.0, None]} for name in MISSIONS}
+    flights: Figures = {who: {name: {"noise": [score]} for name in MISSIONS} for who, score in scores.items()}
+    flights |= {FOUND_BOUNDLESS: lost}
+    others, best, worst = (line.split(" | ") for line in summary({"RotorPy": flights}).splitlines()[2:])
+    assert [row[1:3] for row in (others, best, worst)] == [
+        ["the best of the others", "5.00"],
+        ["ours, the best", "1.00"],
+        ["ours, the worst", "4.00"],
+    ]
+    assert [row[-2] for row in (best, worst)] == ["4.00", "1.00"]  # a height
+    crashed = summary({"RotorPy": flights | {PRESET: lost}})
+    assert [line.split(" | ")[2] for line in crashed.splitlines()[2:]] == ["5.00", "2.00", "lost"]
+    text = aims(dict.fromkeys(L250, flights))
+    assert "| eight; identified | 2.0 | 4.00 | 1.8 | 4.00 |" in text
+    assert "| step; identified, without limits | 1.0 | lost | 1.0 | lost |" in text
