@@ -1,5 +1,8 @@
 """The benchmark of simulators: its scores, its laws and its tables; the simulators are not installed here."""
 
+import importlib
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -17,10 +20,12 @@ from benchmarks.evidence.simulator_tables import (
     unrest,
     with_truth,
 )
-from benchmarks.simulators.missions import AWAY_S, MISSIONS, Flight3d, Mission
+from benchmarks.simulators.missions import AWAY_S, MISSIONS, Flight3d, Mission, largest_mm
 from benchmarks.simulators.pilots import Challenger, OurSettings, Sight, laws
 from mambo_codegen.settings import presets
+from mambo_nmpc.curves import Hover
 from mambo_sil.drone.vehicles import vehicle_toml
+from tests.support.tools import require_module
 
 CRAZYFLIE = vehicle_toml.preset("crazyflie")
 
@@ -91,6 +96,20 @@ def test_every_pilot_flies_towards_its_target() -> None:
             assert (command[:, 1] > 0.0).all()  # nose down, in NWU
             assert (command[:, 0] < 0.0).all()
             assert (command[:, 3] > 0.03 * 9.81).all()
+
+
+def test_rotorpy_is_flown_by_its_controller_and_by_ours() -> None:
+    """Both hold a place through noise; ours knows the age of what it sees."""
+    require_module("rotorpy")
+    rotorpy_flights: Any = importlib.import_module("benchmarks.simulators.rotorpy_flights")
+    hover = Mission("hover", Hover(), 2.0, largest_mm)
+    ours = OurSettings(presets.preset("crazyflie"), CRAZYFLIE)
+    for challenger in (rotorpy_flights.Geometric(), ours):
+        position_m, level, commands = rotorpy_flights.fly(challenger, hover, 0)
+        assert position_m.shape == (201, 3)
+        assert commands.shape == (201, 4)
+        assert np.linalg.norm(position_m - [0.0, 0.0, 1.0], axis=1).max() < 0.02
+        assert level.min() > 0.99
 
 
 def test_tables_show_spread_and_loss() -> None:
