@@ -136,20 +136,18 @@ def aims(figures: Figures) -> str:
 
 
 def summary(figures: Figures) -> str:
-    """Return the best of the others, and the best and the worst of ours, medians through noise."""
+    """Return the best of the others, and the best and the worst of ours: medians through noise."""
     rows: list[Row] = []
     for drone, challengers in figures.items():
         others = [title for title in challengers if not title.startswith(VARIANTS)]
-        for who, titles, is_best in (
-            ("the best of the others", others, True),
-            ("ours, the best", OURS, True),
-            ("ours, the worst", OURS, False),
-        ):
-            row = {"": drone, "median": who}
-            for name, mission in MISSIONS.items():
-                scores = [median(challengers[title][name]) for title in titles]
-                row[mission.title] = _end(name, scores, is_best=is_best)
-            rows.append(row)
+        row = {"the best of the others; ours, from best to worst": drone}
+        for name, mission in MISSIONS.items():
+            theirs, ours = (
+                [median(challengers[title][name]) for title in titles] for titles in (others, OURS)
+            )
+            best, worst = (_end(name, ours, is_best=is_best) for is_best in (True, False))
+            row[mission.title] = f"{_end(name, theirs, is_best=True)}; {best}..{worst}"
+        rows.append(row)
     return table(rows)
 
 

@@ -41,7 +41,7 @@ class Flight3d:
 class Mission:
     """A flight that every controller flies.
 
-    title:       with size and rate, the head of a column, which ends with the unit of the score.
+    title:       the head of a column, which ends with the unit of the score.
     heading_rad: step of the heading at `AWAY_S`.
     push_m_s2:   force along x over the mass, from `AWAY_S` on for `PUSH_S`.
     weight_m_s2: force downwards over the mass, from `AWAY_S` on.
@@ -144,16 +144,12 @@ def least_height_m(distances_m: FloatArray, heights_m: FloatArray, times_s: Floa
 
 EIGHT: Final = Bernoulli(2.0, 0.5)
 MISSIONS: Final = {
-    "eight": Mission("eight, 2 m, 0.5 rad/s: RMSE, mm", EIGHT, 20.0, rms_mm),
-    "circle": Mission("circle, 1 m, 1.5 rad/s: RMSE, mm", Circle(1.0, 1.5), 12.0, rms_mm),
-    "fast eight": Mission("eight, 2 m, 1 rad/s: RMSE, mm", Bernoulli(2.0, 1.0), 14.0, rms_mm),
-    "step": Mission("step of 1 m: within 5 cm, s", PositionStep(1.0, 0.0), 6.0, settled_s, planned_s=1.5),
-    "far step": Mission("step of 5 m: within 5 cm, s", PositionStep(5.0, 0.0), 9.0, settled_s, planned_s=4.0),
-    "push": Mission("push of 1 m/s2: largest, mm", Hover(), 12.0, largest_mm, push_m_s2=PUSH_M_S2),
-    "heading": Mission(
-        "eight, heading by 2 rad: least height, m", EIGHT, 10.0, least_height_m, heading_rad=YAW_STEP_RAD
-    ),
-    "payload": Mission(
-        "payload of 15 %: least height, m", EIGHT, 10.0, least_height_m, weight_m_s2=PAYLOAD_SHARE * 9.81
-    ),
+    "eight": Mission("eight, mm", EIGHT, 20.0, rms_mm),
+    "circle": Mission("circle, mm", Circle(1.0, 1.5), 12.0, rms_mm),
+    "fast eight": Mission("fast eight, mm", Bernoulli(2.0, 1.0), 14.0, rms_mm),
+    "step": Mission("step 1 m, s", PositionStep(1.0, 0.0), 6.0, settled_s, planned_s=1.5),
+    "far step": Mission("step 5 m, s", PositionStep(5.0, 0.0), 9.0, settled_s, planned_s=4.0),
+    "push": Mission("push, mm", Hover(), 12.0, largest_mm, push_m_s2=PUSH_M_S2),
+    "heading": Mission("turn, m", EIGHT, 10.0, least_height_m, heading_rad=YAW_STEP_RAD),
+    "payload": Mission("payload, m", EIGHT, 10.0, least_height_m, weight_m_s2=PAYLOAD_SHARE * 9.81),
 }
