@@ -309,7 +309,8 @@ ITEMS: Final = (
                 "sil/mambo_sil/flight/controllers",
             ),
             *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
-            *("benchmarks/simulators", f"{_HERE}/simulator_pictures.py", _STYLE),
+            *("benchmarks/simulators", "benchmarks/rotorpy_crazyflie.toml"),
+            *(f"{_HERE}/simulator_pictures.py", _STYLE),
         ),
         read=read_simulators,
         tables={
