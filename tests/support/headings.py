@@ -102,11 +102,15 @@ def _open_contracts(text: str) -> str:
 
 
 def _items(text: str) -> Mapping[str, list[str]]:
-    """Return declarations and definitions by their name; each begins at the edge of a line."""
+    """Return declarations and definitions by their name; each begins at the edge of a line.
+
+    The name of a static assertion is its own, which nothing reaches, not that of a type whose size it tells.
+    """
     items: dict[str, list[str]] = defaultdict(list)
     for item in re.split(r"^(?=[A-Za-z@])", text, flags=re.MULTILINE):
         plain = re.sub(r"@[^@]*@", "", item)
-        head = plain if plain.startswith("typedef") else re.split(r"[(\[={;]", plain, maxsplit=1)[0]
+        plain = re.sub(r"^(typedef [^{]*)\{[^{}]*\}", r"\1", plain)
+        head = re.split(r"[(\[={;]", plain, maxsplit=1)[0]
         if words := _WORD.findall(head):
             items[words[-1]].append(item)
     return items
