@@ -60,7 +60,7 @@ def reached(its: Subject) -> str:
 def _headings(its: Subject, flags: tuple[str, ...]) -> Report | Result:
     """Return the report of `turn_everywhere`, kept beside the compile cache if nothing is wrong.
 
-    Properties of other functions are left out, since the other proofs have them, and these functions may be of
+    Properties of other functions are left out, since the other proofs have them, and the functions may be of
     this controller alone. A property's place is kept as the text of its line.
     """
     code = reached(its)

@@ -156,8 +156,8 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     """Every promise of the driver holds, and what Frama-C said stays as evidence.
 
     With float64, whose C is that of float32 with another type, one preset of a 1-norm (`test_quadratic` has
-    others of a quadratic cost); in fixed point not that which differs from another by two signs. One is checked
-    as a user does it; of the others all but `tests.support.headings` leaves out.
+    settings of a quadratic cost); in fixed point not that which differs from another by two signs. One is
+    checked as a user does it; of the others all but `tests.support.headings` leaves out.
     """
     its = subject(of_scalar(name, scalar), tmp_path)
     whole = (name, scalar) == ("mambo", "float32")

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -108,6 +109,25 @@ AT_ONCE = (
     ("the model has no limit", "a bad input leaves the command unset"),
 )
 """Faults that one proof shows at once; each of the others has a proof of its own."""
+
+
+class Options(NamedTuple):
+    """What changes the C of a quadratic cost; without a limit of speed there is none at all."""
+
+    scalar: str
+    ramp_s: float
+    attitude: str
+    acceleration: str
+    speed_m_s: float
+
+
+OTHERS = [
+    Options("float32", 0.0, "measured", "given", 2.0),
+    Options("float64", 0.0, "predicted", "none", 5.0),
+    Options("float64", 0.0, "measured", "tracked", 0.0),
+    Options("float64", 0.4, "measured", "none", 0.0),
+    Options("float32", 0.4, "predicted", "given", 0.0),
+]
 WITH_LIMITS = {
     "a refused target is used",
     "the command leaves the tilt limit",
@@ -203,34 +223,23 @@ def test_a_check_passes(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("scalar", "ramp_s", "attitude", "acceleration", "speed_m_s"),
-    [
-        ("float32", 0.0, "measured", "given", 2.0),
-        ("float64", 0.0, "predicted", "none", 5.0),
-        ("float64", 0.0, "measured", "tracked", 0.0),
-        ("float64", 0.4, "measured", "none", 0.0),
-        ("float32", 0.4, "predicted", "given", 0.0),
-    ],
-)
-def test_other_settings_are_proven(
-    scalar: str, ramp_s: float, attitude: str, acceleration: str, speed_m_s: float, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("chosen", OTHERS, ids=lambda chosen: " ".join(map(str, chosen)))
+def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     """One or two moves, a measured attitude of old measurements, each acceleration, with and without limits.
 
     With the presets, any two of these options occur together.
     """
     require("frama-c", "frama-c-base")
-    document = quadratic_settings(scalar).model_dump()
-    document["horizon"]["ramp_s"] = ramp_s
-    document["model"]["attitude"] = attitude
-    document["observer"]["age_s"] = 0.03 if attitude == "measured" else 0.0
-    document["target"]["acceleration"] = acceleration
-    if acceleration != "tracked":
+    document = quadratic_settings(chosen.scalar).model_dump()
+    document["horizon"]["ramp_s"] = chosen.ramp_s
+    document["model"]["attitude"] = chosen.attitude
+    document["observer"]["age_s"] = 0.03 if chosen.attitude == "measured" else 0.0
+    document["target"]["acceleration"] = chosen.acceleration
+    if chosen.acceleration != "tracked":
         document["damping"]["roll_rate_feedback_s"] = 0.0
-    document["limits"]["speed_m_s"] = speed_m_s
+    document["limits"]["speed_m_s"] = chosen.speed_m_s
     settings = Settings.model_validate(document)
-    result = headings.check(subject(settings if speed_m_s else without_limits(settings), tmp_path))
+    result = headings.check(subject(settings if chosen.speed_m_s else without_limits(settings), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
