@@ -6,7 +6,7 @@
 # make generated  write the committed bundles in generated/ anew
 # make docs       build the manual; its first page is build/docs/index.html
 # make evidence   fly and measure anew those tables and pictures of docs/evidence that are older than the code
-# make bench      time flights against RotorPy, fly its Crazyflie, time updates against peers; results in build/bench
+# make bench      time flights against RotorPy, and updates against peers; results in build/bench
 # make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
 
@@ -84,7 +84,6 @@ evidence: $(SETUP)
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
 	$(BIN)/python -m benchmarks.commands
-	$(BIN)/python -m benchmarks.rotorpy_flights
 	$(BIN)/python -m benchmarks.times
 	$(BIN)/python -m benchmarks.quadratic_times
 

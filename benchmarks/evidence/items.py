@@ -1,13 +1,15 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
 Not in the list are figures that take longer, and those that need another machine or package. `firmware` needs
-a clone of the Crazyflie's firmware, which the environment variable CRAZYFLIE_FIRMWARE names.
+a clone of the Crazyflie's firmware, which the environment variable CRAZYFLIE_FIRMWARE names. `simulators`
+and `adapters` need crazyflow and RotorPy; any value of SIMULATORS says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import PurePath
 from typing import Final
 
+from benchmarks.evidence.adapter_pictures import FLOWN, draw_adapters, read_adapters
 from benchmarks.evidence.board_tables import (
     compilers,
     faults,
@@ -40,6 +42,16 @@ from benchmarks.evidence.first_picture import draw_first_picture, first_commands
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.pictures import draw_envelope
+from benchmarks.evidence.simulator_pictures import draw_simulators
+from benchmarks.evidence.simulator_tables import (
+    SIMULATORS,
+    aims,
+    read_simulators,
+    summary,
+    through_noise,
+    unrest,
+    with_truth,
+)
 from benchmarks.evidence.tables import (
     CONTROLLERS,
     conditions,
@@ -278,5 +290,47 @@ ITEMS: Final = (
         },
         pictures={f"firmware-{name}.png": f"flights/firmware-{name}.png" for name in ("paths", "events")},
         variable="CRAZYFLIE_FIRMWARE",
+    ),
+    Item(
+        name="adapters",
+        commands=(f"python -m benchmarks.adapters {RESULTS}/adapters/flights",),
+        controllers=("design crazyflie", "design crazyflie-l250"),
+        paths=(
+            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
+            *("benchmarks/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),
+        ),
+        read=read_adapters,
+        tables={},
+        pictures={f"adapters-{name}.png": f"adapters-{name}.png" for name in FLOWN},
+        draw=draw_adapters,
+        variable="SIMULATORS",
+    ),
+    Item(
+        name="simulators",
+        commands=tuple(
+            f"python -m benchmarks.simulators {name} {RESULTS}/simulators/{name}" for name in SIMULATORS
+        ),
+        controllers=("crazyflie", *(f"design crazyflie{kind}" for kind in ("", "-l250", "-brushless"))),
+        paths=(
+            *(
+                "sil/mambo_sil/api",
+                "sil/mambo_sil/flight/altitude_loops.py",
+                "sil/mambo_sil/flight/controllers",
+            ),
+            *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
+            *("benchmarks/simulators", "benchmarks/rotorpy_crazyflie.toml"),
+            *(f"{_HERE}/simulator_pictures.py", _STYLE),
+        ),
+        read=read_simulators,
+        tables={
+            "simulators-noise": through_noise,
+            "simulators-truth": with_truth,
+            "simulators-summary": summary,
+            "simulators-aims": aims,
+            "simulators-unrest": unrest,
+        },
+        pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in SIMULATORS},
+        draw=draw_simulators,
+        variable="SIMULATORS",
     ),
 )

@@ -60,10 +60,11 @@ def reached(its: Subject) -> str:
 def _headings(its: Subject, flags: tuple[str, ...]) -> Report | Result:
     """Return the report of `turn_everywhere`, kept beside the compile cache if nothing is wrong.
 
-    Properties of other functions are left out, since the other proofs have them. A property's place is kept
-    as the text of its line.
+    Properties of other functions are left out, since the other proofs have them, and the functions may be of
+    this controller alone. A property's place is kept as the text of its line.
     """
-    text = "\n".join([str(command_version("frama-c")), *flags, reached(its)])
+    code = reached(its)
+    text = "\n".join([str(command_version("frama-c")), *flags, code])
     file = Path(os.environ["XDG_CACHE_HOME"]) / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
     lines = (its.bundle / _DRIVER).read_text("utf-8").splitlines()
     if not file.is_file():
@@ -73,11 +74,12 @@ def _headings(its: Subject, flags: tuple[str, ...]) -> Report | Result:
         known = [one for one in report.properties if one.status != "Dead"]
         if any(one.status not in ("Valid", "Considered valid") for one in known):
             return report
-        stored = [asdict(one) | {"place": _line(lines, one.place)} for one in known]
+        own = [one for one in known if one.function in _WORD.findall(code)]
+        stored = [asdict(one) | {"place": _line(lines, one.place)} for one in own]
         file.parent.mkdir(parents=True, exist_ok=True)
-        own = file.with_suffix(f".{os.getpid()}")
-        own.write_text(json.dumps([report.statements, stored]), "utf-8")
-        own.rename(file)
+        draft = file.with_suffix(f".{os.getpid()}")
+        draft.write_text(json.dumps([report.statements, stored]), "utf-8")
+        draft.rename(file)
     statements, stored = json.loads(file.read_text("utf-8"))
     properties = [Property(**one) for one in stored]
     return Report(tuple(replace(one, place=_place(lines, one.place)) for one in properties), statements)
@@ -102,11 +104,15 @@ def _open_contracts(text: str) -> str:
 
 
 def _items(text: str) -> Mapping[str, list[str]]:
-    """Return declarations and definitions by their name; each begins at the edge of a line."""
+    """Return declarations and definitions by their name; each begins at the edge of a line.
+
+    The name of a static assertion is its own, which nothing reaches, not that of a type whose size it tells.
+    """
     items: dict[str, list[str]] = defaultdict(list)
     for item in re.split(r"^(?=[A-Za-z@])", text, flags=re.MULTILINE):
         plain = re.sub(r"@[^@]*@", "", item)
-        head = plain if plain.startswith("typedef") else re.split(r"[(\[={;]", plain, maxsplit=1)[0]
+        plain = re.sub(r"^(typedef [^{]*)\{[^{}]*\}", r"\1", plain)
+        head = re.split(r"[(\[={;]", plain, maxsplit=1)[0]
         if words := _WORD.findall(head):
             items[words[-1]].append(item)
     return items

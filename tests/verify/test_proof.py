@@ -7,6 +7,7 @@ import pytest
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.proof import check, read_properties
@@ -128,6 +129,8 @@ FIXED_FAULTS = {
 FIXED_AT_ONCE = (("the heading goes unchecked", "errors have a bit too many"),)
 FEW_HEADINGS = Harm(DRIVER, r"quadrant = -653; quadrant <= 653", "quadrant = 0; quadrant <= 0")
 """An alarm for one heading is an alarm for all."""
+MOST_WORK = 20
+"""Moves times iterations of a search that Frama-C interprets in seconds."""
 
 
 @pytest.fixture(autouse=True)
@@ -145,16 +148,16 @@ def of_scalar(name: str, scalar: str) -> Settings:
     ("name", "scalar"),
     [
         *((name, "float32") for name in presets.names()),
-        *((name, "float64") for name in ("mambo", "mambo-1norm")),
+        ("mambo-1norm", "float64"),
         *((name, "fixed") for name in presets.names() if name != "table1-printed"),
     ],
 )
 def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     """Every promise of the driver holds, and what Frama-C said stays as evidence.
 
-    With float64, whose C is that of float32 with another type, one preset of each method; in fixed point not
-    that which differs from another by two signs. One is checked as a user does it; of the others all but
-    `tests.support.headings` leaves out.
+    With float64, whose C is that of float32 with another type, one preset of a 1-norm (`test_quadratic` has
+    settings of a quadratic cost); in fixed point not that which differs from another by two signs. One is
+    checked as a user does it; of the others all but `tests.support.headings` leaves out.
     """
     its = subject(of_scalar(name, scalar), tmp_path)
     whole = (name, scalar) == ("mambo", "float32")
@@ -187,9 +190,15 @@ def test_a_fault_of_fixed_point_raises_an_alarm(names: tuple[str, ...], tmp_path
 @pytest.mark.long
 @pytest.mark.parametrize("index", [0, 1, 2, 3, 5, 6, 9, 14])
 def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
-    """Horizons, variants, warm starts and limits change; the options of the proof do not."""
+    """Horizons, variants, warm starts and limits change; the options of the proof do not.
+
+    A long search ends early, since all its iterations are the same C; the presets and case 14 have 5 and 10.
+    """
     scalar = ("float32", "float64", "fixed")[index % 3]
-    result = headings.check(subject(settings_case(index, scalar), tmp_path))
+    settings = settings_case(index, scalar)
+    if settings.horizon.control * settings.optimizer.iterations > MOST_WORK:
+        settings = with_option(settings, "optimizer.iterations", 3)
+    result = headings.check(subject(settings, tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
