@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.curves import Bernoulli, Circle, CurvePoint, Hover, PositionStep, Trajectory, sample
-from mambo_sil.api.height_hold import HEADING_RATE_RAD_S
+from mambo_sil.api.heading import HEADING_RATE_RAD_S
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import STEP_TIME_S
 

@@ -9,12 +9,14 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.heading import Heading
 from mambo_sil.api.height_hold import HeightHold
 from mambo_sil.api.options import ControllerOptions, with_options
 from mambo_sil.api.outcome import StepOutcome
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import (
     PdFeedForwardController,
     PdGains,
@@ -124,19 +126,23 @@ class WithoutModel:
         law: Law = PidFeedForwardController(pid_gains()["crazyflie"], drones)
         if self.gains is not None:
             law = PdFeedForwardController(self.gains)
-        return _LawPilot(law, HeightHold(HEIGHT, self.drone, presets.preset("crazyflie"), drones), mass_kg)
+        settings = presets.preset("crazyflie")
+        heading = Heading(CompiledController(settings, drones))
+        return _LawPilot(law, HeightHold(HEIGHT, self.drone, settings, drones), heading, mass_kg)
 
 
 @dataclass(frozen=True, eq=False)
 class _LawPilot:
     law: Law
     hold: HeightHold
+    heading: Heading
     mass_kg: float
 
     def command(self, seen: Sight, target: FloatArray) -> FloatArray:
         state, goal = state_of(seen), goal_of(target, len(seen.position_m))
         assert goal.acceleration_m_s2 is not None
-        thrust_m_s2, yaw_rad = self.hold.step(state, goal)
+        thrust_m_s2 = self.hold.step(state, goal)
+        yaw_rad = self.heading.turn(state.attitude_rad[:, 2], goal.yaw_rad)
         places = state.position_m[:, :2], state.velocity_m_s[:, :2], state.attitude_rad
         aims = goal.position_m[:, :2], goal.velocity_m_s[:, :2], goal.acceleration_m_s2[:, :2]
         outcome = self.law.step(np.concatenate(places, axis=1), np.concatenate(aims, axis=1), thrust_m_s2)
