@@ -16,6 +16,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library, ffi
 from tests.support.bundles import place
 from tests.support.extension import build_extension
+from tests.support.heights import height_settings
 from tests.support.quadratic import CORNER_SETTINGS, Array, quadratic_case
 from tests.support.strict_builds import built
 from tests.support.tools import require, toolchain
@@ -58,6 +59,13 @@ def test_another_prefix_passes_the_strictest_build_and_the_self_test(compiler: s
     """Under a prefix of two words."""
     settings = with_option(quadratic_case(EVERYTHING, "float32"), "code.prefix", "x_axis")
     library = built(settings, tmp_path, compiler)
+    assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
+
+
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_a_height_passes_the_strictest_build_and_the_self_test(scalar: str, tmp_path: Path) -> None:
+    """With the C that Python and the engine call."""
+    library = built(height_settings(scalar), tmp_path, "gcc")
     assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
 
 

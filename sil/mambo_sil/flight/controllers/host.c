@@ -152,7 +152,7 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     }
     measured.height_m = NUMBER(state[7], POSITION);
     measured.climb_m_s = NUMBER(state[8], VELOCITY);
-    measured.grounded = state[9] != 0.0;
+    measured.grounded = state[9] != (double)0;
     wanted.height_m = NUMBER(target[6], POSITION);
     wanted.climb_m_s = NUMBER(target[7], VELOCITY);
 #ifdef NMPC_HAS_TARGET_ACCELERATION
