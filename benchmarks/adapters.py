@@ -45,7 +45,7 @@ def in_crazyflow() -> Path3d:
 
 def in_rotorpy() -> Path3d:
     """Fly RotorPy's circle from the ground."""
-    controller = Controller.from_vehicle("crazyflie", height="feedforward", age_s=0.0)
+    controller = Controller.from_vehicle("crazyflie", age_s=0.0)
     flight = Environment(
         Multirotor(quad_params, control_abstraction="cmd_ctatt"),
         RotorpyController(controller, quad_params["mass"]),
