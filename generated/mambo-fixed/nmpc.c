@@ -1583,6 +1583,7 @@ const char *nmpc_version(void)
 #define NMPC_YAW_SCALE 1.048576e+06f
 #define NMPC_THRUST_SCALE 3.3554432e+07f
 #define NMPC_ANGLE_UNIT 2.9802322e-08f
+#define NMPC_YAW_UNIT 9.536743e-07f
 #define NMPC_POSITION_UNIT 3.8146973e-06f
 #define NMPC_VELOCITY_UNIT 1.1920929e-07f
 #define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
@@ -1739,4 +1740,13 @@ nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *lim
     }
     fixed_limits.tilt_rad = quantize(limits->tilt_rad, NMPC_ANGLE_SCALE);
     return nmpc_set_limits(self, &fixed_limits);
+}
+
+float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad)
+{
+    const nmpc_real_t slewed_rad = nmpc_slew_heading(quantize(previous_rad, NMPC_YAW_SCALE),
+                                                     quantize(wanted_rad, NMPC_YAW_SCALE),
+                                                     quantize(most_change_rad, NMPC_YAW_SCALE));
+
+    return (float)slewed_rad * NMPC_YAW_UNIT;
 }

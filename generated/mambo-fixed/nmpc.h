@@ -370,7 +370,7 @@ typedef struct {
     float tilt_rad;
 } nmpc_float_limits_t;
 
-/* nmpc_step(), nmpc_reset(), nmpc_set_command() and nmpc_last_estimate() with floats, which are rounded to the
+/* nmpc_step(), nmpc_reset(), nmpc_set_command(), nmpc_last_estimate() and nmpc_slew_heading() with floats, which are rounded to the
  * nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
  * outside of every range and so refused, as in nmpc.h. */
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
@@ -378,6 +378,7 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate);
+float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad);
 
 /* nmpc_default_limits() and nmpc_set_limits() with floats. */
 void nmpc_float_default_limits(nmpc_float_limits_t *limits);

@@ -13,12 +13,12 @@ from mambo_codegen.settings.toml_file import PRESETS
 
 def departures(settings: Settings) -> dict[str, Any]:
     """Return {"section.key": value} of what differs from the defaults."""
-    defaults = Settings().model_dump()
+    defaults = Settings().model_dump(exclude_none=True)
     return {
         f"{section}.{name}": value
-        for section, values in settings.model_dump().items()
+        for section, values in settings.model_dump(exclude_none=True).items()
         for name, value in values.items()
-        if value != defaults[section][name]
+        if value != defaults.get(section, {}).get(name)
     }
 
 

@@ -129,6 +129,7 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in changes
     },
     ("faults.c", "break;", "left out #6"): "the last case",
+    ("faults.c", "for (i = 0; i < 10; i++) {", "10 -> 9"): "the other numbers alone refuse a state",
     **{
         (
             "loop.c",
