@@ -233,8 +233,10 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     words = f"{THRUST_SHARE:g} of {thrust_m_s2:.3g}, altitude.thrust_max_n over body.mass_kg"
     yield Derived("height", "thrust_max_m_s2", most_m_s2, words)
     descent_m_s = _round(DESCENT_S * (most_m_s2 - GRAVITY_M_S2))
-    if descent_m_s < DESCENT_M_S:
-        yield Derived("height", "descent_m_s", descent_m_s, "What the largest thrust brakes in time")
+    words = "What the largest thrust brakes in time" + (
+        "" if descent_m_s < DESCENT_M_S else f", at most {DESCENT_M_S:g}"
+    )
+    yield Derived("height", "descent_m_s", min(descent_m_s, DESCENT_M_S), words)
 
 
 def _round(value: float) -> float:
