@@ -87,7 +87,7 @@ def shell(*command: str | Path, folder: Path) -> str:
 
 
 def dialects_by_turns() -> list[tuple[str, str]]:
-    """Return names of settings and dialects: presets, and one in every scalar type, with all, others with two."""
+    """Return names of settings and dialects: all for presets, and for one in every scalar type; else two."""
     turns, pairs = itertools.cycle(DIALECTS), []
     for name in SETTINGS:
         whole = name in presets.names() or name.endswith(" mambo")
