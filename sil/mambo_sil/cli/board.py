@@ -28,6 +28,7 @@ from mambo_sil.cli.options import (
     load_boards,
     show,
 )
+from mambo_sil.results.terminal import sentence
 
 if TYPE_CHECKING:
     from mambo_codegen.settings.model import Settings
@@ -55,6 +56,8 @@ def footprint(
     as_json: AsJson = False,
 ) -> None:
     """Measure flash, RAM, stack and instructions on boards; exit 1 if one exceeds its budget.
+
+    Before you choose a board, and in a CI that keeps its budget.
 
     With --port also cycles and stack of the same steps on the board there; exit 1 if its bits differ.
     """
@@ -124,10 +127,13 @@ def sweep(
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
-    """Vary one or two settings; measure footprint and tracking error of each controller."""
+    """Vary one or two settings; measure footprint and tracking error of each controller.
+
+    When a controller does not fit its board, or to see what a setting costs.
+    """
     from mambo_codegen import boards
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
-    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
+    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, points_text, write_points
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.campaign.executors import processes
@@ -161,7 +167,7 @@ def sweep(
         )
         summary.write(folder)
     shown = ([] if best is None else [best]) if fit else points
-    text = "\n".join(map(point_text, shown)) or f"nothing fits {chosen.title}"
+    text = points_text(shown) if shown else f"nothing fits {chosen.title}"
     show(summary, text, as_json=as_json)
     typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
     if fit and best is None:
@@ -231,7 +237,10 @@ def same_bits(
     baud: Baud = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
+    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs.
+
+    When you change compiler, flags or board: whether the C still computes the same bits.
+    """
     from mambo_codegen.bundle.digest import TICKS, episode_count
     from mambo_codegen.methods import method_of
     from mambo_sil.board.footprint.build_digests import (
@@ -273,10 +282,7 @@ def same_bits(
         document = {"steps": total, "same": not others, "builds": [asdict(one) for one in found]}
         typer.echo(json.dumps(document, indent=2))
     else:
-        typer.echo(
-            f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference over {total} "
-            "self-test steps; "
-            f"{len(found) - len(ran)} not run"
-        )
+        answer = f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference"
+        typer.echo(sentence(f"{answer} over {total} self-test steps; {len(found) - len(ran)} not run"))
     if others:
         raise typer.Exit(1)

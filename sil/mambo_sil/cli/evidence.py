@@ -40,7 +40,10 @@ def verify(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Generate the C of a controller, prove and test it, and keep the evidence."""
+    """Generate the C of a controller, prove and test it, and keep the evidence.
+
+    Before a release, or for somebody who must be shown that the C has no run-time error.
+    """
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
     from mambo_sil.cli.progress import counting_bar
@@ -126,7 +129,10 @@ def regress(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline."""
+    """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline.
+
+    After every change of settings, and in a CI: whether everything flies that flew before.
+    """
     from mambo_sil.experiment.campaign.campaign_file import load_entrant
     from mambo_sil.experiment.regress.baseline import (
         baseline_path,
@@ -207,7 +213,10 @@ def table2(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims."""
+    """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims.
+
+    For readers of the paper; nothing else needs it.
+    """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.experiment.table2.table2 import (
         PRESETS,
@@ -240,17 +249,22 @@ def table2(
 
 def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.experiment.table2.sensed import PRESETS, SensedSummary, fly_sensed, text
+    from mambo_sil.experiment.table2.sensed import (
+        PRESETS,
+        SensedSummary,
+        fly_sensed,
+        sensed_markdown,
+        sensed_text,
+    )
     from mambo_sil.results.folders import new_results
 
     settings = {name: load(name, scalar) for name in PRESETS}
     with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
             summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
-        table = text(summary.rows)
-        (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
+        (folder / SENSED_TABLE).write_text(sensed_markdown(summary.rows) + "\n", "utf-8")
         summary.write(folder)
-    show(summary, table, as_json=as_json)
+    show(summary, sensed_text(summary.rows), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)
 
 
@@ -265,7 +279,10 @@ def report(
     ] = Path("report.html"),
     as_json: AsJson = False,
 ) -> None:
-    """Collect results on one HTML page that needs no network and no other file."""
+    """Collect results on one HTML page that needs no network and no other file.
+
+    To show results to somebody, or to keep them.
+    """
     from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 

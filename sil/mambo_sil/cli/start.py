@@ -22,7 +22,10 @@ def init(
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
 ) -> None:
-    """Write a controller.toml that holds and explains every setting."""
+    """Write a controller.toml that holds and explains every setting.
+
+    To begin with settings of your own.
+    """
     from mambo_codegen.settings import controller_toml, presets
     from mambo_codegen.settings.toml_file import PRESETS
 
@@ -33,7 +36,10 @@ def init(
 
 
 def doctor(*, as_json: AsJson = False) -> None:
-    """List which compilers, emulators and analysers are installed, and what needs those that are missing."""
+    """List which compilers, emulators and analysers are installed, and what needs those that are missing.
+
+    When a command says that a tool is missing.
+    """
     from mambo_sil.board.firmware.tool_report import doctor_text, examine
 
     findings = examine()
@@ -57,7 +63,10 @@ def playground(
     vehicle: Drone = "mambo",
     as_json: AsJson = False,
 ) -> None:
-    """Write an HTML page, without network, in which the generated C flies a simulated drone in real time."""
+    """Write an HTML page, without network, in which the generated C flies a simulated drone in real time.
+
+    To see how controllers fly before you read a figure.
+    """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers

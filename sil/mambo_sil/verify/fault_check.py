@@ -8,7 +8,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.experiment.faults.fault_flights import STRAY_M, End, Verdict, fly_faults
-from mambo_sil.experiment.faults.faults_report import table, write_csv
+from mambo_sil.experiment.faults.faults_report import faults_markdown, write_csv
 from mambo_sil.experiment.faults.scenarios import TO_THE_END, scenarios
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library, load_library
@@ -20,7 +20,7 @@ def check(subject: Subject) -> Result:
     """Fly with every fault; raises BuildError, CacheError and FlightError."""
     settings = subject.settings
     verdicts = fly_faults(settings, partial(controller, subject))
-    (subject.folder / "faults.md").write_text(table(verdicts) + "\n", "utf-8")
+    (subject.folder / "faults.md").write_text(faults_markdown(verdicts) + "\n", "utf-8")
     write_csv(verdicts, subject.folder / "faults.csv")
     return replace(judge(verdicts, settings), tools={"compiler": host_toolchain().identity().splitlines()[0]})
 

@@ -12,6 +12,7 @@ from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.results.html_page import render_page
 from mambo_sil.results.summary import ReportedSummary, Section
+from mambo_sil.results.terminal import sentence
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
 
@@ -63,7 +64,7 @@ def verdict(found: Sequence[Verified]) -> CheckOutcome:
 
 def line(one: Verified) -> str:
     """Format one check as a line."""
-    return f"{one.name:12}{one.outcome:12}{one.evidence}"
+    return sentence(f"{one.name:12}{one.outcome:12}{one.evidence}", " " * 24)
 
 
 def closing(found: Sequence[Verified]) -> str:
@@ -71,7 +72,8 @@ def closing(found: Sequence[Verified]) -> str:
     counted = Counter(one.outcome for one in found)
     counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
     left_out = _left_out(found)
-    return f"verdict: {verdict(found)} ({counts})" + (f"; not run: {', '.join(left_out)}" if left_out else "")
+    said = f"verdict: {verdict(found)} ({counts})"
+    return sentence(f"{said}; not run: {', '.join(left_out)}" if left_out else said)
 
 
 def summarise(found: Sequence[Verified], source: str, settings: Settings) -> VerifySummary:

@@ -131,8 +131,8 @@ def test_the_command_writes_table_and_pictures_and_answers_with_the_closest(tmp_
     """The default preset with two response times, the slower of which settings refuse."""
     board_builder("crazyflie")
     said, _ = run("sweep", "--vary", "cost.response_time_s=0.2:3:2", "--fit", "-o", "out")
-    assert said.startswith("cost.response_time_s 0.2  flash ")
-    assert len(said.splitlines()) == 1
+    assert said.startswith("1 of 1 controllers fit\nclosest: cost.response_time_s 0.2, IAE ")
+    assert len(said.splitlines()) == 5
     out = tmp_path / "out"
     assert {path.name for path in out.iterdir()} == {"sweep.csv", "sweep.png", "sweep.svg", "summary.json"}
     summary = json.loads((out / "summary.json").read_text("utf-8"))

@@ -31,7 +31,7 @@ from mambo_sil.experiment.faults.fault import (
     shift_yaw,
 )
 from mambo_sil.experiment.faults.fault_flights import End, Verdict, fly_faults
-from mambo_sil.experiment.faults.faults_report import table
+from mambo_sil.experiment.faults.faults_report import faults_markdown
 from mambo_sil.experiment.faults.injection import (
     Applied,
     FaultyController,
@@ -360,7 +360,7 @@ LINES
 def test_the_table_has_one_row_per_fault() -> None:
     """Both courses are side by side; a column for both shows the worse."""
     worse = replace(VERDICT, largest_command_rad=0.35, saturated_share=0.5, end=End.AWAY)
-    text = table([VERDICT, replace(worse, course="hover")])
+    text = faults_markdown([VERDICT, replace(worse, course="hover")])
     assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
     assert "eight 0.100 m, hover 0.100 m" in text
 

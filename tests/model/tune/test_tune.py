@@ -161,7 +161,7 @@ def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     said, talk = run("tune", str(source), "--trials", str(TRIALS), "-o", str(folder))
-    assert [line.split()[0] for line in said.splitlines()] == ["base", "chosen", "chosen"]
+    assert [line.split()[0] for line in said.splitlines()] == ["trial", "base", "chosen", "chosen", "least"]
     assert talk.count("\n") == 1
     assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
 

@@ -13,7 +13,9 @@ from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv,
 from mambo_sil.model.tune.study import FinishedTrial, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
 from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Summary
+from mambo_sil.results.terminal import sentence, table
 
 CONTROLLER: Final = "controller.toml"
 FRONT: Final = "front"
@@ -75,13 +77,19 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
 def tune_text(summary: TuneSummary) -> str:
     """Return base and chosen trial as text, and the rule of the choice."""
     named = {"base": summary.base, "chosen": summary.chosen}
-    lines = [
-        f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
-        f"{one.command_variation_rad:9.4g} rad per update   {one.crashed} of {summary.flights} crashed"
+    rows = [
+        (
+            name,
+            str(one.number),
+            digits(one.iae_m_s),
+            digits(one.command_variation_rad),
+            f"{one.crashed} of {summary.flights}",
+        )
         for name, one in named.items()
         if one is not None
     ]
-    return "\n".join([*lines, f"chosen by the rule: {summary.rule}"])
+    heads = ("", "trial", "IAE, m s", "command variation, rad", "crashed")
+    return "\n".join([*table(heads, rows), sentence(f"chosen by the rule: {summary.rule}")])
 
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:
