@@ -30,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 VOID = {"meta", "input", "br", "img", "circle", "line", "path", "rect", "use"}
 SEEN = {
-    "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
+    "fly": ("largest error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
     "repeat": ("Repetition: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
     "table2": (

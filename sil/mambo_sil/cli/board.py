@@ -28,7 +28,6 @@ from mambo_sil.cli.options import (
     load_boards,
     show,
 )
-from mambo_sil.results.terminal import sentence
 
 if TYPE_CHECKING:
     from mambo_codegen.settings.model import Settings
@@ -244,8 +243,8 @@ def same_bits(
     from mambo_codegen.bundle.digest import TICKS, episode_count
     from mambo_codegen.methods import method_of
     from mambo_sil.board.footprint.build_digests import (
-        REFERENCE,
         BuildDigest,
+        builds_text,
         count_builds,
         run_everywhere,
         run_on_board,
@@ -271,18 +270,12 @@ def same_bits(
             found.append(result)
             if port is None:
                 progress(len(found) / count_builds(chosen))
-            if not as_json:
-                what = result.reason if result.digest is None else result.digest
-                typer.echo(f"{result.where:12}{result.compiler:26}{result.optimisation:5}{what}")
     total = count * TICKS
-    reference = next(result.digest for result in found if result.where == REFERENCE)
-    ran = [result for result in found if result.digest is not None]
-    others = [result for result in ran if result.digest != reference]
+    same = all(one.digest in (None, found[0].digest) for one in found)
     if as_json:
-        document = {"steps": total, "same": not others, "builds": [asdict(one) for one in found]}
+        document = {"steps": total, "same": same, "builds": [asdict(one) for one in found]}
         typer.echo(json.dumps(document, indent=2))
     else:
-        answer = f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference"
-        typer.echo(sentence(f"{answer} over {total} self-test steps; {len(found) - len(ran)} not run"))
-    if others:
+        typer.echo(builds_text(found, source, total))
+    if not same:
         raise typer.Exit(1)

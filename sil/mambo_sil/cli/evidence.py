@@ -50,7 +50,7 @@ def verify(
     from mambo_sil.results.folders import SUMMARY, digests, new_results
     from mambo_sil.results.scratch import check_tmpdir
     from mambo_sil.verify.check import CheckOutcome
-    from mambo_sil.verify.verify_report import PAGE, VerifySummary, closing, page, summarise
+    from mambo_sil.verify.verify_report import PAGE, VerifySummary, page, summarise, verify_text
 
     settings = load(source, scalar)
     chosen = _chosen_checks(only)
@@ -61,12 +61,12 @@ def verify(
     ):
         folder = place.resolve()
         bundle.write(render(settings), folder / CONTROLLER)
-        found = _run_checks(chosen, settings, folder, bar, aloud=not as_json)
+        found = _run_checks(chosen, settings, folder, bar)
         summary = summarise(found, source, settings)
         (folder / PAGE).write_text(page(summary), "utf-8")
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show(summary, closing(found), as_json=as_json)
+    show(summary, verify_text(summary), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {PAGE}, {SUMMARY}, {CONTROLLER}, {REPORTS}", err=True)
     if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
@@ -86,12 +86,12 @@ def _chosen_checks(only: str | None) -> "Sequence[Entry]":
 
 
 def _run_checks(
-    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar", *, aloud: bool
+    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar"
 ) -> "list[Verified]":
-    """Run the checks one after the other, each in its own folder; with `aloud` print each result."""
+    """Run the checks one after the other, each in its own folder."""
     from mambo_sil.verify.check import Subject
     from mambo_sil.verify.tools import versions
-    from mambo_sil.verify.verify_report import Verified, line
+    from mambo_sil.verify.verify_report import Verified
 
     found: list[Verified] = []
     bar(0)
@@ -104,8 +104,6 @@ def _run_checks(
         tools = versions(entry.tools) | dict(result.tools)
         found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
         bar(len(found))
-        if aloud:
-            typer.echo(line(found[-1]))
     return found
 
 

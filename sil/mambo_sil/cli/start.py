@@ -10,6 +10,7 @@ import typer
 from mambo_codegen.errors import echo
 from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, output_option, write_file
 from mambo_sil.cli.options import AsJson, Drone, show
+from mambo_sil.results.terminal import sentence
 
 
 def init(
@@ -79,8 +80,6 @@ def playground(
             text, flown = playground_page(found, drone, bar)
         size = write(text)
     summary = PlaygroundSummary(page=str(output), bytes=size, vehicle=drone, controllers=flown)
-    lines = [
-        f"{one.title}: its proof flight has the SHA-256 {made.trace_sha256}"
-        for one, made in zip(found, flown, strict=True)
-    ]
-    show(summary, "\n".join([*lines, f"{echo(str(output))}: {size / 1000:.0f} kB"]), as_json=as_json)
+    names = ", ".join(one.title for one in found)
+    said = f"{echo(str(output))}: open it in a browser; {names} fly {echo(drone.name)}; {size / 1000:.0f} kB"
+    show(summary, sentence(said), as_json=as_json)

@@ -16,6 +16,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
+from mambo_sil.flight.metric_names import named
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
@@ -23,9 +24,6 @@ from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
 from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table
-
-_UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
-_UNITS |= {"_rad": "rad", "_m": "m"}
 
 
 class FlightSummary(ReportedSummary):
@@ -51,7 +49,7 @@ class FlightSummary(ReportedSummary):
         columns = {
             "whole flight": self.metrics,
             "after 10 s": self.metrics_without_transient,
-            "as seen": self.metrics_as_seen,
+            "as estimated": self.metrics_as_seen,
         }
         return {heading: values for heading, values in columns.items() if values is not None}
 
@@ -247,13 +245,15 @@ def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any
 
 
 def flight_text(summary: FlightSummary) -> str:
-    """Format a summary: the answer, then a metric per line, with and without the transient, and as seen."""
+    """Format a summary: the answer, then a metric per line, with and without the transient, and estimated."""
     columns = summary.columns
     rows = []
     for key in summary.metrics:
         name, unit = named(key)
         rows.append((name, *(digits(values[key]) for values in columns.values()), unit))
     lines = [*_answer(summary), *table(("", *columns, ""), rows, (0, -1))]
+    if summary.metrics_as_seen is not None:
+        lines.append("as estimated: error of the estimated position, which the controller knows")
     quiet = ("OK", "NOT_CALLED")
     refused = {name: count for name, count in summary.statuses.items() if name not in quiet}
     if refused:
@@ -287,11 +287,3 @@ def _answer(summary: FlightSummary) -> Iterator[str]:
         yield "LOST: the drone diverged before the end of the flight"
     elif summary.mostly_refused:
         yield "NOT CONTROLLED: the controller refused more than half of its inputs"
-
-
-def named(key: str) -> tuple[str, str]:
-    """Split the key of a metric, such as rms_error_m, into its name and its unit."""
-    suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
-    name = key.removesuffix(suffix).replace("_", " ")
-    words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]
-    return " ".join(words), _UNITS.get(suffix, "")

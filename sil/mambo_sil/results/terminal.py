@@ -45,7 +45,7 @@ def sentence(text: str, indent: str = "") -> str:
 
 
 def _wrapped(cell: str, width: int) -> list[str]:
-    return textwrap.wrap(cell, width, break_long_words=False, break_on_hyphens=False) or [""]
+    return textwrap.wrap(cell, max(width, 1), break_long_words=False, break_on_hyphens=False) or [""]
 
 
 def _widths(heads: Sequence[str], rows: Sequence[Sequence[str]], text_columns: set[int]) -> list[int]:

@@ -54,7 +54,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
             wrong.append(f"{where}: statuses {verdict.statuses}")
         if verdict.end is End.CRASHED and not strays:
             wrong.append(f"{where}: crashed")
-        if verdict.end is End.AWAY and not strays and verdict.fault in ending:
+        if verdict.end is End.NOT_RECOVERED and not strays and verdict.fault in ending:
             wrong.append(f"{where}: did not recover")
     figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
     if wrong:
@@ -67,10 +67,10 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
 
 def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
-    back = [verdict for verdict in verdicts if verdict.end is End.BACK]
+    back = [verdict for verdict in verdicts if verdict.end is End.RECOVERED]
     slowest = max((v for v in back if v.fault in ending), key=lambda verdict: verdict.recovery_s)
     return (
         f"{len(verdicts)} faults: no crash, command at most "
-        f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
+        f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} recovered, "
         f"the last {slowest.recovery_s:.1f} s after '{slowest.fault}'"
     )

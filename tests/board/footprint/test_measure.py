@@ -98,9 +98,9 @@ def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     assert f" {cycles.most_met} " in text
     bounds = f"{cycles.fewest} to {cycles.most_with_wait} with the wait states of the flash"
     assert "crazyflie: cycles are a model: Cortex-M4 TRM, ARM DDI 0439D, without wait states; the " in text
-    assert f"most expensive step met takes {bounds}" in text
+    assert f"most expensive step found takes {bounds}" in text
     assert f" ~{estimated.counts.most_met} " in text
-    assert "teensy41: cycles are an estimate: 1 per instruction, +/- 40 %; of the most expensive" in text
+    assert "teensy41: cycles are an estimate: 1 per instruction, +/- 40 % for the most expensive" in text
     summary = footprint_report.summarise([modelled, estimated], "mambo", presets.load("mambo"))
     assert [board.cycles for board in summary.boards] == [cycles, None]
     assert [board.cycles_source.partition(":")[0] for board in summary.boards] == ["model", "estimate"]

@@ -71,12 +71,12 @@ class BoardFootprint:
     def cycles_sentence(self) -> str:
         """What the cycles are, and the bounds of the most expensive step."""
         if self.cycles is None or self.cycles_estimate is None:
-            return f"{self.name}: cycles are an {self.cycles_source}; of the most expensive step met"
+            return f"{self.name}: cycles are an {self.cycles_source} for the most expensive step found"
         low, high = (f"{limit:.0f}" for limit in self.cycles_estimate)
         bounds = low if low == high else f"{low} to {high} with the wait states of the flash"
         return (
             f"{self.name}: cycles are a {self.cycles_source}, without wait states; "
-            f"the most expensive step met takes {bounds}"
+            f"the most expensive step found takes {bounds}"
         )
 
     @property
@@ -99,7 +99,7 @@ class BoardFootprint:
         time_ms = [1000 * one / board.clock_hz for one in cycles]
         stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
         return [
-            ("a step", "measured: least / median / most", "counted: least / mean / most met; estimated"),
+            ("a step", "measured: least / median / most", "counted: least / mean / largest; estimated"),
             ("instructions", "-", counted[0]),
             ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
             ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),

@@ -185,7 +185,7 @@ def emulated_text(summary: BoardFlightSummary) -> str:
     if count is None:
         return f"not counted: {summary.not_emulated}"
     return (
-        f"{count.least} / {count.mean:.0f} / {count.most_met} instructions (least, mean, most met), "
+        f"{count.least} / {count.mean:.0f} / {count.most_met} instructions (least, mean, largest), "
         f"{summary.cycles.median / count.mean:.3g} cycles each"
     )
 

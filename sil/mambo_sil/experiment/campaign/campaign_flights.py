@@ -24,6 +24,7 @@ from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly_groups
 from mambo_sil.flight.fences import LIMIT_METRICS, fenced, measure_limits
 from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metric_names import SEEN
 from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
@@ -31,7 +32,6 @@ from mambo_sil.flight.traces import SensedTrace, Trace
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Metrics of the true flight."""
 
-SEEN: Final = "seen_"
 SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
 """Metrics of the error that are also computed from the estimates."""
 

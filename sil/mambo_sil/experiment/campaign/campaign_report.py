@@ -24,7 +24,7 @@ from mambo_sil.experiment.campaign.statistics import (
     worst_flights,
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
-from mambo_sil.flight.flight_report import named
+from mambo_sil.flight.metric_names import SEEN, named, titled
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.number_format import digits, distance
@@ -186,18 +186,20 @@ def campaign_text(summary: CampaignSummary, folder: str) -> str:
     lines = [_answer(summary, name) for name in reversed(summary.controllers)]
     for name, found in summary.controllers.items():
         rows = [
-            (", ".join(filter(None, named(index))), *(digits(quantiles[share]) for share in _SHOWN))
+            (titled(index), *(digits(quantiles[share]) for share in _SHOWN))
             for index, quantiles in found.quantiles.items()
         ]
         lines += ["", *table((name, *_SHOWN.values()), rows)]
         lines.append(f"crashed: {_spelled(found.crashed)}")
         if found.refused_an_input.count:
             lines.append(f"rejected an input: {_spelled(found.refused_an_input)}")
+    if any(key.startswith(SEEN) for found in summary.controllers.values() for key in found.quantiles):
+        lines += ["", sentence("as estimated: error of the estimated position, which the controller knows")]
     if summary.improvements:
         first = next(iter(summary.controllers))
-        lines += ["", f"{first} divided by the other, per flight"]
+        lines += ["", f"improvement on {first}: its index divided by that of the other, flight by flight"]
         lines += table(
-            ("the other", "index", "median", "95 % interval", "above 1 in", "95 % interval"),
+            ("the other", "index", "median", "95 % interval", "better in", "95 % interval"),
             [
                 (
                     one.controller,
@@ -211,7 +213,7 @@ def campaign_text(summary: CampaignSummary, folder: str) -> str:
             ],
             (0, 1),
         )
-    lines += ["", "worst flights by IAE, and the commands that repeat them"]
+    lines += ["", "worst flights by IAE; these commands repeat them"]
     for name, flights in summary.worst.items():
         for flight in flights:
             what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
@@ -232,4 +234,4 @@ def _interval(one: Proportion) -> str:
 
 
 def _spelled(one: Proportion) -> str:
-    return f"{one.count} of {one.flights} flights, {100 * one.share:.3g} % ({_interval(one)})"
+    return f"{one.count} of {one.flights} flights, {100 * one.share:.3g} % (95 % interval {_interval(one)})"

@@ -54,7 +54,7 @@ def _bar_percent(error_m: float, largest_m: float) -> float:
 
 _HEADS: Final = (
     *("fault", "status", "command, rad", "tilt, rad", "at limit, %"),
-    *(f"{course}: {what}" for course in COURSES for what in ("error, m", "back after, s")),
+    *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
     "end",
 )
 
@@ -97,7 +97,7 @@ def _bands(verdicts: Sequence[Verdict]) -> str:
         f"{course} {next(v.band_m for v in verdicts if v.course == course and not v.turning):.3f} m"
         for course in COURSES
     )
-    return f"Back means within: {bands}."
+    return f"Recovered means an error within: {bands}."
 
 
 def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:

@@ -17,6 +17,7 @@ from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATU
 from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
+from mambo_sil.flight.metric_names import titled
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import ReportedSummary, Section
@@ -125,6 +126,11 @@ class GroupRow:
     failed: int
     flights: int
 
+    @property
+    def title(self) -> str:
+        """The metric with its unit."""
+        return titled(self.metric)
+
 
 def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
     """Yield a row for each metric that is checked in a group; for `crashed` only if it failed or is alone."""
@@ -159,7 +165,7 @@ def finding(summary: RegressSummary) -> str:
 def remarks(summary: RegressSummary) -> list[str]:
     """Return what a reader should know of the baseline."""
     if summary.baseline is None:
-        return ["compared with the bounds only: no recorded metrics"]
+        return ["compared with the bounds only; --update records this run for later ones"]
     found = [f"compared with the bounds and with {echo(summary.baseline)}"]
     if summary.settings_then != summary.settings:
         found.append("the controller's settings have changed since the metrics were recorded")
@@ -175,7 +181,7 @@ def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
     lines = [sentence(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")]
     lines += [sentence(one) for one in remarks(summary)]
-    ratio = () if summary.baseline is None else ("ratio",)
+    ratio = () if summary.baseline is None else ("over recorded",)
     heads = ("group", "metric", "bound", "median", "worst", *ratio, "at limit", "failed")
     rows = [_cells(row, has_ratio=bool(ratio)) for row in group_rows(summary)]
     lines += ["", *table(heads, rows, (0, 1))]
@@ -193,7 +199,7 @@ def _cells(row: GroupRow, *, has_ratio: bool) -> tuple[str, ...]:
     numbers = (row.bound, row.middle, row.worst, *([row.over_recorded] if has_ratio else []))
     shown = ("-" if number is None else digits(number) for number in numbers)
     failed = f"{row.failed} of {row.flights}"
-    return (row.group, row.metric, *shown, f"{row.saturated_share:.1%}", failed)
+    return (row.group, row.title, *shown, f"{100.0 * row.saturated_share:.1f} %", failed)
 
 
 def junit_xml(summary: RegressSummary) -> bytes:

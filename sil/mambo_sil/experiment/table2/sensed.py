@@ -124,7 +124,7 @@ def _judge(name: str, view: str, trace: Trace) -> SensedRow:
     )
 
 
-_HEADS = ("controller", "sees", "flights", *INDICES, "worst IAE", "IAE as seen", "drift, m")
+_HEADS = ("controller", "sensors", "flights", *INDICES, "worst IAE", "IAE as estimated", "drift, m")
 
 
 _SHOWN = (0, 1, 2, 3, 7, 8, 9)

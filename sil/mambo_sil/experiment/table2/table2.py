@@ -154,11 +154,11 @@ def table2_text(summary: Table2Summary) -> str:
             if row.case == case
         ]
         units = (f"{index}, {unit}" for index, unit in zip(INDICES, UNITS, strict=True))
-        lines += ["", *table((case, *units, "PD / this", "variation, rad"), rows)]
+        lines += ["", *table((case, *units, "improvement", "variation, rad"), rows)]
     lines += [
         "",
         sentence("printed: in the paper; flown: here, 100 s along a figure of eight of 4 m"),
-        sentence("PD / this: IAE of the flown PD, or of the printed one, divided by that of the row"),
+        sentence("improvement: IAE of the flown PD, or of the printed one, divided by that of the row"),
         sentence("variation: the mean change of the command from one update to the next"),
         "",
     ]

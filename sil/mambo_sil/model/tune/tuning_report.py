@@ -13,7 +13,7 @@ from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv,
 from mambo_sil.model.tune.study import FinishedTrial, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
 from mambo_sil.results.folders import SUMMARY
-from mambo_sil.results.number_format import digits
+from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Summary
 from mambo_sil.results.terminal import sentence, table
 
@@ -31,6 +31,8 @@ class TuneSummary(Summary):
     seed: int
     flights: int
     """Flights of each trial."""
+    duration_s: float
+    """Duration of each flight."""
     vehicle: VehicleFile = NOMINAL
     trials: int
     base: FinishedTrial | None
@@ -47,6 +49,7 @@ def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
         study=study_name(tuning),
         seed=tuning.file.seed,
         flights=tuning.file.flights,
+        duration_s=tuning.file.flight.duration_s,
         vehicle=tuning.drone,
         trials=len(trials),
         base=_rounded(base[0]) if base else None,
@@ -75,8 +78,14 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
 
 
 def tune_text(summary: TuneSummary) -> str:
-    """Return base and chosen trial as text, and the rule of the choice."""
+    """Return base and chosen trial as text: the answer, the rule of the choice, and a table."""
     named = {"base": summary.base, "chosen": summary.chosen}
+    distances = {
+        name: distance(one.iae_m_s / summary.duration_s) for name, one in named.items() if one is not None
+    }
+    answer = f"trial {summary.chosen.number} of {summary.trials}: {distances['chosen']} in the mean"
+    answer += f", the base {distances['base']}" if summary.base is not None else ""
+    crashed = f"{summary.chosen.crashed} of {summary.flights} flights crashed"
     rows = [
         (
             name,
@@ -89,7 +98,8 @@ def tune_text(summary: TuneSummary) -> str:
         if one is not None
     ]
     heads = ("", "trial", "IAE, m s", "command variation, rad", "crashed")
-    return "\n".join([*table(heads, rows), sentence(f"chosen by the rule: {summary.rule}")])
+    lines = [sentence(f"{answer}; {crashed}"), sentence(f"chosen: {summary.rule}"), "", *table(heads, rows)]
+    return "\n".join(lines)
 
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:
