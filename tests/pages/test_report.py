@@ -62,7 +62,7 @@ SEEN = {
         "<svg role",
     ),
     "margins": (
-        "roll: stands 2.1 times the gain, 138 ms of delay",
+        "roll: tolerates 2.1 times the gain or 138 ms more delay",
         "pitch: UNSTABLE, grows e-fold in 2.00 s",
         "2 drones, drawn by",
         "roll: delay margin at the command, ms",

@@ -39,7 +39,7 @@ def diff_text(summary: DiffSummary) -> str:
 
 
 def _answer(figures: ControllerFigures | None) -> str:
-    """Return how closely a controller flies the eight, and how much delay it stands."""
+    """Return how closely a controller flies the eight, and how much more delay it tolerates."""
     if figures is None:
         return ""
     eight = figures.eight
@@ -47,7 +47,7 @@ def _answer(figures: ControllerFigures | None) -> str:
         return "; CRASHED on the eight"
     answer = f"; {distance(eight.iae_m_s / EIGHT_S)} in the mean"
     delays_s = [axis.loops["command"].delay_s for axis in figures.margins or ()]
-    return f"{answer}, stands {1e3 * min(delays_s):.0f} ms of delay" if delays_s else answer
+    return f"{answer}, tolerates {1e3 * min(delays_s):.0f} ms more delay" if delays_s else answer
 
 
 def _setting(one: SettingDifference) -> tuple[str, ...]:

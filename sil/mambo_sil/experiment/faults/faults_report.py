@@ -59,18 +59,21 @@ _HEADS: Final = (
 )
 
 
-_SHOWN: Final = (0, 1, 3, 5, 6, 7, 8, 9)
-"""The columns that the text has; the Markdown table has all."""
-
-
 def faults_text(summary: FaultsSummary) -> str:
     """Return the verdicts as text: how many faults ended how, then a row per fault."""
-    rows = list(_rows(summary.flights))
-    ends = [row[-1] for row in rows]
+    faults = {
+        flight.fault: [one for one in summary.flights if one.fault == flight.fault]
+        for flight in summary.flights
+    }
+    ends = [_worst_end(pair) for pair in faults.values()]
     counts = ", ".join(f"{ends.count(end)} {end}" for end in ORDER if end in ends)
-    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {len(rows)} faults, {counts}"
-    shown = [[row[index] for index in _SHOWN] for row in (_HEADS, *rows)]
-    lines = [sentence(answer), "", *table(shown[0], shown[1:], (0, 1, -1))]
+    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {len(faults)} faults, {counts}"
+    heads = [
+        "fault",
+        *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
+    ]
+    rows = [[fault, *(cell for flight in pair for cell in _cells(flight))] for fault, pair in faults.items()]
+    lines = [sentence(answer), "", *table(heads, rows)]
     return "\n".join([*lines, "", sentence(_bands(summary.flights))])
 
 
@@ -78,6 +81,17 @@ def faults_markdown(verdicts: Sequence[Verdict]) -> str:
     """Return the verdicts as a Markdown table with one row per fault and both courses side by side."""
     lines = [_HEADS, ("---",) * len(_HEADS), *_rows(verdicts)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{_bands(verdicts)}"
+
+
+def _cells(flight: Verdict) -> tuple[str, str]:
+    """Return the largest error of a flight, and when it recovered."""
+    after = {End.CRASHED: "CRASHED", End.NOT_RECOVERED: "never"}
+    return f"{flight.largest_error_m:.2f}", after.get(flight.end, f"{flight.recovery_s:.1f}")
+
+
+def _worst_end(pair: Sequence[Verdict]) -> End:
+    """Return how the flights with a fault ended."""
+    return max((flight.end for flight in pair), key=ORDER.index)
 
 
 def _rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, ...]]:
@@ -89,7 +103,7 @@ def _rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, ...]]:
         for verdict in pair:
             never = math.isnan(verdict.recovery_s)
             row += [f"{verdict.largest_error_m:.2f}", "-" if never else f"{verdict.recovery_s:.1f}"]
-        yield (*row, max((verdict.end for verdict in pair), key=ORDER.index))
+        yield (*row, _worst_end(pair))
 
 
 def _bands(verdicts: Sequence[Verdict]) -> str:
