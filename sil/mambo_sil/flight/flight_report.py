@@ -16,11 +16,11 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
-from mambo_sil.flight.metric_names import named
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
+from mambo_sil.results.metric_names import named
 from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table

@@ -24,9 +24,9 @@ from mambo_sil.experiment.campaign.statistics import (
     worst_flights,
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
-from mambo_sil.flight.metric_names import SEEN, named, titled
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.metric_names import SEEN, named, titled
 from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table

@@ -14,7 +14,7 @@ from mambo_sil.experiment.campaign.campaign_flights import (
 )
 from mambo_sil.experiment.regress.baseline import Recorded
 from mambo_sil.experiment.regress.suite_file import FlightSuite
-from mambo_sil.flight.metric_names import named
+from mambo_sil.results.metric_names import named
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number
 

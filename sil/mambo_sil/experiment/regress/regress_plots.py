@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
-from mambo_sil.flight.metric_names import named
+from mambo_sil.results.metric_names import named
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
 

@@ -17,8 +17,8 @@ from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATU
 from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
-from mambo_sil.flight.metric_names import titled
 from mambo_sil.flight.scenario import Record, write_record
+from mambo_sil.results.metric_names import titled
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table
