@@ -1,4 +1,4 @@
-"""Search the gains of the altitude loop `pid` on drawn flights of a drone through its sensors.
+"""Search the gains of the altitude loop `pid` on random flights of a drone through its sensors.
 
 python -m benchmarks.altitude [VEHICLE]   takes some minutes
 

@@ -1,4 +1,4 @@
-"""Search the gains of a law with feed-forward on drawn flights of a drone through its sensors.
+"""Search the gains of a law with feed-forward on random flights of a drone through its sensors.
 
 python -m benchmarks.feedforward pd-feedforward             takes five minutes
 python -m benchmarks.feedforward pid-feedforward [VEHICLE]  takes ten minutes
@@ -188,7 +188,9 @@ def main() -> None:
     chosen, closest = choose(found), min(found, key=lambda gains: found[gains].error)
     rows = [row("the paper's PD", None, stock)]
     rows += [row(name, gains, found[gains]) for name, gains in (("least error", closest), ("chosen", chosen))]
-    print(f"\nmedian IAE as seen, m s (command variation, rad); {len(found)} candidates\n\n{table(rows)}")
+    print(
+        f"\nmedian IAE as estimated, m s (command variation, rad); {len(found)} candidates\n\n{table(rows)}"
+    )
     shipped = GAINS if law == "pd-feedforward" else pid_gains().get(vehicle)
     print(f"\nshipped are {'the chosen gains' if chosen == shipped else f'other gains: {shipped}'}")
 

@@ -172,7 +172,8 @@ def ranks(found: dict[tuple[str, str], DrawnDrones]) -> Iterator[dict[str, str]]
             for case in RANKED
         }
         seen = found["default", "mambo"]
-        yield {"worse": name, **cells, "error seen, mambo, default": _signed(rank(of(seen), seen.seen_m_s))}
+        worse = rank(of(seen), seen.seen_m_s)
+        yield {"worse": name, **cells, "estimated error, mambo, default": _signed(worse)}
 
 
 def _signed(value: float) -> str:

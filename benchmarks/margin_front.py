@@ -152,10 +152,10 @@ def front_table(rows: list[dict[str, Any]]) -> str:
         found.append(
             {
                 "number, changed": f"{number}, {name_of(row['change'])}",
-                "error seen, m s: median, 95 %": _pair(default, "seen_{}_m_s", ".3g"),
+                "estimated error, m s: median, 95 %": _pair(default, "seen_{}_m_s", ".3g"),
                 "variation, rad: median, 95 %": _pair(default, "variation_{}_rad", ".2g"),
                 "ring": str(default["ring"]),
-                "slow motors: error seen": _pair(slow, "seen_{}_m_s", ".3g"),
+                "slow motors: estimated error": _pair(slow, "seen_{}_m_s", ".3g"),
                 "slow: crashed, ring": f"{slow['crashed']}, {slow['ring']}",
                 "slow: least damping, median, worst tenth": f"{slow['damping_median']:.3f}, "
                 f"{slow['damping_worst_tenth']:.3f}",
@@ -174,7 +174,7 @@ def _pair(found: dict[str, Any], key: str, form: str) -> str:
 def draw(rows: list[dict[str, Any]], stem: Path) -> None:
     """Draw damping and ringing of drones with slow motors over the error and the variation of the others."""
     panels = (
-        ("seen_median_m_s", "error seen, median, m s", lambda slow: slow["damping_worst_tenth"]),
+        ("seen_median_m_s", "estimated error, median, m s", lambda slow: slow["damping_worst_tenth"]),
         ("variation_95_rad", "command variation, 95 %, rad", lambda slow: slow["ring"]),
     )
     names = (

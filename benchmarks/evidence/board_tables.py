@@ -10,7 +10,7 @@ from benchmarks.evidence.tables import Row, summary
 from benchmarks.markdown import table
 from mambo_sil.experiment.faults.fault_flights import STATUS_NAMES
 
-_ENDS: Final = ("back", "away", "crashed")
+_ENDS: Final = ("recovered", "not recovered", "crashed")
 """How a flight with a fault ends, from the best to the worst."""
 
 
@@ -73,7 +73,7 @@ def footprint(controller: str) -> Callable[[Figures], str]:
                     "flash, B": str(board["flash_bytes"]),
                     "RAM, B": str(board["ram_bytes"]),
                     "stack, B": str(board["stack_bytes"]),
-                    "instructions a step: least / mean / most met": steps,
+                    "instructions a step: least / mean / largest": steps,
                     "cycles a step": _cycles(board),
                     "ms, least to most": f"{time_ms[0]:.3g}..{time_ms[1]:.3g}",
                     "budget": "fits" if board["fits"] else "OVER",
@@ -155,7 +155,7 @@ def faults(controller: str) -> Callable[[Figures], str]:
             for course, flight in pair.items():
                 back = flight["recovery_s"]
                 row[f"{course}: error, m"] = f"{flight['largest_error_m']:.2f}"
-                row[f"{course}: back after, s"] = "-" if back is None else f"{back:.1f}"
+                row[f"{course}: recovered after, s"] = "-" if back is None else f"{back:.1f}"
             rows.append(row | {"end": max((flight["end"] for flight in flights), key=_ENDS.index)})
         bands = {one["course"]: one["band_m"] for one in figures[controller] if not one["turning"]}
         within = ", ".join(f"{course} {band:.3f} m" for course, band in bands.items())

@@ -97,7 +97,7 @@ def campaign(figures: Figures) -> str:
                 f"{figures['flights']} flights": title(name),
                 "crashed (95 %)": f"{crashed['count']}, {_percent(crashed['share'])} % ({interval})",
                 "IAE, m s: 5 %, median, 95 % of the flights": shares("iae_m_s", "0.05", "0.5", "0.95"),
-                "as seen by the estimators: median, 95 %": shares("seen_iae_m_s", "0.5", "0.95"),
+                "as estimated: median, 95 %": shares("seen_iae_m_s", "0.5", "0.95"),
                 "variation, rad: median, 95 %": shares("command_variation_rad", "0.5", "0.95"),
             }
         )
@@ -106,7 +106,7 @@ def campaign(figures: Figures) -> str:
 
 def campaign_ratios(figures: Figures) -> str:
     """Return the ratio of the PD's indices to each controller's, flight by flight."""
-    head = "PD over this, flight by flight: median (95 %), better in"
+    head = "improvement on the PD, flight by flight: median (95 %), better in"
     rows: dict[str, Row] = {}
     for one in figures["improvements"]:
         index = one["index"].partition("_")[0].upper()
@@ -140,11 +140,11 @@ def opponents(campaign_name: str) -> Callable[[Figures], str]:
 def opponents_ratios(figures: Figures) -> str:
     """Return the ratio of the errors of the PID with feed-forward to each controller's, flight by flight."""
     rows: dict[str, Row] = {}
-    for index, error in (("seen_iae_m_s", "error seen"), ("iae_m_s", "true error")):
+    for index, error in (("seen_iae_m_s", "estimated error"), ("iae_m_s", "true error")):
         for one in figures["improvements"]:
             if one["index"] == index:
                 name = title(one["controller"])
-                row = rows.setdefault(name, {"PID with feed-forward over": name})
+                row = rows.setdefault(name, {"error of the PID with feed-forward divided by that of": name})
                 row[f"{error}: median (95 %)"] = (
                     f"{three(one['median'])} ({three(one['low'])} .. {three(one['high'])})"
                 )

@@ -55,7 +55,7 @@ def read_table2(results: Path) -> Figures:
 
 def table2(figures: Figures) -> str:
     """Return the Table II case: what the paper prints, and what flies."""
-    (case, *_), ratios, varied = CASES, "PD over this", "variation, rad"
+    (case, *_), ratios, varied = CASES, "improvement", "variation, rad"
     first = f"{case.replace(' 0.5', ', 0.5')}"
     printed: list[Row] = []
     for name, values, factors in (("PD", PRINTED_PD, ()), ("NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)):
@@ -117,7 +117,7 @@ def sensors(figures: Figures) -> str:
                 "flights": str(row["flights"]) + (f", {row['lost']} lost" if row["lost"] else ""),
                 **dict(zip(INDICES, map(digits, row["tracked"]), strict=True)),
                 "worst IAE": digits(row["worst_iae_m_s"]),
-                "IAE as seen": digits(row["seen"][0]),
+                "IAE as estimated": digits(row["seen"][0]),
                 "drift, m": digits(row["drift_m"]),
             }
             for row in figures["rows"]

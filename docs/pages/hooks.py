@@ -1,4 +1,4 @@
-"""The hooks of MkDocs: pages that the code writes, and tables that `make evidence` writes."""
+"""The hooks of MkDocs: pages that the code writes, tables that `make evidence` writes, and drawings."""
 
 import re
 from pathlib import Path
@@ -22,6 +22,9 @@ PAGES: Final = {
 _TABLE: Final = re.compile(r"^\[Table: [^\]]+\]\(([^)]+\.md)\)$", re.MULTILINE)
 """A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
 
+_DRAWING: Final = re.compile(r"^!\[[^\]]+\]\(([^)]*drawings/[^)]+\.svg)\)$", re.MULTILINE)
+"""A line that is a drawing; as part of the page it has the colour of its text, light or dark."""
+
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the generated pages to the files of the site."""
@@ -31,8 +34,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
-    """Put each linked table in place of its link; raises OSError for a table that is not there."""
+    """Put each linked table and drawing in place of its link; raises OSError for one that is not there."""
     if page.file.abs_src_path is None:
         return markdown
     folder = Path(page.file.abs_src_path).parent
-    return _TABLE.sub(lambda link: (folder / link[1]).read_text("utf-8"), markdown)
+    markdown = _TABLE.sub(lambda link: (folder / link[1]).read_text("utf-8"), markdown)
+    return _DRAWING.sub(lambda link: f"<div>\n{(folder / link[1]).read_text('utf-8')}</div>", markdown)

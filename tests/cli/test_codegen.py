@@ -14,7 +14,7 @@ import pytest
 from mambo_codegen import errors
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.toml_file import PRESETS
-from tests.support.command import run
+from tests.support.command import run, unwrapped
 
 COMMAND = "from mambo_sil.cli.app import main; main()"
 INTERRUPTED = """
@@ -100,10 +100,10 @@ def test_init_writes_where_a_link_leads() -> None:
 
 
 def test_presets_lists_every_preset_with_its_use() -> None:
-    """People get a line per preset, machines a JSON object."""
-    lines = run("presets")[0].splitlines()
+    """People get name and description of each, machines a JSON object."""
     described = {name: PRESETS.description(name) for name in presets.names()}
-    assert {line.split()[0]: line.split(maxsplit=1)[1] for line in lines} == described
+    listed = " ".join(f"{name} {description}" for name, description in described.items())
+    assert unwrapped(run("presets")[0]) == listed
     assert json.loads(run("presets", "--json")[0]) == described
 
 

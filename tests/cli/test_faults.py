@@ -23,7 +23,7 @@ def test_faults_leave_table_picture_and_json(tmp_path: Path) -> None:
     flights = summary["flights"]
     lines = (out / "faults.csv").read_text("utf-8").splitlines()
     assert len(lines) == 1 + len(flights)
-    assert {flight["end"] for flight in flights} == {"back", "away"}
+    assert {flight["end"] for flight in flights} == {"recovered", "not recovered"}
     assert flights[1]["statuses"] == ["BAD_STATE"]
     assert lines[2].startswith("eight,")
     assert ",BAD_STATE," in lines[2]

@@ -1,6 +1,7 @@
 """The command `identify`, as a user types it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -86,7 +87,8 @@ def test_the_screen_says_what_is_written() -> None:
     said, _ = run("identify", "flight/trace.csv", "-o", "out")
     settings, vehicle = controller_toml.read(Path("out/model.toml")), load("out/vehicle.toml").attitude
     assert isinstance(vehicle, FirstOrderAttitude)
-    rows = {line[:28].strip(): line[28:].split() for line in said.splitlines()}
+    columns = (re.split(" {2,}", line) for line in said.splitlines())
+    rows = {name: " ".join(cells).split() for name, *cells in columns}
     assert float(rows["integrator, 1/s"][0]) == pytest.approx(settings.model.roll_integral_1_s, abs=0.005)
     flown = vehicle.roll
     times = f"{1e3 * flown.lag_s:.0f} + {1e3 * flown.dead_time_s:.0f} ms"

@@ -10,7 +10,7 @@ import pytest
 from mambo_codegen.settings.toml_file import parse_document
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.scenario import read_record
-from tests.support.command import run
+from tests.support.command import run, unwrapped
 from tests.support.tools import require_module
 
 FLYING = ("fly", "sweep", "tune", "campaign", "faults", "regress")
@@ -49,11 +49,10 @@ def summary(folder: str) -> dict[str, Any]:
 
 def test_the_list_names_every_drone() -> None:
     """With what it is, as text and as JSON."""
-    listed = run("vehicles")[0].splitlines()
+    listed = unwrapped(run("vehicles")[0])
     described = json.loads(run("vehicles", "--json")[0])
     assert list(described) == list(vehicle_toml.names())
-    for line, (name, description) in zip(listed, described.items(), strict=True):
-        assert line.split(maxsplit=1) == [name, description]
+    assert listed == " ".join(f"{name} {description}" for name, description in described.items())
 
 
 def test_a_shipped_file_is_one_to_start_from() -> None:

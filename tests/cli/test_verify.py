@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
-from mambo_sil.verify.verify_report import Verified, closing, verdict
-from tests.support.command import run
+from mambo_sil.verify.verify_report import Verified, summarise, verdict, verify_text
+from tests.support.command import run, unwrapped
 from tests.support.tools import require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -60,10 +61,11 @@ def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
     checks = ["warnings", "rules", "proof", "sanitizers", "fuzzing", "bits"]
     said, _ = run("verify", "--only", ",".join(checks), code=1)
     lines = said.splitlines()
-    assert [line.split()[:2] for line in lines[: len(checks)]] == [[name, "incomplete"] for name in checks]
+    results = [line.split()[:2] for line in lines[3:] if not line.startswith(" ")]
+    assert results == [[name, "incomplete"] for name in checks]
     for package in ("gcc", "g++", "clang", "cppcheck", "frama-c-base"):
-        assert f"(Debian: {package})" in said
-    assert lines[-1].startswith("verdict: incomplete (6 incomplete)")
+        assert f"(Debian: {package})" in unwrapped(said)
+    assert lines[0] == "mambo: 0 of 6 checks passed, 6 incomplete; not run: faults"
     assert (tmp_path / "verification" / "controller" / "nmpc.c").is_file()
 
 
@@ -107,8 +109,11 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
 def test_the_verdict_is_the_worst_outcome(outcomes: tuple[CheckOutcome, ...], whole: CheckOutcome) -> None:
     """A failure outweighs a gap, and a gap everything that passed."""
     assert verdict(ended(*outcomes)) is whole
-    assert f"verdict: {whole} (" in closing(ended(*outcomes))
-    assert f"not run: {CHECKS[2].name}" in closing(ended(*outcomes))
+    text = unwrapped(verify_text(summarise(ended(*outcomes), "mambo", Settings())))
+    passed = outcomes.count(CheckOutcome.PASSED)
+    assert text.startswith(f"mambo: {passed} of {len(outcomes)} checks passed")
+    assert (", 1 failed" in text) is (whole is CheckOutcome.FAILED)
+    assert f"; not run: {CHECKS[2].name}" in text
 
 
 def test_checks_have_names_and_order() -> None:

@@ -1,5 +1,6 @@
 """The site that MkDocs builds from docs/ and from the code."""
 
+import json
 import re
 import subprocess
 import sys
@@ -47,6 +48,28 @@ def test_it_loads_nothing_from_a_network(site: Path) -> None:
         assert not re.findall(r'<(?:script|img|iframe)[^>]*src="(?:https?:)?//', text), page
         assert not re.findall(
             r'<link[^>]*rel="(?:stylesheet|preconnect|icon)"[^>]*href="(?:https?:)?//', text
+        )
+
+
+@pytest.mark.long
+def test_the_search_answers_what_a_pilot_asks_first(site: Path) -> None:
+    """A section has the word in its title, which the search lists before all others."""
+    index = json.loads((site / "search" / "search_index.json").read_text("utf-8"))
+    titles = " | ".join(one["title"].lower() for one in index["docs"])
+    asked = ("install", "license", "weight", "tilt limit", "wind", "height", "latency", "gps")
+    flown = ("ros", "px4", "ardupilot", "betaflight", "axes and signs")
+    assert [word for word in (*asked, *flown) if not re.search(rf"\b{word}\b", titles)] == []
+
+
+@pytest.mark.long
+def test_drawings_have_the_colour_of_the_page(site: Path) -> None:
+    """They are part of it, on one page of each kind, in light and dark."""
+    for page, count in (("index.html", 2), ("reference/axes.html", 1)):
+        text = (site / page).read_text("utf-8")
+        assert (
+            text.count('<svg class="drawing"')
+            == text.count("prefers-color-scheme: dark) { .drawing")
+            == count
         )
 
 

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 VOID = {"meta", "input", "br", "img", "circle", "line", "path", "rect", "use"}
 SEEN = {
-    "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
+    "fly": ("largest error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
     "repeat": ("Repetition: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
     "table2": (
@@ -62,7 +62,7 @@ SEEN = {
         "<svg role",
     ),
     "margins": (
-        "roll: stands 2.1 times the gain, 138 ms of delay",
+        "roll: tolerates 2.1 times the gain or 138 ms more delay",
         "pitch: UNSTABLE, grows e-fold in 2.00 s",
         "2 drones, drawn by",
         "roll: delay margin at the command, ms",

@@ -13,17 +13,19 @@ from tests.support.tools import toolchain
 BUILDS: Final = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
 
 _WHOLE: Final = 10
-"""So many of the settings of a parity test, the corners among them, run in every build, with all cases."""
+"""So many of the settings of a parity test, the corners among them, run with all cases in one scalar type."""
 
 
-def share_of(index: int) -> tuple[tuple[tuple[str, str], ...], int]:
-    """Return the builds in which the settings of a number run, and the percentage of the cases.
+def share_of(index: int, scalar: int, scalars: int) -> tuple[tuple[tuple[str, str], ...], int]:
+    """Return the builds in which settings run and the percentage of the cases, by the number of their scalar.
 
-    After the first `_WHOLE` settings each runs in two builds, which take turns, with a fifth of the cases.
+    Each runs in two builds, which take turns: settings in three scalar types have all builds, and so have
+    five settings of one scalar type. Each of the first `_WHOLE` has all cases in one of its scalar types; all
+    others have a fifth.
     """
-    if index < _WHOLE:
-        return BUILDS, 100
-    return (BUILDS[index % len(BUILDS)], BUILDS[(index + 2) % len(BUILDS)]), 20
+    turn = index + scalar
+    builds = (BUILDS[turn % len(BUILDS)], BUILDS[(turn + 2) % len(BUILDS)])
+    return builds, 100 if index < _WHOLE and turn % scalars == 0 else 20
 
 
 def libraries(settings: Settings, builds: Sequence[tuple[str, str]] = BUILDS) -> dict[str, Any]:

@@ -16,6 +16,11 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
     return result.stdout, result.stderr
 
 
+def unwrapped(text: str) -> str:
+    """Return printed text on one line, its words one space apart."""
+    return " ".join(text.split())
+
+
 def command(
     *arguments: object,
     folder: Path | None = None,

@@ -1,5 +1,6 @@
 """A controller and a drone at hover: linear systems joined by python-control, and flights near hover."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight, Offset, PositionController, fly
+from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Hover
 
 
@@ -53,15 +55,15 @@ def opened_at_the_command(settings: Settings, vehicle: Vehicle, axis: int) -> An
 
 @dataclass(frozen=True, eq=False)
 class Scaled:
-    """A controller whose commands reach the drone times a factor of their axis."""
+    """Controllers whose commands reach their drones times factors (n, 2) of roll and pitch."""
 
     controller: PositionController
-    factors: tuple[float, float]
+    factors: NDArray[np.float64]
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
         """Return the outcome of the controller with other commands."""
         outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
-        return _Sent(np.asarray(outcome.command_rad) * np.array(self.factors), outcome.status)
+        return _Sent(np.asarray(outcome.command_rad) * self.factors, outcome.status)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,35 +72,47 @@ class _Sent:
     status: NDArray[np.int64]
 
 
-def grows(
-    settings: Settings,
-    vehicle: Vehicle,
-    axis: int,
-    *,
-    gain: float = 1.0,
-    delay_ticks: int = 0,
-    duration_s: float = 30.0,
-) -> bool:
-    """Return whether a displacement of 1 mm along an axis grows in a flight with the true state.
+def grows(settings: Settings, vehicle: Vehicle, axis: int, *, delay_ticks: int = 0) -> bool:
+    """Return whether a displacement of 1 mm along an axis grows in a flight with the true state."""
+    flight = _hover(settings, vehicle, axis, delay_ticks=delay_ticks)
+    (grown,) = _grown(simulate.fly(flight, CompiledController(settings)), settings, axis)
+    return grown
 
-    It compares the largest displacement in the last fifth of the flight with that in the second fifth; the
-    flight ends before a command reaches half the tilt limit.
-    """
-    offset_m = (0.0, 1e-3, 0.0) if axis == 0 else (1e-3, 0.0, 0.0)
-    flight = Flight(
+
+def grows_with_gains(settings: Settings, vehicle: Vehicle, axis: int, gains: Sequence[float]) -> list[bool]:
+    """Return the same of flights side by side, whose commands of that axis are multiplied by gains."""
+    flight = _hover(settings, vehicle, axis, flights=len(gains))
+    factors = np.ones((len(gains), 2))
+    factors[:, axis] = gains
+    trace = fly(flight, Scaled(CompiledController(settings, len(gains)), factors))
+    return _grown(trace, settings, axis)
+
+
+def _hover(
+    settings: Settings, vehicle: Vehicle, axis: int, *, delay_ticks: int = 0, flights: int = 1
+) -> Flight:
+    return Flight(
         Hover(),
-        duration_s=duration_s,
+        duration_s=30.0,
         vehicle=vehicle,
         update_period_s=settings.horizon.update_period_s,
-        offset=Offset(offset_m),
+        offset=Offset((0.0, 1e-3, 0.0) if axis == 0 else (1e-3, 0.0, 0.0)),
         link=Link(delay_ticks),
+        flights=flights,
     )
-    controller = CompiledController(settings)
-    if gain == 1.0:
-        trace = simulate.fly(flight, controller)
-    else:
-        trace = fly(flight, Scaled(controller, (gain, 1.0) if axis == 0 else (1.0, gain)))
-    large = np.flatnonzero(np.abs(trace.command_rad[:, 0]).max(axis=1) > 0.5 * settings.limits.tilt_rad)
-    moved_m = np.abs(trace.position_m[: large[0] if len(large) else None, 0, 1 - axis])
-    fifth = len(moved_m) // 5
-    return bool(moved_m[-fifth:].max() > moved_m[fifth : 2 * fifth].max())
+
+
+def _grown(trace: Trace, settings: Settings, axis: int) -> list[bool]:
+    """Compare the largest displacement in the last fifth of each flight with that in the second fifth.
+
+    A flight ends before a command reaches half the tilt limit.
+    """
+    found = []
+    for index in range(trace.command_rad.shape[1]):
+        large = np.flatnonzero(
+            np.abs(trace.command_rad[:, index]).max(axis=1) > 0.5 * settings.limits.tilt_rad
+        )
+        moved_m = np.abs(trace.position_m[: large[0] if len(large) else None, index, 1 - axis])
+        fifth = len(moved_m) // 5
+        found.append(bool(moved_m[-fifth:].max() > moved_m[fifth : 2 * fifth].max()))
+    return found

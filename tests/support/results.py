@@ -178,7 +178,7 @@ def faults_folder(folder: Path) -> None:
         Verdict(course, fault, False, ("OK", "BAD_STATE"), True, 0.35, 0.3, error, 0.07, 0.25, back, end)
         for course in ("eight", "hover")
         for fault, error, back, end in (
-            (HOSTILE, 0.06, 0.0, End.BACK),
+            (HOSTILE, 0.06, 0.0, End.RECOVERED),
             ("state NaN to the end", 2376.5, np.nan, End.CRASHED),
         )
     ]

@@ -1,5 +1,6 @@
 """The command line `mambo-nmpc` with all its commands."""
 
+import inspect
 import os
 from collections.abc import Callable
 from typing import Final
@@ -118,7 +119,12 @@ def app() -> typer.Typer:
             lines = [line for line in EXAMPLES.splitlines() if line.split()[1] == name]
             more = [VERIFY_EXIT_CODES] if name == "verify" else []
             epilog = examples(*lines, *more) if lines else None
-            joined.command(name, cls=Command, epilog=epilog, rich_help_panel=panel)(command)
+            what, when, *rest = (inspect.getdoc(command) or "").split("\n\n")
+            shown = "\n\n".join((f"{what}\n{when}", *rest))
+            add = joined.command(
+                name, cls=Command, help=shown, short_help=what, epilog=epilog, rich_help_panel=panel
+            )
+            add(command)
     return joined
 
 

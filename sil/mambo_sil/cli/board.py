@@ -56,6 +56,8 @@ def footprint(
 ) -> None:
     """Measure flash, RAM, stack and instructions on boards; exit 1 if one exceeds its budget.
 
+    Before you choose a board, and in a CI that keeps its budget.
+
     With --port also cycles and stack of the same steps on the board there; exit 1 if its bits differ.
     """
     from mambo_sil.board.footprint.footprint_report import FootprintSummary, page, summarise, text
@@ -124,10 +126,13 @@ def sweep(
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
-    """Vary one or two settings; measure footprint and tracking error of each controller."""
+    """Vary one or two settings; measure footprint and tracking error of each controller.
+
+    When a controller does not fit its board, or to see what a setting costs.
+    """
     from mambo_codegen import boards
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
-    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
+    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, points_text, write_points
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.campaign.executors import processes
@@ -161,7 +166,7 @@ def sweep(
         )
         summary.write(folder)
     shown = ([] if best is None else [best]) if fit else points
-    text = "\n".join(map(point_text, shown)) or f"nothing fits {chosen.title}"
+    text = points_text(shown) if shown else f"nothing fits {chosen.title}"
     show(summary, text, as_json=as_json)
     typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
     if fit and best is None:
@@ -231,12 +236,15 @@ def same_bits(
     baud: Baud = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
+    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs.
+
+    When you change compiler, flags or board: whether the C still computes the same bits.
+    """
     from mambo_codegen.bundle.digest import TICKS, episode_count
     from mambo_codegen.methods import method_of
     from mambo_sil.board.footprint.build_digests import (
-        REFERENCE,
         BuildDigest,
+        builds_text,
         count_builds,
         run_everywhere,
         run_on_board,
@@ -262,21 +270,12 @@ def same_bits(
             found.append(result)
             if port is None:
                 progress(len(found) / count_builds(chosen))
-            if not as_json:
-                what = result.reason if result.digest is None else result.digest
-                typer.echo(f"{result.where:12}{result.compiler:26}{result.optimisation:5}{what}")
     total = count * TICKS
-    reference = next(result.digest for result in found if result.where == REFERENCE)
-    ran = [result for result in found if result.digest is not None]
-    others = [result for result in ran if result.digest != reference]
+    same = all(one.digest in (None, found[0].digest) for one in found)
     if as_json:
-        document = {"steps": total, "same": not others, "builds": [asdict(one) for one in found]}
+        document = {"steps": total, "same": same, "builds": [asdict(one) for one in found]}
         typer.echo(json.dumps(document, indent=2))
     else:
-        typer.echo(
-            f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference over {total} "
-            "self-test steps; "
-            f"{len(found) - len(ran)} not run"
-        )
-    if others:
+        typer.echo(builds_text(found, source, total))
+    if not same:
         raise typer.Exit(1)

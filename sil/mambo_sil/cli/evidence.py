@@ -40,14 +40,17 @@ def verify(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Generate the C of a controller, prove and test it, and keep the evidence."""
+    """Generate the C of a controller, prove and test it, and keep the evidence.
+
+    Before a release, or for somebody who must be shown that the C has no run-time error.
+    """
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.results.folders import SUMMARY, digests, new_results
     from mambo_sil.results.scratch import check_tmpdir
     from mambo_sil.verify.check import CheckOutcome
-    from mambo_sil.verify.verify_report import PAGE, VerifySummary, closing, page, summarise
+    from mambo_sil.verify.verify_report import PAGE, VerifySummary, page, summarise, verify_text
 
     settings = load(source, scalar)
     chosen = _chosen_checks(only)
@@ -58,12 +61,12 @@ def verify(
     ):
         folder = place.resolve()
         bundle.write(render(settings), folder / CONTROLLER)
-        found = _run_checks(chosen, settings, folder, bar, aloud=not as_json)
+        found = _run_checks(chosen, settings, folder, bar)
         summary = summarise(found, source, settings)
         (folder / PAGE).write_text(page(summary), "utf-8")
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show(summary, closing(found), as_json=as_json)
+    show(summary, verify_text(summary), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {PAGE}, {SUMMARY}, {CONTROLLER}, {REPORTS}", err=True)
     if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
@@ -83,12 +86,12 @@ def _chosen_checks(only: str | None) -> "Sequence[Entry]":
 
 
 def _run_checks(
-    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar", *, aloud: bool
+    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar"
 ) -> "list[Verified]":
-    """Run the checks one after the other, each in its own folder; with `aloud` print each result."""
+    """Run the checks one after the other, each in its own folder."""
     from mambo_sil.verify.check import Subject
     from mambo_sil.verify.tools import versions
-    from mambo_sil.verify.verify_report import Verified, line
+    from mambo_sil.verify.verify_report import Verified
 
     found: list[Verified] = []
     bar(0)
@@ -101,8 +104,6 @@ def _run_checks(
         tools = versions(entry.tools) | dict(result.tools)
         found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
         bar(len(found))
-        if aloud:
-            typer.echo(line(found[-1]))
     return found
 
 
@@ -126,7 +127,10 @@ def regress(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline."""
+    """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline.
+
+    After every change of settings, and in a CI: whether everything flies that flew before.
+    """
     from mambo_sil.experiment.campaign.campaign_file import load_entrant
     from mambo_sil.experiment.regress.baseline import (
         baseline_path,
@@ -207,7 +211,10 @@ def table2(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims."""
+    """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims.
+
+    For readers of the paper; nothing else needs it.
+    """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.experiment.table2.table2 import (
         PRESETS,
@@ -240,17 +247,22 @@ def table2(
 
 def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.experiment.table2.sensed import PRESETS, SensedSummary, fly_sensed, text
+    from mambo_sil.experiment.table2.sensed import (
+        PRESETS,
+        SensedSummary,
+        fly_sensed,
+        sensed_markdown,
+        sensed_text,
+    )
     from mambo_sil.results.folders import new_results
 
     settings = {name: load(name, scalar) for name in PRESETS}
     with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
             summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
-        table = text(summary.rows)
-        (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
+        (folder / SENSED_TABLE).write_text(sensed_markdown(summary.rows) + "\n", "utf-8")
         summary.write(folder)
-    show(summary, table, as_json=as_json)
+    show(summary, sensed_text(summary.rows), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)
 
 
@@ -265,7 +277,10 @@ def report(
     ] = Path("report.html"),
     as_json: AsJson = False,
 ) -> None:
-    """Collect results on one HTML page that needs no network and no other file."""
+    """Collect results on one HTML page that needs no network and no other file.
+
+    To show results to somebody, or to keep them.
+    """
     from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 

@@ -54,7 +54,10 @@ def generate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Generate the C of a controller into a folder, with --for one that builds for a drone or a tool."""
+    """Generate the C of a controller into a folder, with --for one that builds for a drone or a tool.
+
+    When the settings fly in simulation, and shall go into a firmware.
+    """
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render, render_target
     from mambo_codegen.settings import controller_toml
@@ -120,7 +123,10 @@ def identify_binary(
     *,
     as_json: AsJson = False,
 ) -> None:
-    """Show which controllers a firmware image holds; exit 1 if it has none, or lacks one of SOURCE."""
+    """Show which controllers a firmware image holds; exit 1 if it has none, or lacks one of SOURCE.
+
+    Before you flash an image, or to know what an old one flies.
+    """
     from mambo_codegen.settings import presets
     from mambo_sil.board.firmware.identity import held_controllers, identity_text, missing, name_settings
 

@@ -48,7 +48,10 @@ def margins(
     output: OptionalResults = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure gain, phase and delay margins of a controller on a drone at hover; exit 1 if it is unstable."""
+    """Measure gain, phase and delay margins of a controller on a drone at hover; exit 1 if it is unstable.
+
+    Before a first flight: how wrong the model, or how late the position, may be.
+    """
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES
     from mambo_sil.experiment.margins.margins_report import margins_text

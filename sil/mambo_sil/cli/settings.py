@@ -22,6 +22,7 @@ from mambo_sil.cli.options import (
     output_option,
     show,
 )
+from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -34,20 +35,24 @@ if TYPE_CHECKING:
 
 
 def list_presets(as_json: AsJson = False) -> None:
-    """List the presets and their purpose."""
+    """List the presets and their purpose.
+
+    To choose the settings to start from.
+    """
     from mambo_codegen.settings.toml_file import PRESETS
 
     described = {name: PRESETS.description(name) for name in PRESETS.names()}
     if as_json:
         typer.echo(json.dumps(described, indent=2))
         return
-    width = max(map(len, described))
-    for name, description in described.items():
-        typer.echo(f"{name:<{width}}  {description}")
+    typer.echo("\n".join(table((), list(described.items()), (0, 1))))
 
 
 def schema() -> None:
-    """Print the JSON schema of controller.toml; editors check and complete TOML with it."""
+    """Print the JSON schema of controller.toml; editors check and complete TOML with it.
+
+    When you edit settings by hand.
+    """
     from mambo_codegen.settings.model import Settings
 
     typer.echo(json.dumps(Settings.json_schema(), indent=2))
@@ -64,7 +69,10 @@ def vehicles(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """List the drones that can be flown, or print the file of one to start from."""
+    """List the drones that can be flown, or print the file of one to start from.
+
+    When you describe a drone of your own.
+    """
     from mambo_sil.drone.vehicles import VEHICLES
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
@@ -80,9 +88,7 @@ def vehicles(
     if as_json:
         typer.echo(json.dumps(described, indent=2))
         return
-    width = max(map(len, described))
-    for each, description in described.items():
-        typer.echo(f"{each:<{width}}  {description}")
+    typer.echo("\n".join(table((), list(described.items()), (0, 1))))
 
 
 def identify(
@@ -111,7 +117,10 @@ def identify(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Identify gain, lag and dead time of a drone from flight logs; exit 1 if they do not show them."""
+    """Identify gain, lag and dead time of a drone from flight logs; exit 1 if they do not show them.
+
+    When you have a drone that flies: its log becomes the model for which `design` derives settings.
+    """
     if manoeuvre is not None:
         if logs or columns:
             raise typer.BadParameter("is used without logs and without --columns", param_hint="--manoeuvre")
@@ -163,7 +172,10 @@ def design(
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
 ) -> None:
-    """Derive settings from a drone; write a controller.toml that says the reason of each."""
+    """Derive settings from a drone; write a controller.toml that says the reason of each.
+
+    For every drone that is not a shipped one, before you tune anything by hand.
+    """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.model.derive.derived_settings import controller_text
@@ -187,7 +199,7 @@ def _print_margins(settings: "Settings", drone: "VehicleFile") -> None:
     except BuildError as error:
         said = [f"no margins: {error}"]
     for line in said:
-        typer.echo(line, err=True)
+        typer.echo(sentence(line), err=True)
 
 
 def tune(
@@ -208,7 +220,10 @@ def tune(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Search for settings that track well with calm commands; continue an interrupted search."""
+    """Search for settings that track well with calm commands; continue an interrupted search.
+
+    When the settings of `design` are not good enough, and an hour of search is worth it.
+    """
     from mambo_sil.cli.progress import counting_bar
 
     with counting_bar("starting", "trials", trials) as bar:
@@ -307,7 +322,10 @@ def diff(
     vehicle: Drone = "mambo",
     as_json: AsJson = False,
 ) -> None:
-    """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not."""
+    """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not.
+
+    After a change of settings: what it does to the flight before you fly it.
+    """
     from mambo_codegen.settings import presets
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.drone.vehicles import vehicle_toml

@@ -10,6 +10,7 @@ import typer
 from mambo_codegen.errors import echo
 from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, output_option, write_file
 from mambo_sil.cli.options import AsJson, Drone, show
+from mambo_sil.results.terminal import sentence
 
 
 def init(
@@ -22,7 +23,10 @@ def init(
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
 ) -> None:
-    """Write a controller.toml that holds and explains every setting."""
+    """Write a controller.toml that holds and explains every setting.
+
+    To begin with settings of your own.
+    """
     from mambo_codegen.settings import controller_toml, presets
     from mambo_codegen.settings.toml_file import PRESETS
 
@@ -33,7 +37,10 @@ def init(
 
 
 def doctor(*, as_json: AsJson = False) -> None:
-    """List which compilers, emulators and analysers are installed, and what needs those that are missing."""
+    """List which compilers, emulators and analysers are installed, and what needs those that are missing.
+
+    When a command says that a tool is missing.
+    """
     from mambo_sil.board.firmware.tool_report import doctor_text, examine
 
     findings = examine()
@@ -57,7 +64,10 @@ def playground(
     vehicle: Drone = "mambo",
     as_json: AsJson = False,
 ) -> None:
-    """Write an HTML page, without network, in which the generated C flies a simulated drone in real time."""
+    """Write an HTML page, without network, in which the generated C flies a simulated drone in real time.
+
+    To see how controllers fly before you read a figure.
+    """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
@@ -70,8 +80,6 @@ def playground(
             text, flown = playground_page(found, drone, bar)
         size = write(text)
     summary = PlaygroundSummary(page=str(output), bytes=size, vehicle=drone, controllers=flown)
-    lines = [
-        f"{one.title}: its proof flight has the SHA-256 {made.trace_sha256}"
-        for one, made in zip(found, flown, strict=True)
-    ]
-    show(summary, "\n".join([*lines, f"{echo(str(output))}: {size / 1000:.0f} kB"]), as_json=as_json)
+    names = ", ".join(one.title for one in found)
+    said = f"{echo(str(output))}: open it in a browser; {names} fly {echo(drone.name)}; {size / 1000:.0f} kB"
+    show(summary, sentence(said), as_json=as_json)

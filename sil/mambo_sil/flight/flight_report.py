@@ -1,5 +1,6 @@
 """The summary of a flight as a record, as text and as a section of the report."""
 
+from collections.abc import Iterator
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import SerializerFunctionWrapHandler, model_serializer
 
+from mambo_codegen.errors import echo
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
@@ -18,10 +20,10 @@ from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measu
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
+from mambo_sil.results.metric_names import named
+from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
-
-_UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
-_UNITS |= {"_rad": "rad", "_m": "m"}
+from mambo_sil.results.terminal import sentence, table
 
 
 class FlightSummary(ReportedSummary):
@@ -47,7 +49,7 @@ class FlightSummary(ReportedSummary):
         columns = {
             "whole flight": self.metrics,
             "after 10 s": self.metrics_without_transient,
-            "as seen": self.metrics_as_seen,
+            "as estimated": self.metrics_as_seen,
         }
         return {heading: values for heading, values in columns.items() if values is not None}
 
@@ -243,37 +245,45 @@ def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any
 
 
 def flight_text(summary: FlightSummary) -> str:
-    """Format a summary: a metric per line, columns with and without the transient, and as seen."""
+    """Format a summary: the answer, then a metric per line, with and without the transient, and estimated."""
     columns = summary.columns
-    lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
+    rows = []
     for key in summary.metrics:
         name, unit = named(key)
-        lines.append(
-            f"{name:22}" + "".join(f"{values[key]:14.5g}" for values in columns.values()) + f"  {unit}"
-        )
+        rows.append((name, *(digits(values[key]) for values in columns.values()), unit))
+    lines = [*_answer(summary), *table(("", *columns, ""), rows, (0, -1))]
+    if summary.metrics_as_seen is not None:
+        lines.append("as estimated: error of the estimated position, which the controller knows")
     quiet = ("OK", "NOT_CALLED")
     refused = {name: count for name, count in summary.statuses.items() if name not in quiet}
     if refused:
         lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
-        lines += [f"  {sentence}" for sentence in summary.refusals]
+        lines += [sentence(f"  {one}", "  ") for one in summary.refusals]
     if isinstance(summary, RepeatSummary) and summary.same_bits_as_recorded is not None:
         same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
         lines.append(f"repetition: the trace {same} the recorded one, bit for bit")
     if isinstance(summary, FlySummary) and summary.board is not None:
         same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
         lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
-    if summary.crash is not None:
-        lines.append(f"CRASHED at {summary.crash.time_s:.2f} s: {summary.crash.how}")
-    if summary.lost:
-        lines.append("LOST: the drone diverged before the end of the flight")
-    elif summary.mostly_refused:
-        lines.append("NOT CONTROLLED: the controller refused more than half of its inputs")
     return "\n".join(lines)
 
 
-def named(key: str) -> tuple[str, str]:
-    """Split the key of a metric, such as rms_error_m, into its name and its unit."""
-    suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
-    name = key.removesuffix(suffix).replace("_", " ")
-    words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]
-    return " ".join(words), _UNITS.get(suffix, "")
+def _answer(summary: FlightSummary) -> Iterator[str]:
+    """Yield how close the drone came to its target, and what went wrong."""
+    flown = summary.scenario if isinstance(summary, RepeatSummary) else summary
+    name = summary.controller
+    if isinstance(summary, FlySummary) and name not in PD_TITLES and summary.source is not None:
+        name = echo(summary.source)
+    metrics = summary.metrics
+    if "iae_m_s" in metrics and isinstance(flown, FlySummary | Scenario):
+        mean_m = metrics["iae_m_s"] / flown.duration_s
+        yield sentence(
+            f"{name} on {echo(flown.vehicle.name)}: {distance(mean_m)} in the mean, "
+            f"{distance(metrics['max_error_m'])} at most"
+        )
+    if summary.crash is not None:
+        yield sentence(f"CRASHED at {summary.crash.time_s:.2f} s: {summary.crash.how}")
+    if summary.lost:
+        yield "LOST: the drone diverged before the end of the flight"
+    elif summary.mostly_refused:
+        yield "NOT CONTROLLED: the controller refused more than half of its inputs"

@@ -15,6 +15,14 @@ def three_digits(value: float) -> str:
     return f"{value:#.3g}".rstrip(".") if abs(value) < 1000 else f"{value:.0f}"
 
 
+def distance(value_m: float) -> str:
+    """Format a distance in cm with two significant digits, in m from 1 m on."""
+    if not math.isfinite(value_m):
+        return _DASH
+    value, unit = (value_m, "m") if abs(value_m) >= 0.995 else (100.0 * value_m, "cm")
+    return f"{float(f'{value:.2g}'):g} {unit}" if value else f"0 {unit}"
+
+
 def digits_or_dash(value: float | None) -> str:
     """Format a value as `digits` does, and None, NaN and infinity as a dash."""
     return _DASH if value is None or not math.isfinite(value) else digits(value)

@@ -8,7 +8,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.experiment.faults.fault_flights import STRAY_M, End, Verdict, fly_faults
-from mambo_sil.experiment.faults.faults_report import table, write_csv
+from mambo_sil.experiment.faults.faults_report import faults_markdown, write_csv
 from mambo_sil.experiment.faults.scenarios import TO_THE_END, scenarios
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library, load_library
@@ -20,7 +20,7 @@ def check(subject: Subject) -> Result:
     """Fly with every fault; raises BuildError, CacheError and FlightError."""
     settings = subject.settings
     verdicts = fly_faults(settings, partial(controller, subject))
-    (subject.folder / "faults.md").write_text(table(verdicts) + "\n", "utf-8")
+    (subject.folder / "faults.md").write_text(faults_markdown(verdicts) + "\n", "utf-8")
     write_csv(verdicts, subject.folder / "faults.csv")
     return replace(judge(verdicts, settings), tools={"compiler": host_toolchain().identity().splitlines()[0]})
 
@@ -56,7 +56,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
             wrong.append(f"{where}: statuses {verdict.statuses}")
         if verdict.end is End.CRASHED and not strays and verdict.fault not in may_crash:
             wrong.append(f"{where}: crashed")
-        if verdict.end is End.AWAY and not strays and verdict.fault in ending:
+        if verdict.end is End.NOT_RECOVERED and not strays and verdict.fault in ending:
             wrong.append(f"{where}: did not recover")
     figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
     if wrong:
@@ -69,7 +69,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
 
 def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
-    back = [verdict for verdict in verdicts if verdict.end is End.BACK]
+    back = [verdict for verdict in verdicts if verdict.end is End.RECOVERED]
     slowest = max((v for v in back if v.fault in ending), key=lambda verdict: verdict.recovery_s)
     crashes = sorted({verdict.fault for verdict in verdicts if verdict.end is End.CRASHED})
     lost = (
@@ -79,6 +79,6 @@ def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
     )
     return (
         f"{len(verdicts)} faults: {lost}, command at most "
-        f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
+        f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} recovered, "
         f"the last {slowest.recovery_s:.1f} s after '{slowest.fault}'"
     )

@@ -8,10 +8,12 @@ from typing import Any, Final
 
 from pydantic import Field
 
+from mambo_codegen.errors import echo
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.results.html_page import render_page
 from mambo_sil.results.summary import ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
 
@@ -47,11 +49,8 @@ class VerifySummary(ReportedSummary):
 
     def section(self, _folder: Path) -> Section:
         """Return the section of the report on this verification."""
-        passed = sum(check.outcome is CheckOutcome.PASSED for check in self.checks)
-        finding = f"{self.verdict}: {passed} of {len(self.checks)} checks passed"
-        finding += f"; not run: {', '.join(self.not_run)}" if self.not_run else ""
         title = f"Verification of {self.source}"
-        return Section("verify", title, self.verdict is CheckOutcome.PASSED, finding, self)
+        return Section("verify", title, self.verdict is CheckOutcome.PASSED, finding(self), self)
 
 
 def verdict(found: Sequence[Verified]) -> CheckOutcome:
@@ -61,17 +60,20 @@ def verdict(found: Sequence[Verified]) -> CheckOutcome:
     return next(outcome for outcome in worst_first if outcome in outcomes)
 
 
-def line(one: Verified) -> str:
-    """Format one check as a line."""
-    return f"{one.name:12}{one.outcome:12}{one.evidence}"
+def finding(summary: VerifySummary) -> str:
+    """Return the result in one line: how many checks passed, failed, lacked a tool, and which did not run."""
+    counted = Counter(one.outcome for one in summary.checks)
+    said = f"{counted[CheckOutcome.PASSED]} of {len(summary.checks)} checks passed"
+    for outcome in (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE):
+        said += f", {counted[outcome]} {outcome}" if counted[outcome] else ""
+    return said + (f"; not run: {', '.join(summary.not_run)}" if summary.not_run else "")
 
 
-def closing(found: Sequence[Verified]) -> str:
-    """Format the verdict and the list of checks that did not run."""
-    counted = Counter(one.outcome for one in found)
-    counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
-    left_out = _left_out(found)
-    return f"verdict: {verdict(found)} ({counts})" + (f"; not run: {', '.join(left_out)}" if left_out else "")
+def verify_text(summary: VerifySummary) -> str:
+    """Return a summary as text: the answer, then a row for each check."""
+    rows = [(one.name, one.outcome, one.evidence) for one in summary.checks]
+    answer = sentence(f"{echo(summary.source)}: {finding(summary)}")
+    return "\n".join([answer, "", *table(("check", "result", "evidence"), rows, (0, 1, 2))])
 
 
 def summarise(found: Sequence[Verified], source: str, settings: Settings) -> VerifySummary:

@@ -3,9 +3,26 @@ const STEP_M = 0.25, AWAY_M = 30, LEAST_FENCE_M = 0.5, FENCE_M = 1;
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 const WAYS = { "1,0": "right", "-1,0": "left", "0,1": "down", "0,-1": "up" };
 const find = (id) => document.getElementById(id);
-const metres = (value) => `${value.toFixed(value < 9.995 ? 2 : 1)} m`;
+const distance = (value) => (value < 0.0995 ? `${(100 * value).toFixed(1)} cm` : value < 9.995 ? `${(100 * value).toFixed(0)} cm` : `${value.toFixed(1)} m`);
 const titles = (drones) => drones.map((drone) => drone.entry.title).join(", ");
 const say = (text) => { find("status").textContent = text; };
+
+/* Mean distance of a drone to the target over the history, without the time in which it was lost. */
+function meanOf(history, drone) {
+  const errors = history.map((row) => errorOf(row, drone)).filter(Number.isFinite);
+  return errors.reduce((sum, one) => sum + one, 0) / errors.length;
+}
+
+/* In words: who is closest in the mean of `seconds`, how much farther away the others are, and who is lost, and why. */
+function verdict(drones, means, seconds) {
+  const shown = drones.map((drone, index) => ({ drone, name: drone.entry.title, mean: means[index] })).filter(({ drone }) => drone.shown);
+  const [best, ...others] = shown.filter(({ drone, mean }) => !drone.lost && mean > 0).sort((a, b) => a.mean - b.mean);
+  const lost = shown.filter(({ drone }) => drone.lost).map(({ drone, name }) => `${name} is lost: ${drone.lost.why}; it starts again at the target.`);
+  const again = shown.filter(({ drone }) => drone.losses && !drone.lost).map(({ drone, name }) => `${name} was lost ${drone.losses === 1 ? "once" : `${drone.losses} times`}.`);
+  const farther = others.map(({ name, mean }) => `${name} ${(mean / best.mean).toFixed(mean < 9.95 * best.mean ? 1 : 0)} times as far`);
+  const first = best && `${best.name} is closest: ${distance(best.mean)} from the target in the mean of the last ${Math.round(seconds)} s`;
+  return [...(best ? [`${[first, ...farther].join(", ")}.`] : []), ...lost, ...again].join(" ");
+}
 
 class Controls {
   constructor(world, field, player) {
@@ -59,17 +76,18 @@ class Controls {
     find("fence").textContent = this.world.fence ? "Remove the fence" : this.field.drawing ? "Cancel the fence" : "Draw a fence";
   }
 
-  /* The table's figures. */
+  /* The table's figures, and the verdict. */
   numbers() {
-    const { history, drones } = this.world, now = history.at(-1);
+    const { history, drones } = this.world, now = history.at(-1), means = drones.map((_, index) => meanOf(history, index));
     this.rows.forEach((row, index) => {
-      const mean = history.reduce((sum, one) => sum + errorOf(one, index), 0) / history.length;
       const put = (name, text) => { row.querySelector(name).textContent = text; };
-      const error = errorOf(now, index);
-      put(".error", !Number.isFinite(error) ? "lost" : drones[index].answer[0] > 0n ? "refused" : metres(error));
-      put(".mean", Number.isFinite(mean) ? metres(mean) : "\u2013");
-      put(".tilt", Number.isFinite(error) ? `${tiltOf(now, index).toFixed(0)}\u00b0` : "\u2013");
+      const { lost, answer } = drones[index];
+      put(".error", lost ? "lost" : answer[0] > 0n ? "refused" : distance(errorOf(now, index)));
+      put(".mean span", Number.isFinite(means[index]) ? distance(means[index]) : "\u2013");
+      put(".tilt", lost ? "\u2013" : `${tiltOf(now, index).toFixed(0)}\u00b0`);
+      row.querySelector(".bar").style.width = `${100 * Math.min(LOGARITHMIC_CM.share(100 * (means[index] || 0)), 1)}%`;
     });
+    find("verdict").textContent = verdict(drones, means, history.length * this.world.data.period_s);
     const limited = drones.filter((drone) => drone.limited), without = titles(drones.filter((drone) => !drone.limited));
     const speeds = limited.map((drone) => `${drone.entry.title} ${drone.speedWords}`);
     find("limits").textContent = [...speeds, ...(without ? [`without limits: ${without}`] : [])].join("; ");

@@ -133,8 +133,8 @@ class Field {
   /* A disc with the number of the table; at the edge of the field if the drone is beyond it. */
   drone(context, palette, now, index, stroke) {
     const [x, y, roll, pitch] = now.slice(3 + PER_DRONE * index, 3 + PER_DRONE * (index + 1));
-    if (!Number.isFinite(x)) return;
     const one = this.world.drones[index], colour = palette.hues[one.entry.hue], length = TILT_M_RAD * this.view.width / VIEW_M;
+    if (one.lost) return this.wreck(context, palette, one, colour, stroke);
     stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
     const inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
     const [px, py] = this.pixels(x, y);
@@ -148,6 +148,17 @@ class Field {
     context.fillText(index + 1, cx, cy + 0.5);
     Object.assign(context, { textAlign: "start", textBaseline: "alphabetic" });
     if (one.active.length) this.label(context, palette, one.speedWords, cx, cy);
+  }
+
+  /* A cross where a drone was lost, at the edge of the field if that is beyond it, and why. */
+  wreck(context, palette, drone, colour, stroke) {
+    const { clientWidth, clientHeight } = this.canvas, inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
+    const [px, py] = this.pixels(...drone.lost.place), [x, y] = [inside(px, clientWidth), inside(py, clientHeight)];
+    for (const way of [1, -1]) {
+      stroke([[-1, -way], [1, way]].map(([dx, dy]) => this.view.metres(x + RADIUS_PX * dx, y + RADIUS_PX * dy)), colour, 3);
+    }
+    context.font = "bold 12px system-ui, sans-serif";
+    this.label(context, palette, `${drone.entry.title} is lost: ${drone.lost.why}`, x, y);
   }
 
   /* Words beside a drone, on the side where there is room. */

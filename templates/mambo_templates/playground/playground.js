@@ -73,8 +73,8 @@ async function start() {
   const drones = await Promise.all(data.drones.map(async (entry) => new Drone(await Module.load(entry), entry, data)));
   const world = new World(drones, data), field = new Field(find("field"), world);
   const plots = [
-    new Plot(find("errors"), world, errorOf, [0.5, 1, 2, 5, 10, 20, 50, 100]),
-    new Plot(find("tilts"), world, tiltOf, [10, 20, 40, 90, 180]),
+    new Plot(find("errors"), world, (row, drone) => 100 * errorOf(row, drone), LOGARITHMIC_CM),
+    new Plot(find("tilts"), world, tiltOf, DEGREES),
   ];
   const player = new Player(world, [field, ...plots]);
   player.controls = new Controls(world, field, player);

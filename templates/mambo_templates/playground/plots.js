@@ -1,10 +1,13 @@
-/* Plots over the last seconds; each drone has its colour and its dashes. */
-const LEFT_PX = 34, BOTTOM_PX = 20, TOP_PX = 6;
+/* Plots over the last seconds; each drone has its colour and its dashes. The axes stay: a larger value is at the upper edge. */
+const LEFT_PX = 40, BOTTOM_PX = 20, TOP_PX = 6;
+
+/* Vertical axes: the marks, and where a value is, from 0 at the lower end to 1 at the upper. */
+const LOGARITHMIC_CM = { marks: [0.1, 1, 10, 100, 1000], share: (value) => (Math.log10(Math.max(value, 0.1)) + 1) / 4 };
+const DEGREES = { marks: [0, 20, 40], share: (value) => value / 40 };
 
 class Plot {
-  /* `limits` are the possible upper ends of the vertical axis. */
-  constructor(canvas, world, value, limits) {
-    Object.assign(this, { canvas, world, value, limits });
+  constructor(canvas, world, value, axis) {
+    Object.assign(this, { canvas, world, value, axis });
   }
 
   draw(palette) {
@@ -12,16 +15,14 @@ class Plot {
     const bottom = height - BOTTOM_PX, last = rows.at(-1)[0], first = Math.max(last, HISTORY_S) - HISTORY_S;
     const shown = drones.map((drone, index) => index).filter((index) => drones[index].shown).reverse();
     const lines = shown.map((index) => [index, rows.map((row) => this.value(row, index))]);
-    const highest = lines.reduce((most, [, values]) => values.reduce((a, b) => (b > a ? b : a), most), 0);
-    const limit = this.limits.find((one) => one >= highest) ?? this.limits.at(-1);
     const x = (time) => LEFT_PX + (time - first) / HISTORY_S * (width - LEFT_PX - 2);
-    const y = (value) => bottom - Math.min(value / limit, 1) * (bottom - TOP_PX);
+    const y = (value) => bottom - Math.min(this.axis.share(value), 1) * (bottom - TOP_PX);
     Object.assign(context, { strokeStyle: palette.line, fillStyle: palette.quiet, lineWidth: 1, font: "12px system-ui, sans-serif", textAlign: "right", textBaseline: "middle" });
     context.beginPath();
-    for (const share of [0, 0.5, 1]) {
-      context.moveTo(LEFT_PX, y(share * limit));
-      context.lineTo(width, y(share * limit));
-      context.fillText(share * limit, LEFT_PX - 6, y(share * limit));
+    for (const mark of this.axis.marks) {
+      context.moveTo(LEFT_PX, y(mark));
+      context.lineTo(width, y(mark));
+      context.fillText(mark, LEFT_PX - 6, y(mark));
     }
     context.stroke();
     Object.assign(context, { textAlign: "center", textBaseline: "alphabetic" });
@@ -32,7 +33,11 @@ class Plot {
       Object.assign(context, { strokeStyle: palette.hues[drones[index].entry.hue], lineWidth: 1.8, lineJoin: "round" });
       context.setLineDash(drones[index].entry.dash);
       context.beginPath();
-      values.forEach((value, row) => { if (value === value) context.lineTo(x(rows[row][0]), y(value)); });
+      values.forEach((value, row) => {
+        if (value !== value) return; /* the drone is lost: a gap */
+        const there = values[row - 1] === values[row - 1] && row > 0;
+        context[there ? "lineTo" : "moveTo"](x(rows[row][0]), y(value));
+      });
       context.stroke();
     }
     context.setLineDash([]);

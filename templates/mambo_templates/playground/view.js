@@ -1,5 +1,5 @@
 /* What the field shows: all that is near the start, or target, fence and drones that are not lost, wherever they are. */
-const VIEW_M = 5.6, MOST_VIEW_M = 80, LOST_M = 50, MARGIN = 1.3, INSET_M = 0.07, EASE_1_S = 3, ZOOM_1_S = 1.5, BAND_PX = 28;
+const VIEW_M = 5.6, MOST_VIEW_M = 80, MARGIN = 1.3, INSET_M = 0.07, EASE_1_S = 3, ZOOM_1_S = 1.5, BAND_PX = 28;
 
 class View {
   constructor(canvas, world) {
@@ -30,7 +30,7 @@ class View {
     if (fence) points.push(fence.slice(0, 2), fence.slice(2));
     world.drones.forEach((drone, index) => {
       const first = 3 + PER_DRONE * index;
-      if (drone.shown && errorOf(now, index) < LOST_M) points.push([now[first], now[first + 1]]);
+      if (drone.shown && !drone.lost) points.push([now[first], now[first + 1]]);
     });
     const aspect = canvas.clientHeight / canvas.clientWidth, home = [VIEW_M / 2, VIEW_M / 2 * aspect];
     if (points.every((point) => point.every((value, axis) => Math.abs(value) <= home[axis] - INSET_M))) {

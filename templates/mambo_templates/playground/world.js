@@ -1,5 +1,5 @@
 /* All drones with one target, one wind and one clock. The same scenario flies the same bits in every browser. */
-const HISTORY_S = 10, IMPULSE_N_S = 0.04;
+const HISTORY_S = 10, IMPULSE_N_S = 0.04, LOST_M = 50, LOST_S = 3;
 
 /* Numbers in [0, 1) from a seed of 32 bits (mulberry32); the sum of twelve less 6 is nearly normal, and exact. */
 function normals(seed) {
@@ -27,28 +27,34 @@ class World {
   begin() {
     Object.assign(this, { updates: 0, history: [], impulse: null, draw: normals(1) });
     this.target.begin();
-    const first = this.draw(3);
-    for (const drone of this.drones) {
-      drone.begin(this.target.now, [...first, ...new Float64Array(3 * this.data.ticks)]);
-    }
-    this.dials.forEach((place, index) => this.turn(index, place));
-    this.enclose(this.fence);
+    this.first = [...this.draw(3), ...new Float64Array(3 * this.data.ticks)];
+    this.drones.forEach((drone) => { drone.losses = 0; this.start(drone); });
     this.record();
+  }
+
+  /* Puts a drone at the target, at rest, with all that the sliders and the fence say. */
+  start(drone) {
+    Object.assign(drone, { lost: null, born: this.updates });
+    drone.begin(this.target.now, this.first);
+    this.dials.forEach((place, index) => this.apply(drone, this.data.dials[index], place));
+    if (drone.limited) drone.enclose(this.fence);
   }
 
   /* Sets a slider. */
   turn(index, place) {
-    const dial = this.data.dials[index];
     this.dials[index] = place;
-    for (const drone of dial.drone === null ? this.drones : [this.drones[dial.drone]]) {
-      if (dial.drone !== null) {
-        drone.setWeights(dial.members.weights[place]);
-        continue;
-      }
-      const rows = Object.entries(dial.members).map(([member, values]) => [member, values[place]]);
-      drone.setMembers("flight", Object.fromEntries(rows));
-      if (dial.key === "noise") drone.sense(dial.values[place] > 0);
+    this.drones.forEach((drone) => this.apply(drone, this.data.dials[index], place));
+  }
+
+  /* Gives one drone what a slider says, if the slider is for it. */
+  apply(drone, dial, place) {
+    if (dial.drone !== null) {
+      if (this.drones[dial.drone] === drone) drone.setWeights(dial.members.weights[place]);
+      return;
     }
+    const rows = Object.entries(dial.members).map(([member, values]) => [member, values[place]]);
+    drone.setMembers("flight", Object.fromEntries(rows));
+    if (dial.key === "noise") drone.sense(dial.values[place] > 0);
   }
 
   /* Puts a fence (least x and y, largest x and y, in m; null: none) around those that have limits; tells who has it not. */
@@ -76,14 +82,28 @@ class World {
       const target = this.target.at(this.time), { ticks } = this.data;
       const draws = [this.draw(6 * ticks), this.draw(3 * (ticks + 1))];
       for (const drone of this.drones) {
-        if (this.impulse) drone.push(this.impulse, this.updates * ticks);
+        if (drone.lost && this.time >= drone.lost.until) this.start(drone);
+        if (drone.lost) continue;
+        if (this.impulse) drone.push(this.impulse, (this.updates - drone.born) * ticks);
         drone.update([this.time], target, ...draws);
+        this.watch(drone, target);
       }
       this.impulse = null;
       this.record();
       this.updates++;
       this.target.move();
     }
+  }
+
+  /* Takes a drone that is lost out of the flight: it stays where it was, and starts again after LOST_S. */
+  watch(drone, target) {
+    const [x, y, z] = drone.position, [roll, pitch] = drone.angles;
+    const why = Math.cos(roll) * Math.cos(pitch) < 0 ? "it turned over"
+      : z >= 0 ? "it hit the ground"
+      : Math.hypot(x - target[0], y - target[1]) < LOST_M ? null : `it is more than ${LOST_M} m from the target`;
+    if (!why) return;
+    drone.losses++;
+    drone.lost = { why, place: drone.last, until: this.time + LOST_S };
   }
 
   /* The rows that are drawn: every fourth, the same ones from picture to picture, and the last. */
@@ -95,7 +115,12 @@ class World {
   /* Keeps the last seconds for trails and plots: time, target, and of each drone x, y, roll, pitch. */
   record() {
     const { now } = this.target;
-    const states = this.drones.flatMap(({ position: [x, y], angles: [roll, pitch] }) => [x, y, roll, pitch]);
+    const states = this.drones.flatMap((drone) => {
+      if (drone.lost) return [NaN, NaN, NaN, NaN];
+      const { position: [x, y], angles: [roll, pitch] } = drone;
+      drone.last = [x, y];
+      return [x, y, roll, pitch];
+    });
     this.history.push([this.time, now[0], now[1], ...states]);
     if (this.history.length > HISTORY_S / this.data.period_s) this.history.shift();
   }

@@ -63,18 +63,26 @@ def test_missing_tools_are_listed_with_purpose_and_package(bare: Path) -> None:
     commands = [finding for finding in findings if finding.registry == "Debian"]
     assert not any(finding.here or finding.version for finding in commands)
     assert "cc or gcc or clang" in text
+    here = sum(finding.here for finding in findings)
+    assert text.startswith(f"{here} of {len(findings)} tools are here; missing: ")
     for finding in commands:
-        line = next(line for line in text.splitlines() if f"  {finding.tool}  " in line)
-        assert "  missing  " in line
-        assert line.endswith(finding.enables)
+        row = doctor_text([finding]).split("what for")[1].partition("install what")[0]
+        assert sorted(row.split()) == sorted(
+            f"{finding.kind} {finding.tool} missing {finding.enables}".split()
+        )
         install = next(line for line in text.splitlines() if "apt install" in line)
         assert set(finding.packages) <= set(install.split())
 
 
 def test_a_complete_machine_gets_no_install_command() -> None:
-    """The text has only the line of the tool."""
+    """The text has the answer and the row of the tool."""
     here = Finding("compiler", "cc", True, "12.2.0", "flies", "Debian", ("gcc",))
-    assert doctor_text([here]) == "compiler  cc  12.2.0  flies"
+    assert doctor_text([here]).splitlines() == [
+        "1 of 1 tools are here",
+        "",
+        "kind      tool  version  what for",
+        "compiler  cc    12.2.0   flies",
+    ]
 
 
 @pytest.mark.parametrize(

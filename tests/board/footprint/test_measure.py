@@ -17,6 +17,7 @@ from mambo_sil.board.firmware.elf import load
 from mambo_sil.board.firmware.gate import Forbidden, find_forbidden
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint, measure_footprint
+from tests.support.command import unwrapped
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, only
 
@@ -93,12 +94,13 @@ def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     cycles = modelled.counts.cycles
     assert cycles is not None
     text = footprint_report.text([modelled, estimated])
-    assert f" {cycles.least} / {cycles.mean:.0f} / {cycles.most_met} " in text
+    text = unwrapped(text)
+    assert f" {cycles.most_met} " in text
     bounds = f"{cycles.fewest} to {cycles.most_with_wait} with the wait states of the flash"
     assert "crazyflie: cycles are a model: Cortex-M4 TRM, ARM DDI 0439D, without wait states; the " in text
-    assert f"most expensive step met takes {bounds}\n" in text
-    assert f" about {estimated.counts.most_met} " in text
-    assert "teensy41: cycles are an estimate: 1 per instruction, +/- 40 %; of the most expensive" in text
+    assert f"most expensive step found takes {bounds}" in text
+    assert f" ~{estimated.counts.most_met} " in text
+    assert "teensy41: cycles are an estimate: 1 per instruction, +/- 40 % for the most expensive" in text
     summary = footprint_report.summarise([modelled, estimated], "mambo", presets.load("mambo"))
     assert [board.cycles for board in summary.boards] == [cycles, None]
     assert [board.cycles_source.partition(":")[0] for board in summary.boards] == ["model", "estimate"]
@@ -137,7 +139,7 @@ def test_a_missing_measurement_is_reported(
     assert (footprint.counts, footprint.time_s) == (None, None)
     assert [limit.name for limit in footprint.limits] == ["flash", "RAM", "stack"]
     text = footprint_report.text([footprint])
-    assert re.search(f"^mega: instructions and time are not measured: .*{missing}", text, re.MULTILINE)
+    assert re.search(f" mega: instructions and time are not measured: .*{missing}", unwrapped(text))
     assert "incomplete" in text
 
 
@@ -221,7 +223,7 @@ def test_what_must_not_be_linked_is_over_whatever_the_sizes() -> None:
     wrong = replace(footprint, forbidden=(found,))
     assert not wrong.fits
     text = footprint_report.text([wrong])
-    assert "__aeabi_dmul (double precision) must not be linked; called by cost_evaluate" in text
+    assert "__aeabi_dmul (double precision) must not be linked; called by cost_evaluate" in unwrapped(text)
     assert "OVER" in text
 
 

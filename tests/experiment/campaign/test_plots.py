@@ -25,4 +25,4 @@ def test_few_very_large_values_leave_the_others_wide(tmp_path: Path) -> None:
     assert {"10", "30"} <= set(texts)
     assert "1e+06" not in texts
     assert "IAE, m s" in texts
-    assert "IAE: pd over mambo" in texts
+    assert "IAE: improvement on pd" in texts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mambo_sil.errors import ResultsError
-from mambo_sil.experiment.campaign.campaign_flights import INDICES, SEEN, SEEN_INDICES
+from mambo_sil.experiment.campaign.campaign_flights import INDICES, SEEN_INDICES
 from mambo_sil.experiment.campaign.statistics import (
     COMPARED,
     distributions,
@@ -19,6 +19,7 @@ from mambo_sil.experiment.campaign.statistics import (
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FlightStore
 from mambo_sil.flight.metrics import HEIGHT_METRICS
+from mambo_sil.results.metric_names import SEEN
 
 COLUMNS = ("trajectory", "mass_kg", "pd_trace_sha256")
 

@@ -31,7 +31,7 @@ from mambo_sil.experiment.faults.fault import (
     shift_yaw,
 )
 from mambo_sil.experiment.faults.fault_flights import End, Verdict, fly_faults
-from mambo_sil.experiment.faults.faults_report import table
+from mambo_sil.experiment.faults.faults_report import faults_markdown
 from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller
 from mambo_sil.experiment.faults.scenarios import FaultScenario, scenarios
 from mambo_sil.experiment.table2.table2 import CASES
@@ -230,11 +230,11 @@ def test_verdicts_match_known_outcomes() -> None:
     outage, moved, wrapped, wrong = verdicts[:4]
     assert outage.statuses == ("BAD_STATE",)
     assert outage.expected
-    assert outage.end is End.BACK
+    assert outage.end is End.RECOVERED
     assert outage.recovery_s > 0.5
     assert outage.largest_error_m > outage.band_m
     assert 2.9 < moved.largest_error_m < 3.1  # the error at the jump
-    assert moved.end is End.BACK
+    assert moved.end is End.RECOVERED
     assert moved.saturated_share > outage.saturated_share
     assert wrapped.recovery_s == 0.0  # the heading is the same
     assert not wrong.expected
@@ -252,7 +252,7 @@ VERDICT = Verdict(
     band_m=0.1,
     saturated_share=0.25,
     recovery_s=2.0,
-    end=End.BACK,
+    end=End.RECOVERED,
 )
 
 
@@ -264,8 +264,8 @@ VERDICT = Verdict(
         ({"largest_command_rad": math.nan}, CheckOutcome.FAILED, "a command of nan rad"),
         ({"expected": False}, CheckOutcome.FAILED, "statuses"),
         ({"end": End.CRASHED}, CheckOutcome.FAILED, "crashed"),
-        ({"end": End.AWAY, "recovery_s": math.nan}, CheckOutcome.FAILED, "did not recover"),
-        ({"band_m": 17.0, "end": End.AWAY}, CheckOutcome.INCOMPLETE, "without a fault"),
+        ({"end": End.NOT_RECOVERED, "recovery_s": math.nan}, CheckOutcome.FAILED, "did not recover"),
+        ({"band_m": 17.0, "end": End.NOT_RECOVERED}, CheckOutcome.INCOMPLETE, "without a fault"),
         ({"band_m": math.nan, "end": End.CRASHED}, CheckOutcome.INCOMPLETE, "without a fault"),
     ],
 )
@@ -279,7 +279,7 @@ def test_the_check_judges_each_rule(change: dict[str, Any], outcome: CheckOutcom
 
 def test_a_fault_without_an_end_need_not_be_recovered_from() -> None:
     """A controller without a valid state cannot return to its target, and passes."""
-    gone = replace(VERDICT, fault="state NaN to the end", end=End.AWAY, recovery_s=math.nan)
+    gone = replace(VERDICT, fault="state NaN to the end", end=End.NOT_RECOVERED, recovery_s=math.nan)
     assert judge([VERDICT, gone], MAMBO).outcome is CheckOutcome.PASSED
 
 
@@ -296,7 +296,9 @@ def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> Non
 def words(text: str) -> list[tuple[str, str, str]]:
     """Return fault, status and end of every row of the fault table in `text`."""
     rows = [
-        line.strip("| ").split(" | ") for line in text.splitlines() if line.endswith(("| back |", "| away |"))
+        line.strip("| ").split(" | ")
+        for line in text.splitlines()
+        if line.endswith(("| recovered |", "| not recovered |"))
     ]
     assert len(rows) == len(scenarios(MAMBO))
     return [(row[0], row[1], row[-1]) for row in rows]
@@ -356,9 +358,12 @@ LINES
 
 def test_the_table_has_one_row_per_fault() -> None:
     """Both courses are side by side; a column for both shows the worse."""
-    worse = replace(VERDICT, largest_command_rad=0.35, saturated_share=0.5, end=End.AWAY)
-    text = table([VERDICT, replace(worse, course="hover")])
-    assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
+    worse = replace(VERDICT, largest_command_rad=0.35, saturated_share=0.5, end=End.NOT_RECOVERED)
+    text = faults_markdown([VERDICT, replace(worse, course="hover")])
+    assert (
+        "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | not recovered |"
+        in text
+    )
     assert "eight 0.100 m, hover 0.100 m" in text
 
 

@@ -71,7 +71,7 @@ def judged(found: FlightSuite, rows: list[Row]) -> RegressSummary:
 def test_without_a_baseline_only_bounds_hold(tmp_path: Path) -> None:
     """A value at its bound holds, one above fails with flight, metric, value and bound."""
     summary = judged(suite(tmp_path), [row(3.0), row(3.001), row(0.0)])
-    assert [flight.failures for flight in summary.flights] == [[], ["iae_m_s = 3.001 (bound 3)"], []]
+    assert [flight.failures for flight in summary.flights] == [[], ["IAE 3.001 m s (bound 3)"], []]
     assert [flight.name for flight in summary.failed] == ["eight/yaw_rad=0.5"]
     assert summary.baseline is None
     assert "compared with the bounds only" in regress_text(summary, "out")
@@ -84,8 +84,8 @@ def test_a_recorded_value_limits_with_its_tolerance(tmp_path: Path) -> None:
     summary = judged(found, [row(2.19), row(2.21), row(3.1)])
     assert [flight.failures for flight in summary.flights] == [
         [],
-        ["iae_m_s = 2.21 (bound 3; recorded 2, so at most 2.2)"],
-        ["iae_m_s = 3.1 (bound 3; recorded 2.9)"],
+        ["IAE 2.21 m s (bound 3; recorded 2, so at most 2.2)"],
+        ["IAE 3.1 m s (bound 3; recorded 2.9)"],
     ]
     assert summary.baseline == str(tmp_path / "mine.mambo.baseline.json")
     assert "settings have changed" not in regress_text(summary, "out")
@@ -146,7 +146,7 @@ def test_a_crashed_or_lost_flight_fails(tmp_path: Path) -> None:
     summary = judged(suite(tmp_path), [row(1.0, crashed=1), lost, row(1.0)])
     assert [flight.failures for flight in summary.flights] == [
         ["crashed"],
-        ["crashed", "iae_m_s = nan (bound 3)"],
+        ["crashed", "IAE nan m s (bound 3)"],
         [],
     ]
     assert "null" in summary.text()
@@ -167,25 +167,26 @@ bounds = { ise_m2_s = 2.0, refused_updates = 4 }
 """Groups that may crash, have other bounds, or none."""
 
 TEXT = """\
-group                metric                     bound     median      worst      ratio   at limit      failed
-eight                iae_m_s                        3        2.5        2.9       1.25      50.0%      1 of 3
-fall                 iae_m_s                        -        inf        inf        inf      12.5%      1 of 2
-calm                 crashed                        0        0.5          1          -      12.5%      1 of 2
-calm                 refused_updates                4        2.5          5          -      12.5%      1 of 2
-calm                 iae_m_s                        -          1          1          1      12.5%      0 of 1
-calm                 ise_m2_s                       2       1.75        2.5          -      12.5%      1 of 2
-still                crashed                        0          0          0          -      12.5%      0 of 1
-
-eight/yaw_rad=0: iae_m_s = 2.5 (bound 3; recorded 2, so at most 2.2)
-    mambo-nmpc fly --repeat out/flights/0000-eight.json
-fall/seed=2: iae_m_s = nan (recorded 1, so at most 1.1)
-    mambo-nmpc fly --repeat out/flights/0004-fall.json
-calm/seed=1: crashed; ise_m2_s = 2.5 (bound 2)
-    mambo-nmpc fly --repeat out/flights/0005-calm.json
-calm/seed=2: refused_updates = 5 (bound 4)
-    mambo-nmpc fly --repeat out/flights/0006-calm.json
 mine with mambo: 4 of 8 flights passed, 4 failed
-compared with the bounds and with here.json"""
+compared with the bounds and with here.json
+
+group  metric           bound  median  worst  over recorded  at limit  failed
+eight  IAE, m s             3     2.5    2.9           1.25    50.0 %  1 of 3
+fall   IAE, m s             -     inf    inf            inf    12.5 %  1 of 2
+calm   crashed              0     0.5      1              -    12.5 %  1 of 2
+calm   refused updates      4     2.5      5              -    12.5 %  1 of 2
+calm   IAE, m s             -       1      1              1    12.5 %  0 of 1
+calm   ISE, m^2 s           2    1.75    2.5              -    12.5 %  1 of 2
+still  crashed              0       0      0              -    12.5 %  0 of 1
+
+eight/yaw_rad=0: IAE 2.5 m s (bound 3; recorded 2, so at most 2.2)
+    mambo-nmpc fly --repeat out/flights/0000-eight.json
+fall/seed=2: IAE nan m s (recorded 1, so at most 1.1)
+    mambo-nmpc fly --repeat out/flights/0004-fall.json
+calm/seed=1: crashed; ISE 2.5 m^2 s (bound 2)
+    mambo-nmpc fly --repeat out/flights/0005-calm.json
+calm/seed=2: refused updates 5 (bound 4)
+    mambo-nmpc fly --repeat out/flights/0006-calm.json"""
 
 
 def test_the_text_has_a_row_for_each_group_and_metric_and_then_what_failed(tmp_path: Path) -> None:
@@ -202,10 +203,12 @@ def test_the_text_has_a_row_for_each_group_and_metric_and_then_what_failed(tmp_p
 def test_the_text_of_a_suite_that_passed_is_its_table_and_one_line(tmp_path: Path) -> None:
     """Without what failed or was recorded."""
     text = regress_text(judged(suite(tmp_path), [row(1.0)] * 3), "out")
-    assert text.splitlines()[2:] == [
-        "",
+    assert text.splitlines() == [
         "mine with mambo: 3 of 3 flights passed",
-        "compared with the bounds only: no recorded metrics",
+        "compared with the bounds only; --update records this run for later ones",
+        "",
+        "group  metric    bound  median  worst  at limit  failed",
+        "eight  IAE, m s      3       1      1    12.5 %  0 of 3",
     ]
 
 
@@ -397,7 +400,7 @@ def test_junit_has_a_case_for_each_flight(tmp_path: Path) -> None:
     assert "repeat it: mambo-nmpc fly --repeat flights/0001-eight.json, in the result folder" in text
     messages = [case.find("failure") for case in found]
     assert [None if one is None else one.get("message") for one in messages] == [
-        "iae_m_s = 4 (bound 3)",
+        "IAE 4 m s (bound 3)",
         "crashed",
         None,
     ]
@@ -426,8 +429,8 @@ def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path:
     png, svg = draw_regress(judge(found, mambo(), rows, None, path).flights, tmp_path / "many")
     assert png.read_bytes().startswith(b"\x89PNG")
     drawn = svg.read_text("utf-8")
-    assert "group-199: iae_m_s" in drawn
-    assert "group-139: iae_m_s" not in drawn
+    assert "group-199: IAE" in drawn
+    assert "group-139: IAE" not in drawn
 
 
 def test_a_suite_without_bounds_has_a_picture_without_rows(tmp_path: Path) -> None:
@@ -447,10 +450,10 @@ def test_the_picture_shows_shares_of_limits_within_its_edges(tmp_path: Path) -> 
     )
     rows = [row(1.5), row(1e-9), row(math.nan), row(1.0), row(1.0, ise_m2_s=1e9)]
     shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows).flights).items()}
-    assert shares == {"eight: iae_m_s": [0.5, 0.01, 100.0], "calm: ise_m2_s": [0.25, 100.0]}
+    assert shares == {"eight: IAE": [0.5, 0.01, 100.0], "calm: ISE": [0.25, 100.0]}
     rows[3] = row(1.0, refused_updates=1, crashed=1)
     shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows).flights).items()}
-    assert shares["calm: refused_updates"] == shares["calm: crashed"] == [100.0]
+    assert shares["calm: refused updates"] == shares["calm: crashed"] == [100.0]
 
 
 def test_the_summary_is_read_back(tmp_path: Path) -> None:

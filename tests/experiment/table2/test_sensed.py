@@ -3,7 +3,7 @@
 import pytest
 
 from mambo_codegen.settings import presets
-from mambo_sil.experiment.table2.sensed import PRESETS, VIEWS, fly_sensed, text
+from mambo_sil.experiment.table2.sensed import PRESETS, VIEWS, fly_sensed, sensed_markdown
 from mambo_sil.flight.names import PD_TITLES
 
 
@@ -21,6 +21,6 @@ def test_sensed_table_has_a_row_for_every_controller_and_view() -> None:
         assert (row.seen == row.tracked) == (row.view == "the truth")
         assert (row.drift_m == 0.0) == (row.view == "the truth")
         assert row.flights == (2 if row.view in ("mambo", "mambo-derotated") else 1)
-    lines = text(rows).splitlines()
+    lines = sensed_markdown(rows).splitlines()
     assert len(lines) == 4 + len(rows)
     assert len({line.count("|") for line in lines}) == 1

@@ -40,12 +40,14 @@ QUICK = {
 CASES = [
     (board, scalar, index)
     for turn, (board, chosen) in enumerate(SCALARS.items())
-    for scalar in chosen
     for index in range(12)
+    for scalar in (chosen if index >= len(CORNER_HORIZONS) else [chosen[(index + turn) % len(chosen)]])
     if (board, index) != ("mega", 4)  # too large
-    and (index < len(CORNER_HORIZONS) or (index + turn) % 3 == 0 or (board, scalar, index) in QUICK)
+    and (index < len(CORNER_HORIZONS) or (index + turn) % 3 == 0)
 ]
-"""Every corner of the horizon on every board; the random settings on two boards each, by turns."""
+CASES += sorted(QUICK.difference(CASES))
+"""Every corner of the horizon on every board and, by turns, in every scalar type; the random settings on two
+boards each, by turns, in all scalar types."""
 
 N = 30
 """Controllers of a case."""

@@ -161,7 +161,10 @@ def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     said, talk = run("tune", str(source), "--trials", str(TRIALS), "-o", str(folder))
-    assert [line.split()[0] for line in said.splitlines()] == ["base", "chosen", "chosen"]
+    lines = said.splitlines()
+    assert lines[0].startswith("trial ")
+    assert " in the mean, the base " in lines[0]
+    assert [line.split()[0] for line in lines[-3:]] == ["trial", "base", "chosen"]
     assert talk.count("\n") == 1
     assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
 

@@ -244,6 +244,39 @@ def test_a_drawn_fence_keeps_the_drone_inside(made: tuple[Path, Any], tab: Brows
     assert tab.complaints == []
 
 
+def test_a_lost_drone_says_why_and_starts_again(page: Page, tab: Browser) -> None:
+    """Verdict and table say it, view and axes stay, and the others fly on, bit for bit."""
+    others = "JSON.stringify(page.world.drones.slice(0, 3).map((drone) => [...drone.position]))"
+    page.advance(6.0)
+    calm = page.find(others)
+    page.find("page.world.begin()")
+    page.advance(2.0)
+    hit = "(one) => one.push([5, 0], (page.world.updates - one.born) * page.world.data.ticks)"
+    page.find(f"({hit})(page.world.drones[{PD}])")
+    page.advance(2.0)
+    assert "PD is lost: it turned over; it starts again at the target." in page.text("#verdict")
+    assert page.text(f".standing tbody tr:nth-child({PD + 1}) .error") == "lost"
+    assert page.find("page.player.views[0].view.wanted.width") == page.find("VIEW_M")
+    page.advance(2.0)
+    assert page.find(others) == calm
+    page.advance(1.0)
+    assert page.error_m(PD) < 1.0
+    assert "PD was lost once." in page.text("#verdict")
+    assert tab.complaints == []
+
+
+def test_the_verdict_names_the_closest(page: Page) -> None:
+    """Distances in cm, the others as multiples, and a longer bar for a larger distance."""
+    page.advance(20.0)
+    verdict = page.text("#verdict")
+    assert re.match(
+        r"mambo(-1norm)? is closest: \d\.\d cm from the target in the mean of the last 10 s, ", verdict
+    )
+    assert re.search(r"PD \d+ times as far", verdict)
+    widths = page.find("[...document.querySelectorAll('.bar')].map((bar) => bar.clientWidth)")
+    assert 0 < widths[MAMBO] < widths[FEEDFORWARD] < widths[PD]
+
+
 def test_the_keyboard_fences_the_target(page: Page, tab: Browser) -> None:
     """F puts the fence, and removes it."""
     page.find("page.world.target.drag(0, 0)")

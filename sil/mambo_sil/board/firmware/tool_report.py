@@ -16,6 +16,7 @@ from typing import Final, Literal
 from mambo_codegen import boards
 from mambo_codegen.errors import BuildError, echo
 from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.results.terminal import sentence, table
 
 LIBFUZZER: Final = "libFuzzer"
 """Clang's library for fuzzing; not a command."""
@@ -53,11 +54,11 @@ def doctor_text(findings: Sequence[Finding]) -> str:
         (one.kind, echo(one.tool), one.version or ("here" if one.here else "missing"), one.enables)
         for one in findings
     ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]
     absent = [one for one in findings if not one.here]
+    missing_tools = ", ".join(echo(one.tool) for one in absent)
+    answer = f"{len(findings) - len(absent)} of {len(findings)} tools are here"
+    lines = [sentence(f"{answer}; missing: {missing_tools}" if absent else answer), ""]
+    lines += table(("kind", "tool", "version", "what for"), rows, (0, 1, 2, 3))
     for registry, installer in (("Debian", "apt install"), ("PyPI", "pip install")):
         missing = {package for one in absent if one.registry == registry for package in one.packages}
         if missing:

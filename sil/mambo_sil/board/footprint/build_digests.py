@@ -18,6 +18,7 @@ from mambo_sil.errors import EmulatorError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.results.scratch import scratch_folder
+from mambo_sil.results.terminal import sentence, table
 
 HOST_COMPILERS: Final = ("gcc", "clang")
 BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
@@ -59,6 +60,29 @@ def run_on_board(
 def count_builds(boards: Sequence[Board]) -> int:
     """Return the number of digests that `run_everywhere` yields."""
     return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
+
+
+def builds_text(builds: Sequence[BuildDigest], source: str, steps: int) -> str:
+    """Return digests as text: the answer, then a row for each build; the first one is the reference."""
+    reference = builds[0].digest
+    ran = [one for one in builds[1:] if one.digest is not None]
+    other = sum(one.digest != reference for one in ran)
+    found = f"OTHER BITS in {other}" if other else f"the bits of the reference in {len(ran)}"
+    said = f"{echo(source)}: {found} of {len(ran)} builds, over {steps} self-test steps"
+    if len(ran) < len(builds) - 1:
+        said += f"; {len(builds) - 1 - len(ran)} builds not run"
+    rows = [
+        (
+            one.where,
+            one.compiler,
+            one.optimisation,
+            one.reason if one.digest is None else one.digest,
+            "" if one.digest in (None, reference) else "DIFFERS",
+        )
+        for one in builds
+    ]
+    heads = ("build for", "compiler", "flag", "self-test digest", "")
+    return "\n".join([sentence(said), "", *table(heads, rows, range(len(heads)))])
 
 
 def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:

@@ -14,15 +14,17 @@ from mambo_sil.board.footprint.measure import Footprint, Limit
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.results.html_page import render_page
 from mambo_sil.results.summary import ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
+_FUNCTION_HEAD = ("function", "size B", "own frame B", "deepest B", "instructions")
 _HEAD = (
     "board",
     "flash B",
     "RAM B",
     "stack B",
-    "instructions a step: least / mean / most met",
-    "cycles a step",
-    "time ms",
+    "instructions, mean / most",
+    "cycles, most",
+    "time, ms",
     "period",
     "",
 )
@@ -69,12 +71,12 @@ class BoardFootprint:
     def cycles_sentence(self) -> str:
         """What the cycles are, and the bounds of the most expensive step."""
         if self.cycles is None or self.cycles_estimate is None:
-            return f"{self.name}: cycles are an {self.cycles_source}; of the most expensive step met"
+            return f"{self.name}: cycles are an {self.cycles_source} for the most expensive step found"
         low, high = (f"{limit:.0f}" for limit in self.cycles_estimate)
         bounds = low if low == high else f"{low} to {high} with the wait states of the flash"
         return (
             f"{self.name}: cycles are a {self.cycles_source}, without wait states; "
-            f"the most expensive step met takes {bounds}"
+            f"the most expensive step found takes {bounds}"
         )
 
     @property
@@ -97,7 +99,7 @@ class BoardFootprint:
         time_ms = [1000 * one / board.clock_hz for one in cycles]
         stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
         return [
-            ("a step", "measured: least / median / most", "counted: least / mean / most met; estimated"),
+            ("a step", "measured: least / median / most", "counted: least / mean / largest; estimated"),
             ("instructions", "-", counted[0]),
             ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
             ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),
@@ -141,19 +143,27 @@ def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) 
 
 
 def text(footprints: Sequence[Footprint]) -> str:
-    """Return a table of the boards, the functions if there is one board, and notes on what fails."""
-    rows = [_HEAD, *(_row(footprint) for footprint in footprints)]
-    lines = _columns(rows)
+    """Return the answer, a table of the boards, the functions if there is one board, and notes."""
+    lines = [*map(_answer, footprints), "", *table(_HEAD, list(map(_row, footprints)), (0, -1))]
     if len(footprints) == 1:
         if footprints[0].on_board is not None:
-            lines += ["", footprints[0].on_board.sentence, *_columns(_board(footprints[0]).compared)]
-        functions = _functions(footprints[0])
-        head = ("function", "size B", "own frame B", "deepest B", "instructions")
-        lines += ["", *_columns([head, *(tuple(map(str, astuple(one))) for one in functions)])]
+            compared = _board(footprints[0]).compared
+            lines += ["", sentence(footprints[0].on_board.sentence), *table(compared[0], compared[1:])]
+        functions = [tuple(map(str, astuple(one))) for one in _functions(footprints[0])]
+        lines += ["", *table(_FUNCTION_HEAD, functions)]
     cycles = [_board(footprint).cycles_sentence for footprint in footprints if footprint.cycles]
-    lines += ["", *cycles] if cycles else []
+    lines += ["", *map(sentence, cycles)] if cycles else []
     notes = [note for footprint in footprints for note in _notes(footprint)]
-    return "\n".join([*lines, *(["", *notes] if notes else [])])
+    return "\n".join([*lines, *(["", *map(sentence, notes)] if notes else [])])
+
+
+def _answer(footprint: Footprint) -> str:
+    """Return whether the controller fits a board, and what it takes."""
+    verdict = ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER"
+    found = f"{footprint.board.name}: {verdict}, {footprint.added.flash.total / 1000:.3g} KB of flash"
+    if footprint.time_s is None:
+        return found
+    return f"{found}, {100 * footprint.time_s[1] / footprint.update_period_s:.2g} % of the period"
 
 
 def page(summary: FootprintSummary) -> str:
@@ -168,20 +178,20 @@ def _row(footprint: Footprint) -> tuple[str, ...]:
         str(footprint.added.flash.total),
         str(footprint.added.ram.total),
         "-" if footprint.stack is None else str(footprint.stack.bytes),
-        "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
+        "-" if counts is None else f"{counts.mean:.0f} / {counts.most_met}",
         _cycles_cell(footprint),
-        "-" if time_s is None else f"{1000 * time_s[0]:.3g}..{1000 * time_s[1]:.3g}",
+        "-" if time_s is None else f"{1000 * time_s[1]:.3g}",
         "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
         ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",
     )
 
 
 def _cycles_cell(footprint: Footprint) -> str:
-    """Return the modelled cycles, or one estimated number."""
+    """Return the modelled cycles of the most expensive step, or their estimate."""
     modelled = _modelled(footprint)
     if modelled is not None:
-        return f"{modelled.least} / {modelled.mean:.0f} / {modelled.most_met}"
-    return "-" if footprint.cycles is None else f"about {sum(footprint.cycles) / 2:.0f}"
+        return str(modelled.most_met)
+    return "-" if footprint.cycles is None else f"~{sum(footprint.cycles) / 2:.0f}"
 
 
 def _modelled(footprint: Footprint) -> CycleCounts | None:
@@ -265,9 +275,3 @@ def _notes(footprint: Footprint) -> list[str]:
 
 def _format(value: float, unit: str) -> str:
     return f"{value:.0f} {unit}" if unit == "B" else f"{value:.4g} {unit}"
-
-
-def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Return the rows as lines, the first column flush left, the others flush right."""
-    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
-    return ["  ".join([name.ljust(first), *map(str.rjust, cells, others)]).rstrip() for name, *cells in rows]

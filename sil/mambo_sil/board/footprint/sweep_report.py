@@ -9,7 +9,9 @@ from pathlib import Path
 from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 
 class SweepSummary(ReportedSummary):
@@ -59,13 +61,25 @@ def values_text(point: Point) -> str:
     return ", ".join(f"{key} {value:g}" for key, value in point.values.items())
 
 
-def point_text(point: Point) -> str:
-    """Spell a point in a line."""
-    if point.refusal is not None:
-        return f"{values_text(point)}  refused: {point.refusal}"
+def points_text(points: Sequence[Point]) -> str:
+    """Return the answer and a table of the points, then why others were refused."""
+    flown = [point for point in points if point.refusal is None]
+    refused = [point for point in points if point.refusal is not None]
+    lines = [f"{sum(point.fits for point in flown)} of {len(points)} controllers fit"]
+    best = closest_fit(flown)
+    if best is not None:
+        lines.append(sentence(f"closest: {values_text(best)}, IAE {digits(best.iae_m_s)} m s"))
+    if flown:
+        heads = ("settings", "flash B", "RAM B", "stack B", "instructions", "IAE, m s", "")
+        lines += ["", *table(heads, [_row(point) for point in flown], (0, -1))]
+    return "\n".join(lines + [sentence(f"{values_text(one)} is refused: {one.refusal}") for one in refused])
+
+
+def _row(point: Point) -> tuple[str, ...]:
     return (
-        f"{values_text(point)}  "
-        f"flash {point.flash_bytes} B  RAM {point.ram_bytes} B  stack {point.stack_bytes:g} B  "
-        f"instructions {point.instructions:g}  IAE {point.iae_m_s:.4g} m s  "
-        f"{'fits' if point.fits else 'not shown to fit'}"
+        values_text(point),
+        *(f"{value:g}" for value in (point.flash_bytes, point.ram_bytes, point.stack_bytes)),
+        f"{point.instructions:g}",
+        digits(point.iae_m_s),
+        "fits" if point.fits else "not shown to fit",
     )

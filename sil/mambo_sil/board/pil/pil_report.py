@@ -185,7 +185,7 @@ def emulated_text(summary: BoardFlightSummary) -> str:
     if count is None:
         return f"not counted: {summary.not_emulated}"
     return (
-        f"{count.least} / {count.mean:.0f} / {count.most_met} instructions (least, mean, most met), "
+        f"{count.least} / {count.mean:.0f} / {count.most_met} instructions (least, mean, largest), "
         f"{summary.cycles.median / count.mean:.3g} cycles each"
     )
 
@@ -193,8 +193,8 @@ def emulated_text(summary: BoardFlightSummary) -> str:
 def link_text(summary: BoardFlightSummary) -> str:
     """Say what went wrong on the link."""
     faults = [f"{count} {name}" for name, count in sorted(summary.link_faults.items()) if count]
-    made_good = ": made good" if summary.real_time is None else ""
-    return ", ".join(faults) + made_good if faults else "no fault"
+    recovered = ": recovered" if summary.real_time is None else ""
+    return ", ".join(faults) + recovered if faults else "no fault"
 
 
 def real_time_text(timed: RealTime, steps: int) -> list[str]:

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 def _fly(
     runner: Runner, course: Course, conditions: Conditions, output: Output, repetition: Repetition
 ) -> None:
-    """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes."""
+    """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes.
+
+    To see how settings fly a curve, a push, gusts, sensors or another drone.
+    """
     if repetition.repeat is not None:
         from mambo_sil.cli.fly.repeat import fly_again
 
@@ -69,7 +72,10 @@ def campaign(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
+    """Fly many random flights with several controllers and compare them; continue an interrupted campaign.
+
+    For the question how a controller flies drones, winds and courses that nobody chose for it.
+    """
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
     from mambo_sil.cli.progress import counting_bar
@@ -134,12 +140,15 @@ def faults(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes."""
+    """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes.
+
+    Before a first flight: what becomes of it if the state is lost, late, frozen or in other units.
+    """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.errors import FlightError
     from mambo_sil.experiment.faults.fault_flights import End, fly_faults
-    from mambo_sil.experiment.faults.faults_report import FaultsSummary, table, write_csv
+    from mambo_sil.experiment.faults.faults_report import FaultsSummary, faults_text, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
 
@@ -159,7 +168,7 @@ def faults(
             source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
         )
         summary.write(folder)
-    show(summary, table(verdicts), as_json=as_json)
+    show(summary, faults_text(summary), as_json=as_json)
     if any(verdict.end is End.CRASHED for verdict in verdicts):
         raise typer.Exit(1)
 
@@ -181,7 +190,10 @@ def replay(
     ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Compare the commands in a log with those of the compiled controller; exit 1 if it is not what flew."""
+    """Compare the commands in a log with those of the compiled controller; exit 1 if it is not what flew.
+
+    After a flight: whether the firmware has these settings, and gets the inputs that you believe.
+    """
     from mambo_sil.model.identify.columns import parse_columns
     from mambo_sil.model.replay.log_replay import SIGNALS, replay_log, write_curves
     from mambo_sil.model.replay.replay_plots import draw_replay

@@ -94,7 +94,7 @@ class Runner:
     on: Annotated[
         str | None,
         typer.Option(
-            help="Board on whose emulated core the C runs; a flight on this machine must have the same bits.",
+            help="Board on whose emulated core the C runs; its flight must equal this machine's bit for bit.",
             autocompletion=complete_boards,
         ),
     ] = None

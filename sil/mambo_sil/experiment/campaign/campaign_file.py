@@ -248,7 +248,7 @@ def _stem(name: str) -> str:
 
 
 def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, place: str) -> None:
-    """Raise InvalidSettingsError, which begins with `place`, if a drawn flight cannot be simulated."""
+    """Raise InvalidSettingsError, which begins with `place`, if a random flight cannot be simulated."""
     try:
         flight_of([scenario(flight, drawn)], settings.horizon.update_period_s)
     except FlightError as error:

@@ -1,4 +1,4 @@
-"""The task of a worker: fly a batch of drawn flights with every controller and return their results.
+"""The task of a worker: fly a batch of random flights with every controller and return their results.
 
 Arguments and results are plain values, which can be sent to other processes and machines.
 """
@@ -27,11 +27,11 @@ from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.results.metric_names import SEEN
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Metrics of the true flight."""
 
-SEEN: Final = "seen_"
 SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
 """Metrics of the error that are also computed from the estimates."""
 
@@ -57,7 +57,7 @@ _BUILDING: Final = threading.Lock()
 
 
 def indices(*, sensed: bool, spatial: bool) -> tuple[str, ...]:
-    """Return the metrics of a campaign: as flown, with sensors as seen, in space with those of the height."""
+    """Return the metrics of a campaign: as flown and as estimated, in space with the height."""
     found = (*INDICES, *(SEEN + name for name in SEEN_INDICES if sensed))
     return tuple(name for name in found if spatial or name.removeprefix(SEEN) not in HEIGHT_METRICS)
 

@@ -37,7 +37,6 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
     few but very large values leaves the panel.
     """
     rows = 1 if len(names) == 1 else 2
-    other = names[1] if len(names) == 2 else "another"
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 0.4 + 1.9 * rows), layout="constrained")
         panels = figure.subplots(rows, len(COMPARED), squeeze=False, sharey=True)
@@ -54,7 +53,7 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
                 with np.errstate(invalid="ignore", divide="ignore"):
                     _draw_shares(axes, theirs / ours, looks(names)[name], name)
             axes.axvline(1.0, color=QUIET, linewidth=THIN)
-            axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: {names[0]} over {other}")
+            axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: improvement on {names[0]}")
             _show_most(axes)
             _label_plainly(axes)
         for axes in panels[:, 0]:

@@ -24,11 +24,12 @@ from mambo_sil.experiment.campaign.statistics import (
     worst_flights,
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
-from mambo_sil.flight.flight_report import named
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.results.folders import SUMMARY
-from mambo_sil.results.number_format import digits
+from mambo_sil.results.metric_names import SEEN, named, titled
+from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 PICTURE: Final = "campaign"
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
@@ -181,38 +182,56 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
 
 
 def campaign_text(summary: CampaignSummary, folder: str) -> str:
-    """Return a summary as text: statistics per controller, improvements, commands to repeat the worst."""
-    lines: list[str] = []
-    width = max(len(name) for name in summary.controllers)
+    """Return a summary as text: the answer, statistics, improvements, commands to repeat the worst."""
+    lines = [_answer(summary, name) for name in reversed(summary.controllers)]
     for name, found in summary.controllers.items():
-        lines.append(f"{name:34}" + "".join(f"{title:>10}" for title in _SHOWN.values()))
-        for index, quantiles in found.quantiles.items():
-            values = "".join(f"{digits(quantiles[share]):>10}" for share in _SHOWN)
-            lines.append(f"  {index:32}{values}")
-        lines.append(f"  crashed: {_spelled(found.crashed)}")
+        rows = [
+            (titled(index), *(digits(quantiles[share]) for share in _SHOWN))
+            for index, quantiles in found.quantiles.items()
+        ]
+        lines += ["", *table((name, *_SHOWN.values()), rows)]
+        lines.append(f"crashed: {_spelled(found.crashed)}")
         if found.refused_an_input.count:
-            lines.append(f"  rejected an input: {_spelled(found.refused_an_input)}")
-        lines.append("")
+            lines.append(f"rejected an input: {_spelled(found.refused_an_input)}")
+    if any(key.startswith(SEEN) for found in summary.controllers.values() for key in found.quantiles):
+        lines += ["", sentence("as estimated: error of the estimated position, which the controller knows")]
     if summary.improvements:
         first = next(iter(summary.controllers))
-        lines.append(f"ratio of {first} to the other, per flight: median, 95 % interval, ratio above 1 in")
-        for one in summary.improvements:
-            interval = f"{digits(one.low)} .. {digits(one.high)}"
-            ratio = f"{digits(one.median):>9}  {interval:20}"
-            lines.append(f"  {one.controller:{width}} {one.index:18}{ratio}{_spelled(one.better)}")
-        lines.append("")
-    lines.append("worst flights by IAE, and the commands that repeat them:")
+        lines += ["", f"improvement on {first}: its index divided by that of the other, flight by flight"]
+        lines += table(
+            ("the other", "index", "median", "95 % interval", "better in", "95 % interval"),
+            [
+                (
+                    one.controller,
+                    named(one.index)[0],
+                    digits(one.median),
+                    f"{digits(one.low)} .. {digits(one.high)}",
+                    f"{one.better.count} of {one.better.flights}",
+                    _interval(one.better),
+                )
+                for one in summary.improvements
+            ],
+            (0, 1),
+        )
+    lines += ["", "worst flights by IAE; these commands repeat them"]
     for name, flights in summary.worst.items():
         for flight in flights:
             what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
-            lines.append(
-                f"  {name:{width}} {what:>12}  mambo-nmpc fly --repeat {echo(folder)}/{flight.record}"
-            )
+            lines.append(f"{name}, {what}: mambo-nmpc fly --repeat {echo(folder)}/{flight.record}")
     return "\n".join(lines)
 
 
+def _answer(summary: CampaignSummary, name: str) -> str:
+    """Return how close a controller flies, by the median of the flights, and how many crashed."""
+    found = summary.controllers[name]
+    mean_m = found.quantiles["iae_m_s"]["0.5"] / summary.campaign.flight.duration_s
+    crashed = f"{found.crashed.count} of {found.crashed.flights} crashed"
+    return sentence(f"{name}: {distance(mean_m)} in the mean, {crashed}")
+
+
+def _interval(one: Proportion) -> str:
+    return f"{100 * one.low:.3g} .. {100 * one.high:.3g} %"
+
+
 def _spelled(one: Proportion) -> str:
-    return (
-        f"{one.count} of {one.flights} flights, "
-        f"{100 * one.share:.3g} % ({100 * one.low:.3g} .. {100 * one.high:.3g} %)"
-    )
+    return f"{one.count} of {one.flights} flights, {100 * one.share:.3g} % (95 % interval {_interval(one)})"

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
-from mambo_sil.experiment.campaign.campaign_flights import CRASHED, REFUSED, SEEN, indices
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED, REFUSED, indices
 from mambo_sil.experiment.campaign.store import FLIGHT, read_rows
+from mambo_sil.results.metric_names import SEEN
 from mambo_sil.results.summary import Number
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)

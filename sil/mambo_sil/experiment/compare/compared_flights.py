@@ -21,6 +21,7 @@ from mambo_sil.results.summary import Number
 
 STEP_M: Final = 1.0
 STEP_DURATION_S: Final = 10.0
+EIGHT_S: Final = 100.0
 SETTLED_SHARE: Final = 0.05
 """The step has settled when the error stays within this share of it."""
 
@@ -71,7 +72,7 @@ def answers(settings: Settings, drone: VehicleFile) -> Answers:
         vehicle=vehicle,
         update_period_s=period_s,
     )
-    eight = Flight(Bernoulli(2.0, 0.5), vehicle=vehicle, update_period_s=period_s)
+    eight = Flight(Bernoulli(2.0, 0.5), duration_s=EIGHT_S, vehicle=vehicle, update_period_s=period_s)
     steps = fly(step, CompiledController(settings, 2))
     flown = fly(eight, CompiledController(settings))
     metrics = measure(flown)

@@ -1,20 +1,17 @@
 """A comparison of two controllers as text."""
 
 import re
-import textwrap
 from collections.abc import Iterator
 
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.key import spell
-from mambo_sil.experiment.compare.compared_flights import SETTLED_SHARE, STEP_M
+from mambo_sil.experiment.compare.compared_flights import EIGHT_S, SETTLED_SHARE, STEP_M
 from mambo_sil.experiment.compare.control_terms import AXES
 from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
 from mambo_sil.experiment.margins.axis_margins import AxisMargins
-from mambo_sil.results.number_format import three_digits_or_dash
+from mambo_sil.results.number_format import distance, three_digits_or_dash
+from mambo_sil.results.terminal import sentence, table
 
-_WIDE = 34
-_COLUMN = 14
-_MEANING = 60
 _DASH = "\N{EN DASH}"
 
 Row = tuple[str, float | None, str]
@@ -28,35 +25,42 @@ def diff_text(summary: DiffSummary) -> str:
             f"{echo(summary.a)} and {echo(summary.b)} are the same controller: "
             f"settings {summary.settings_a[:16]}"
         )
-    lines = [
-        f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}",
-        f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}",
-        "",
-        _line("setting", "A", "B", ""),
-        *(_setting(one) for one in summary.differences),
-    ]
     a, b = summary.figures_a, summary.figures_b
+    lines = [
+        sentence(f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}{_answer(a)}"),
+        sentence(f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}{_answer(b)}"),
+        "",
+        *table(("setting", "A", "B", "meaning"), [_setting(one) for one in summary.differences], (0, -1)),
+    ]
     if a is not None and b is not None:
-        lines += ["", _line(f"on vehicle {echo(summary.vehicle.name)}", "A", "B", "")]
-        lines += _figure_lines(a, b)
+        heads = (f"on vehicle {echo(summary.vehicle.name)}", "A", "B", "")
+        lines += ["", *table(heads, list(_figures(a, b)), (0, -1))]
     return "\n".join(lines)
 
 
-def _setting(one: SettingDifference) -> str:
+def _answer(figures: ControllerFigures | None) -> str:
+    """Return how closely a controller flies the eight, and how much more delay it tolerates."""
+    if figures is None:
+        return ""
+    eight = figures.eight
+    if eight.crashed:
+        return "; CRASHED on the eight"
+    answer = f"; {distance(eight.iae_m_s / EIGHT_S)} in the mean"
+    delays_s = [axis.loops["command"].delay_s for axis in figures.margins or ()]
+    return f"{answer}, tolerates {1e3 * min(delays_s):.0f} ms more delay" if delays_s else answer
+
+
+def _setting(one: SettingDifference) -> tuple[str, ...]:
     a, b = (_DASH if value is None else spell(value) for value in (one.a, one.b))
-    meaning = re.split(r"[.:;] |\.$", one.meaning)[0]
-    return _line(one.key, a, b, textwrap.shorten(meaning, _MEANING, placeholder=" ..."))
+    return one.key, a, b, re.split(r"[.:;] |\.$", one.meaning)[0]
 
 
-def _figure_lines(a: ControllerFigures, b: ControllerFigures) -> Iterator[str]:
-    """Yield a line for each figure that one of them has."""
+def _figures(a: ControllerFigures, b: ControllerFigures) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each figure that one of them has."""
     left, right = ({name: (value, unit) for name, value, unit in figure_rows(one)} for one in (a, b))
     for name, (_, unit) in (left | right).items():
         old, new = (three_digits_or_dash(side.get(name, (None, ""))[0]) for side in (left, right))
-        yield _line(name, old, new, unit)
-    for letter, one in (("A", a), ("B", b)):
-        if one.eight.crashed:
-            yield f"{letter} CRASHED on the eight"
+        yield name, old, new, unit
 
 
 def figure_rows(one: ControllerFigures) -> Iterator[Row]:
@@ -96,7 +100,3 @@ def _margin_rows(axis: AxisMargins) -> Iterator[Row]:
         yield f"{axis.axis}: phase margin{where}", loop.phase_deg, "degrees"
         yield f"{axis.axis}: delay margin{where}", 1e3 * loop.delay_s, "ms"
         yield f"{axis.axis}: sensitivity{where}", loop.sensitivity, ""
-
-
-def _line(name: str, a: str, b: str, note: str) -> str:
-    return f"{name:<{_WIDE}}{a:>{_COLUMN}}{b:>{_COLUMN}}  {note}".rstrip()

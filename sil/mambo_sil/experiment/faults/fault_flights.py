@@ -62,15 +62,15 @@ STATUS_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for
 class End(StrEnum):
     """How a flight ended."""
 
-    BACK = "back"
+    RECOVERED = "recovered"
     """Recovered: within the band until the end."""
-    AWAY = "away"
+    NOT_RECOVERED = "not recovered"
     """Not recovered by the end, but in the air."""
     CRASHED = "crashed"
     """Tilted beyond `crash_tilt_rad`, or on the ground."""
 
 
-ORDER: Final = (End.BACK, End.AWAY, End.CRASHED)
+ORDER: Final = (End.RECOVERED, End.NOT_RECOVERED, End.CRASHED)
 
 
 @dataclass(frozen=True)
@@ -267,7 +267,7 @@ def _judge_flight(
         band_m=band_m,
         saturated_share=saturated,
         recovery_s=max(0, late) * float(trace.time_s[1] - trace.time_s[0]) if back else math.nan,
-        end=End.CRASHED if crashed else End.BACK if back else End.AWAY,
+        end=End.CRASHED if crashed else End.RECOVERED if back else End.NOT_RECOVERED,
     )
 
 

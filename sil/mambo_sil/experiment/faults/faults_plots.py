@@ -36,5 +36,5 @@ def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:
         errors.set_yticklabels(faults, parse_math=False)
         errors.set_ylim(len(faults) - 0.5, -0.5)
         figure.legend(loc="outside upper center", ncols=len(COURSES))
-        times.set(xlabel="back after, s", xlim=(0.0, None))
+        times.set(xlabel="recovered after, s", xlim=(0.0, None))
         return save(figure, stem)

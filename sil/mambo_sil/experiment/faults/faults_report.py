@@ -1,16 +1,18 @@
-"""Verdicts on flights with faults as a record, as Markdown table, as CSV and as a section of the report."""
+"""Verdicts on flights with faults: record, text, Markdown table, CSV and section of the report."""
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Final
 
+from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.faults.fault_flights import COURSES, ORDER, End, Verdict, all_statuses
 from mambo_sil.results.summary import ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 _LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
 _SHORTEST_BAR_M: Final = 0.01
@@ -50,11 +52,49 @@ def _bar_percent(error_m: float, largest_m: float) -> float:
     return round(100.0 * math.log(error_m / _SHORTEST_BAR_M) / math.log(largest_m / _SHORTEST_BAR_M), 1)
 
 
-def table(verdicts: Sequence[Verdict]) -> str:
+_HEADS: Final = (
+    *("fault", "status", "command, rad", "tilt, rad", "at limit, %"),
+    *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
+    "end",
+)
+
+
+def faults_text(summary: FaultsSummary) -> str:
+    """Return the verdicts as text: how many faults ended how, then a row per fault."""
+    faults = {
+        flight.fault: [one for one in summary.flights if one.fault == flight.fault]
+        for flight in summary.flights
+    }
+    ends = [_worst_end(pair) for pair in faults.values()]
+    counts = ", ".join(f"{ends.count(end)} {end}" for end in ORDER if end in ends)
+    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {len(faults)} faults, {counts}"
+    heads = [
+        "fault",
+        *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
+    ]
+    rows = [[fault, *(cell for flight in pair for cell in _cells(flight))] for fault, pair in faults.items()]
+    lines = [sentence(answer), "", *table(heads, rows)]
+    return "\n".join([*lines, "", sentence(_bands(summary.flights))])
+
+
+def faults_markdown(verdicts: Sequence[Verdict]) -> str:
     """Return the verdicts as a Markdown table with one row per fault and both courses side by side."""
-    head = ["fault", "status", "command, rad", "tilt, rad", "at limit, %"]
-    head += [f"{course}: {what}" for course in COURSES for what in ("error, m", "back after, s")]
-    rows = [[*head, "end"], ["---"] * (len(head) + 1)]
+    lines = [_HEADS, ("---",) * len(_HEADS), *_rows(verdicts)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{_bands(verdicts)}"
+
+
+def _cells(flight: Verdict) -> tuple[str, str]:
+    """Return the largest error of a flight, and when it recovered."""
+    after = {End.CRASHED: "CRASHED", End.NOT_RECOVERED: "never"}
+    return f"{flight.largest_error_m:.2f}", after.get(flight.end, f"{flight.recovery_s:.1f}")
+
+
+def _worst_end(pair: Sequence[Verdict]) -> End:
+    """Return how the flights with a fault ended."""
+    return max((flight.end for flight in pair), key=ORDER.index)
+
+
+def _rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, ...]]:
     for fault in dict.fromkeys(verdict.fault for verdict in verdicts):
         pair = [verdict for verdict in verdicts if verdict.fault == fault]
         row = [fault, ", ".join(all_statuses(pair))]
@@ -63,12 +103,15 @@ def table(verdicts: Sequence[Verdict]) -> str:
         for verdict in pair:
             never = math.isnan(verdict.recovery_s)
             row += [f"{verdict.largest_error_m:.2f}", "-" if never else f"{verdict.recovery_s:.1f}"]
-        rows.append([*row, max((verdict.end for verdict in pair), key=ORDER.index)])
+        yield (*row, _worst_end(pair))
+
+
+def _bands(verdicts: Sequence[Verdict]) -> str:
     bands = ", ".join(
         f"{course} {next(v.band_m for v in verdicts if v.course == course and not v.turning):.3f} m"
         for course in COURSES
     )
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + f"\n\nBack means within: {bands}."
+    return f"Recovered means an error within: {bands}."
 
 
 def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:

@@ -41,10 +41,10 @@ def verdict(axis: AxisMargins) -> str:
     parts = []
     for place, loop in axis.loops.items():
         gain = "any gain" if math.isinf(loop.gain_up) else f"{loop.gain_up:.2g} times the gain"
-        delay = "any delay" if math.isinf(loop.delay_s) else f"{1e3 * loop.delay_s:.0f} ms of delay"
-        where = "" if place == "command" else f" at {PLACES['motors']}"
-        parts.append(f"{gain}, {delay}{where}")
-    return f"{axis.axis}: stands {'; '.join(parts)}"
+        delay = "any delay" if math.isinf(loop.delay_s) else f"{1e3 * loop.delay_s:.0f} ms more delay"
+        where = "" if place == "command" else f"at {PLACES['motors']} "
+        parts.append(f"{where}{gain} or {delay}")
+    return f"{axis.axis}: tolerates {'; '.join(parts)}"
 
 
 def figure_rows(axis: AxisMargins) -> Iterator[Row]:

@@ -14,6 +14,7 @@ from mambo_sil.experiment.campaign.campaign_flights import (
 )
 from mambo_sil.experiment.regress.baseline import Recorded
 from mambo_sil.experiment.regress.suite_file import FlightSuite
+from mambo_sil.results.metric_names import named
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number
 
@@ -101,4 +102,6 @@ def _explain(check: Check) -> str:
         limits.append(f"recorded {digits(check.then)}")
     if check.limit != check.bound:
         limits[-1] += f", so at most {digits(check.limit)}"
-    return f"{check.metric} = {digits(check.now)} ({'; '.join(limits)})"
+    name, unit = named(check.metric)
+    value = " ".join(filter(None, (name, digits(check.now), unit)))
+    return f"{value} ({'; '.join(limits)})"

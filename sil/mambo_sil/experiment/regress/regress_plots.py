@@ -9,6 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
+from mambo_sil.results.metric_names import named
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
 
@@ -63,7 +64,7 @@ def _rows(flights: Sequence[FlightResult]) -> dict[str, list[Check]]:
     for flight in flights:
         for check in flight.checks:
             if check.limit > 0.0 or not check.holds:
-                rows.setdefault(f"{flight.group}: {check.metric}", []).append(check)
+                rows.setdefault(f"{flight.group}: {named(check.metric)[0]}", []).append(check)
     closest = sorted(rows, key=lambda row: max(_shares(rows[row])), reverse=True)[:_MOST_ROWS]
     return {row: checks for row, checks in rows.items() if row in closest}
 

@@ -18,8 +18,10 @@ from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Record, write_record
+from mambo_sil.results.metric_names import titled
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 JUNIT: Final = "junit.xml"
 PICTURES: Final = ("regress.png", "regress.svg")
@@ -124,6 +126,11 @@ class GroupRow:
     failed: int
     flights: int
 
+    @property
+    def title(self) -> str:
+        """The metric with its unit."""
+        return titled(self.metric)
+
 
 def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
     """Yield a row for each metric that is checked in a group; for `crashed` only if it failed or is alone."""
@@ -158,7 +165,7 @@ def finding(summary: RegressSummary) -> str:
 def remarks(summary: RegressSummary) -> list[str]:
     """Return what a reader should know of the baseline."""
     if summary.baseline is None:
-        return ["compared with the bounds only: no recorded metrics"]
+        return ["compared with the bounds only; --update records this run for later ones"]
     found = [f"compared with the bounds and with {echo(summary.baseline)}"]
     if summary.settings_then != summary.settings:
         found.append("the controller's settings have changed since the metrics were recorded")
@@ -172,21 +179,27 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    heads = ("bound", "median", "worst", "ratio", "at limit")
-    lines = [f"{'group':21}{'metric':21}" + "".join(f"{head:>11}" for head in heads) + f"{'failed':>12}"]
-    for row in group_rows(summary):
-        numbers = (row.bound, row.middle, row.worst, row.over_recorded)
-        cells = "".join(f"{'-' if number is None else digits(number):>11}" for number in numbers)
-        cells += f"{f'{row.saturated_share:.1%}':>11}"
-        lines.append(f"{row.group:20} {row.metric:21}{cells}{f'{row.failed} of {row.flights}':>12}")
-    lines.append("")
+    lines = [sentence(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")]
+    lines += [sentence(one) for one in remarks(summary)]
+    ratio = () if summary.baseline is None else ("over recorded",)
+    heads = ("group", "metric", "bound", "median", "worst", *ratio, "at limit", "failed")
+    rows = [_cells(row, has_ratio=bool(ratio)) for row in group_rows(summary)]
+    lines += ["", *table(heads, rows, (0, 1))]
+    if summary.failed:
+        lines.append("")
     for flight in summary.failed[:MOST_SHOWN]:
-        lines.append(f"{flight.name}: {'; '.join(flight.failures)}")
+        lines.append(sentence(f"{flight.name}: {'; '.join(flight.failures)}", "    "))
         lines.append(f"    mambo-nmpc fly --repeat {echo(folder)}/{flight.record}")
     if len(summary.failed) > MOST_SHOWN:
         lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
-    lines.append(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")
-    return "\n".join([*lines, *remarks(summary)])
+    return "\n".join(lines)
+
+
+def _cells(row: GroupRow, *, has_ratio: bool) -> tuple[str, ...]:
+    numbers = (row.bound, row.middle, row.worst, *([row.over_recorded] if has_ratio else []))
+    shown = ("-" if number is None else digits(number) for number in numbers)
+    failed = f"{row.failed} of {row.flights}"
+    return (row.group, row.title, *shown, f"{100.0 * row.saturated_share:.1f} %", failed)
 
 
 def junit_xml(summary: RegressSummary) -> bytes:

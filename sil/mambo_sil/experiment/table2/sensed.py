@@ -1,6 +1,6 @@
 """The Table II case with sensors: PDs and NMPC with the true state, and with both estimators."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -27,8 +27,9 @@ from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.results.number_format import digits
+from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.terminal import table
 
 PRESETS: Final = ("mambo", "table1")
 """Presets that are compared with the PDs."""
@@ -123,15 +124,34 @@ def _judge(name: str, view: str, trace: Trace) -> SensedRow:
     )
 
 
-def text(rows: Sequence[SensedRow]) -> str:
-    """Return the rows as a Markdown table, below those printed in the paper."""
-    heads = ("controller", "sees", "flights", *INDICES, "worst IAE", "IAE as seen", "drift, m")
-    lines = [" | ".join(heads), " | ".join(["---"] * 3 + ["---:"] * 7)]
+_HEADS = ("controller", "sensors", "flights", *INDICES, "worst IAE", "IAE as estimated", "drift, m")
+
+
+_SHOWN = (0, 1, 2, 3, 7, 8, 9)
+"""The columns that the text has; the Markdown table has all."""
+
+
+def sensed_text(rows: Sequence[SensedRow]) -> str:
+    """Return the rows as text, below those printed in the paper."""
+    lines = [
+        f"{row.controller}, sensors {row.view}: {distance(row.tracked[0] / DURATION_S)} in the mean"
+        for row in rows
+        if row.flights > 1
+    ]
+    shown = [[row[index] for index in _SHOWN] for row in (_HEADS, *_cells(rows))]
+    return "\n".join([*lines, "", *table(shown[0], shown[1:], (0, 1))])
+
+
+def sensed_markdown(rows: Sequence[SensedRow]) -> str:
+    """Return the same rows as a Markdown table."""
+    lines = [_HEADS, ("---",) * 3 + ("---:",) * 7, *_cells(rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _cells(rows: Sequence[SensedRow]) -> Iterator[tuple[str, ...]]:
     for name, printed in (("PD, printed", PRINTED_PD), ("NMPC, printed", PRINTED_NMPC)):
-        lines.append(" | ".join([name, "", "", *map(digits, printed), "", "", ""]))
+        yield (name, "", "", *map(digits, printed), "", "", "")
     for row in rows:
         flights = f"{row.flights}" + (f", {row.lost} lost" if row.lost else "")
         ends = (row.worst_iae_m_s, row.seen[0], row.drift_m)
-        cells = [row.controller, row.view, flights, *map(digits, row.tracked), *map(digits, ends)]
-        lines.append(" | ".join(cells))
-    return "\n".join(f"| {line} |" for line in lines)
+        yield (row.controller, row.view, flights, *map(digits, row.tracked), *map(digits, ends))

@@ -16,8 +16,9 @@ from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import Trace, read_existing
 from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
-from mambo_sil.results.number_format import digits, three_digits
+from mambo_sil.results.number_format import digits, distance, three_digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
 UNITS: Final = ("m s", "m^2 s", "m^2 s^2", "m s^2")
@@ -133,39 +134,43 @@ def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summa
 
 
 def table2_text(summary: Table2Summary) -> str:
-    """Return Table II as text: a block for each case, printed above measured, then the claims."""
+    """Return Table II as text: the answer, a table for each case, printed above flown, then the claims."""
+    shortest = next(iter(CASES))
     lines = [
-        "printed: in the paper; flown: here, 100 s along a figure of eight of 4 m, Bernoulli's or Gerono's;",
-        "PD over this: the index of the flown PD, or of the printed one, divided by that of the row;",
-        "variation: the command variation, the mean change of the command from one update to the next",
-        f"{'':28}" + "".join(f"{unit:>10}" for unit in UNITS) + f"{'  PD over this':36}{'variation':>11}",
+        f"{row.controller}: {distance(row.measured[0] / DURATION_S)} in the mean on {shortest}"
+        for row in summary.rows
+        if row.case == shortest
     ]
     for case in CASES:
-        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
-        lines[-1] += "".join(f"{index:>9}" for index in INDICES) + f"{'rad':>11}"
-        if case == next(iter(CASES)):
-            lines += [_line("printed PD", PRINTED_PD, None, "")]
-            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
-        lines += [
+        rows = []
+        if case == shortest:
+            rows += [_line("printed PD", PRINTED_PD, None, "")]
+            rows += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
+        rows += [
             _line(
                 f"flown {row.controller}", row.measured, row.improvement, f"{row.command_variation_rad:.4f}"
             )
             for row in summary.rows
             if row.case == case
         ]
-        lines += [""]
-    lines += ["the paper's claims, as flown here:"]
+        units = (f"{index}, {unit}" for index, unit in zip(INDICES, UNITS, strict=True))
+        lines += ["", *table((case, *units, "improvement", "variation, rad"), rows)]
     lines += [
-        f"  {'holds' if claim.holds else 'does not hold':13}  {claim.text}: {claim.evidence}"
+        "",
+        sentence("printed: in the paper; flown: here, 100 s along a figure of eight of 4 m"),
+        sentence("improvement: IAE of the flown PD, or of the printed one, divided by that of the row"),
+        sentence("variation: the mean change of the command from one update to the next"),
+        "",
+    ]
+    claims = [
+        ("holds" if claim.holds else "does not hold", f"{claim.text}: {claim.evidence}")
         for claim in summary.claims
     ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *table(("verdict", "the paper's claims, as flown here"), claims, (0, 1))])
 
 
-def _line(name: str, values: Four, improvement: Four | None, variation: str) -> str:
-    ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
-    line = f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values)
-    return f"{line}{ratios:36}{variation:>11}".rstrip()
+def _line(name: str, values: Four, improvement: Four | None, variation: str) -> tuple[str, ...]:
+    return (name, *map(digits, values), "" if improvement is None else digits(improvement[0]), variation)
 
 
 def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:

@@ -19,7 +19,7 @@ from mambo_sil.flight.names import SENSORS_OF, SensorsName
 from mambo_sil.model.derive.derived_settings import controller_text
 
 LEAST_GAIN: Final = 1.5
-"""A loop that stands less of its gain is warned of, wherever it is broken."""
+"""A loop that tolerates less of its gain is warned of, wherever it is broken."""
 LEAST_DELAY_S: Final = 0.03
 """The same for the delay at the command."""
 
@@ -56,7 +56,9 @@ def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
     if min(map(_reserve, axes)) >= 1.0:
         return JudgedMargins(where, axes, None)
     worst, _ = min(found, key=lambda one: _reserve_of(one[1]))
-    short = f"a loop stands less than {LEAST_GAIN:g} times the gain or {1e3 * LEAST_DELAY_S:.0f} ms of delay"
+    short = (
+        f"a loop tolerates less than {LEAST_GAIN:g} times the gain or {1e3 * LEAST_DELAY_S:.0f} ms more delay"
+    )
     return JudgedMargins(where, axes, f"{short}; {_in_the_way(settings, drone, worst, sensors)}")
 
 
@@ -97,10 +99,10 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
         derived = controller_toml.parse(controller_text(other, drone.name), drone.name)
         found.append((_reserve_of(_measure(derived, _at(other, worst), seen)), words))
     if not found:
-        return "no single property is in the way"
+        return "no single property is the cause"
     reserve, words = max(found)
-    enough = "enough" if reserve >= 1.0 else "too little, too"
-    return f"most in the way is {words}: without it the loops stand {enough}"
+    enough = "large enough" if reserve >= 1.0 else "still too small"
+    return f"the main cause is {words}: without it the margins are {enough}"
 
 
 def _without(drone: VehicleFile) -> Iterator[tuple[str, VehicleFile]]:

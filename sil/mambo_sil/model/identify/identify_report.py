@@ -13,6 +13,7 @@ from mambo_sil.model.identify.identify_record import (
 )
 from mambo_sil.model.identify.response import Interval
 from mambo_sil.results.number_format import three_digits
+from mambo_sil.results.terminal import sentence, table
 
 ADVICE: Final = (
     "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
@@ -22,25 +23,29 @@ ADVICE: Final = (
 
 def identify_text(summary: IdentifySummary) -> str:
     """Return an identification as text: the model with its 95 % intervals, then what the logs showed."""
-    lines = [f"{'':28}" + "".join(f"{name:20}" for name in summary.axes)]
-    cells = zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True)
-    rows = zip(AXIS_ROWS, cells, strict=True)
-    lines += [f"{words:28}" + "".join(f"{cell:20}" for cell in row) for words, row in rows]
-    facts = [*motion_rows(summary), *thrust_rows(summary), *noise_rows(summary)]
-    lines += [f"{words:28}{value}" for words, value in facts]
+    cells = list(zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True))
+    lines = [
+        f"{name}: {axis.verdict}; gain {gain}, lag + dead time {lag} ms"
+        for (name, axis), gain, lag, *_ in zip(summary.axes.items(), *cells[:2], strict=True)
+    ]
     for name, axis in summary.axes.items():
-        lines += [f"{name} is {axis.verdict}: {reason}" for reason in axis.reasons]
+        lines += [sentence(f"{name} is {axis.verdict}: {reason}") for reason in axis.reasons]
     if summary.thrust is not None:
-        lines += [f"thrust is {summary.thrust.verdict}: {reason}" for reason in summary.thrust.reasons]
+        lines += [
+            sentence(f"thrust is {summary.thrust.verdict}: {reason}") for reason in summary.thrust.reasons
+        ]
+    rows = [(words, *row) for words, row in zip(AXIS_ROWS, cells, strict=True)]
+    lines += ["", *table(("", *summary.axes), rows, range(len(summary.axes) + 1)), ""]
+    lines += table((), [*motion_rows(summary), *thrust_rows(summary), *noise_rows(summary)], (0, 1))
+    lines.append("")
     for log in summary.logs:
         renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
-        lines.append(
-            f"{log.name}: {log.duration_s:.1f} s used" + (f"; {', '.join(renamed)}" if renamed else "")
-        )
-    lines += summary.remarks
+        used = f"{log.name}: {log.duration_s:.1f} s used"
+        lines.append(sentence(f"{used}; {', '.join(renamed)}" if renamed else used, "  "))
+    lines += [sentence(remark, "  ") for remark in summary.remarks]
     if any(axis.verdict != "good" for axis in summary.axes.values()):
-        lines.append(ADVICE)
-    return "\n".join(line.rstrip() for line in lines)
+        lines.append(sentence(ADVICE))
+    return "\n".join(lines)
 
 
 def model_text(summary: IdentifySummary) -> str:

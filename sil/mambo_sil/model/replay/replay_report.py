@@ -7,6 +7,7 @@ import numpy as np
 
 from mambo_sil.model.replay.log_replay import AXES, LogReplay
 from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.terminal import sentence, table
 
 CURVES: Final = "replay.csv"
 PICTURES: Final = ("replay.png", "replay.svg")
@@ -138,5 +139,5 @@ def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
 
 def replay_text(summary: LogReplaySummary) -> str:
     """Format a summary."""
-    lines = [f"{name:20}{value}" for name, value in rows(summary)]
-    return "\n".join([finding(summary), *lines, *summary.remarks])
+    lines = [sentence(finding(summary)), "", *table((), rows(summary), (0, 1))]
+    return "\n".join([*lines, *map(sentence, summary.remarks)])

@@ -13,7 +13,9 @@ from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv,
 from mambo_sil.model.tune.study import FinishedTrial, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
 from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.number_format import digits, distance
 from mambo_sil.results.summary import Summary
+from mambo_sil.results.terminal import sentence, table
 
 CONTROLLER: Final = "controller.toml"
 FRONT: Final = "front"
@@ -29,6 +31,8 @@ class TuneSummary(Summary):
     seed: int
     flights: int
     """Flights of each trial."""
+    duration_s: float
+    """Duration of each flight."""
     vehicle: VehicleFile = NOMINAL
     trials: int
     base: FinishedTrial | None
@@ -45,6 +49,7 @@ def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
         study=study_name(tuning),
         seed=tuning.file.seed,
         flights=tuning.file.flights,
+        duration_s=tuning.file.flight.duration_s,
         vehicle=tuning.drone,
         trials=len(trials),
         base=_rounded(base[0]) if base else None,
@@ -73,15 +78,28 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
 
 
 def tune_text(summary: TuneSummary) -> str:
-    """Return base and chosen trial as text, and the rule of the choice."""
+    """Return base and chosen trial as text: the answer, the rule of the choice, and a table."""
     named = {"base": summary.base, "chosen": summary.chosen}
-    lines = [
-        f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
-        f"{one.command_variation_rad:9.4g} rad per update   {one.crashed} of {summary.flights} crashed"
+    distances = {
+        name: distance(one.iae_m_s / summary.duration_s) for name, one in named.items() if one is not None
+    }
+    answer = f"trial {summary.chosen.number} of {summary.trials}: {distances['chosen']} in the mean"
+    answer += f", the base {distances['base']}" if summary.base is not None else ""
+    crashed = f"{summary.chosen.crashed} of {summary.flights} flights crashed"
+    rows = [
+        (
+            name,
+            str(one.number),
+            digits(one.iae_m_s),
+            digits(one.command_variation_rad),
+            f"{one.crashed} of {summary.flights}",
+        )
         for name, one in named.items()
         if one is not None
     ]
-    return "\n".join([*lines, f"chosen by the rule: {summary.rule}"])
+    heads = ("", "trial", "IAE, m s", "command variation, rad", "crashed")
+    lines = [sentence(f"{answer}; {crashed}"), sentence(f"chosen: {summary.rule}"), "", *table(heads, rows)]
+    return "\n".join(lines)
 
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:

@@ -1,0 +1,34 @@
+"""Names of metrics for readers, from their keys."""
+
+from typing import Final
+
+SEEN: Final = "seen_"
+"""Begins the key of a metric of the estimated flight, which is all that a controller knows of."""
+
+_UNITS: Final = {
+    "_m2_s2": "m^2 s^2",
+    "_m2_s": "m^2 s",
+    "_m_s2": "m s^2",
+    "_m_s": "m s",
+    "_rad_s": "rad s",
+    "_rad": "rad",
+    "_m": "m",
+}
+_WORDS: Final = {
+    **{index: index.upper() for index in ("iae", "ise", "itse", "itae")},
+    "max": "largest",
+    "3d": "in space",
+}
+
+
+def named(key: str) -> tuple[str, str]:
+    """Split the key of a metric, such as rms_error_m, into its name and its unit."""
+    suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
+    words = key.removeprefix(SEEN).removesuffix(suffix).split("_")
+    name = " ".join(_WORDS.get(word, word) for word in words)
+    return name + (" as estimated" if key.startswith(SEEN) else ""), _UNITS.get(suffix, "")
+
+
+def titled(key: str) -> str:
+    """Return name and unit of a metric for the head of a column, such as IAE, m s."""
+    return ", ".join(filter(None, named(key)))
