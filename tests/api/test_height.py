@@ -11,7 +11,7 @@ from mambo_nmpc.curves import curve
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import CurveName
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 
 RNG = np.random.default_rng(8)
 REST = np.zeros((2, 3))

@@ -25,7 +25,7 @@ from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Hover
 from tests.support.engines import lanes_here
 from tests.support.faults import FAULTS, PATIENCE, faulty_controller, faulty_flight
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.scenarios import BATCHES, CRAZYFLIE, changed
 from tests.support.tools import toolchain
 

@@ -49,7 +49,7 @@ from tests.support.faults import (
     faulty_controller,
     faulty_flight,
 )
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
 from tests.support.tools import toolchain

@@ -9,7 +9,7 @@ import pytest
 
 from mambo_codegen.methods import method_of
 from tests.support.crazyflie import Built, Crazyflie, build, folder_of
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 
 MOST_N = 0.48
 """Of the four motors, in the stubs."""

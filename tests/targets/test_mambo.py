@@ -22,7 +22,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
 

@@ -12,7 +12,7 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import place
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
 

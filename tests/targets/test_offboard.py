@@ -17,6 +17,7 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_nmpc import Controller
 from tests.support.bundles import place
+from tests.support.height_settings import height_settings
 from tests.support.offboard import Flown, Radio, fly_offboard
 from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
 
@@ -42,6 +43,11 @@ def drone() -> Drone:
 @pytest.fixture
 def script(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Return the script, with the drone behind cflib and its clock."""
+    return imported(folder, drone, monkeypatch)
+
+
+def imported(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Import the script of a folder."""
     install(drone, monkeypatch)
     spec = importlib.util.spec_from_file_location("offboard", folder / "offboard.py")
     assert spec is not None
@@ -69,6 +75,16 @@ def test_it_sends_angles_and_height_a_hundred_times_a_second(
     tilts = np.array([arguments[:2] for _, arguments in sent])
     assert 1.0 < np.abs(tilts).max() <= math.degrees(SETTINGS.limits.tilt_rad) + 1e-4
     assert {arguments[2] for _, arguments in sent} == {0.0}
+
+
+def test_with_a_height_in_the_settings_the_stock_firmware_flies_it(
+    drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The script sends the same kind of set-points."""
+    files = render_target(height_settings(), TARGETS["crazyflie"], with_digest=False)
+    imported(place(files, tmp_path), drone, monkeypatch).main()
+    assert capsys.readouterr().out == "landed\n"
+    assert drone.names() == ["arm", "zdistance", "stop_setpoint", "notify", "close"]
 
 
 def test_ctrl_c_descends_where_it_is(script: ModuleType, drone: Drone) -> None:

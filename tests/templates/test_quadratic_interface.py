@@ -16,7 +16,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library, ffi
 from tests.support.bundles import place
 from tests.support.extension import build_extension
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.quadratic import CORNER_SETTINGS, Array, quadratic_case
 from tests.support.strict_builds import built
 from tests.support.tools import require, toolchain

@@ -23,7 +23,7 @@ from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.serial_port import open_port
 from tests.support.command import run
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.serial_line import Line, build_firmware, serial_line
 from tests.support.tools import require_module, without_compilers_of_boards
 

@@ -26,7 +26,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.trajectories import CURVES
-from tests.support.heights import height_settings
+from tests.support.height_settings import height_settings
 from tests.support.lockstep import LockstepPort, TimedFaults, build_lockstep
 from tests.support.serial_line import edited
 
