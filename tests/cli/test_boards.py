@@ -139,7 +139,7 @@ def test_a_missing_emulator_is_named(
     board_builder("mega")
     monkeypatch.setenv("PATH", only(tmp_path_factory.mktemp("bin"), "avr-*"))
     said, talk = run(*command, code=2 if command[0] == "fly" else 0)
-    assert "qemu-system-avr, needed to emulate an ATmega2560, is missing" in said + talk
+    assert "qemu-system-avr, needed to emulate an ATmega2560, is missing" in unwrapped(said + talk)
 
 
 @pytest.mark.parametrize(
