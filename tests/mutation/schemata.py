@@ -7,6 +7,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from tests.mutation.mutants import Mutant, Token, tokens_of
@@ -35,7 +36,8 @@ class Region:
         return self.start <= mutant.start and mutant.end <= self.end
 
 
-def regions(text: str) -> list[Region]:
+@lru_cache(maxsize=4)
+def regions(text: str) -> tuple[Region, ...]:
     """Return the bodies of all functions and the values of all tables of C, ordered by position."""
     found = list[Region]()
     declared, outer = -1, list[Token]()
@@ -57,7 +59,7 @@ def regions(text: str) -> list[Region]:
         ]
         rest = outer[ends[-1] + 1 :] if ends else outer
         declared = rest[0].start if rest else -1
-    return found
+    return tuple(found)
 
 
 def can_share(text: str, mutant: Mutant) -> bool:

@@ -37,8 +37,10 @@ def test_margins_at_the_command_are_those_of_python_control(name: str, drone: st
 
 def turning_rad_s(loop: Any) -> float:
     """Return about where the phase of a loop passes -180 degrees with the largest gain."""
-    rad_s = np.geomspace(1.0, np.pi / loop.dt, 20000)
+    rad_s = np.geomspace(1.0, np.pi / loop.dt, 1000)
     magnitude, phase, _ = control.frequency_response(loop, rad_s)
     values = magnitude * np.exp(1j * phase)
     turns = np.flatnonzero((values.imag[:-1] * values.imag[1:] < 0.0) & (values.real[:-1] < 0.0))
-    return float(rad_s[turns[np.argmax(magnitude[turns])]])
+    last = turns[np.argmax(magnitude[turns])]
+    before, behind = values.imag[last], values.imag[last + 1]
+    return float(rad_s[last] + ((rad_s[last + 1] - rad_s[last]) * before / (before - behind)))
