@@ -41,6 +41,7 @@ from benchmarks.evidence.firmware_tables import conditions as firmware_condition
 from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
+from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
 from benchmarks.evidence.simulator_pictures import draw_simulators
 from benchmarks.evidence.simulator_tables import (
@@ -122,6 +123,16 @@ ITEMS: Final = (
         tables={"first": first_table},
         pictures={"first.png": "first.png"},
         draw=draw_first_picture,
+    ),
+    Item(
+        name="space",
+        commands=space_commands(f"{RESULTS}/space"),
+        controllers=("crazyflie", f"{_HERE}/height.toml"),
+        paths=(*_FLIGHT, _STYLE, f"{_HERE}/moving_picture.py"),
+        read=read_space,
+        tables={"space": space_table},
+        pictures={"space.gif": "space.gif"},
+        draw=draw_moving_picture,
     ),
     Item(
         name="sensors",
