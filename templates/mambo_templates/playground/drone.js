@@ -1,6 +1,6 @@
 /* One drone on the field: a module and its flight, update by update. */
-const LIMITS = 7, FENCE_AT = 2; /* numbers of nmpc_limits_t; the first of its fence: least x and y, largest x and y */
-const LIMIT_NAMES = ["speed", "braking", "fence", "tilt"]; /* the bits of nmpc_limits_active */
+const LIMITS = 11, FENCE_AT = 2; /* most numbers of nmpc_limits_t; the first of its fence: least x and y, largest x and y */
+const LIMIT_NAMES = ["speed", "braking", "fence", "tilt", "height"]; /* the bits of nmpc_limits_active */
 const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array };
 
 class Drone {
@@ -10,7 +10,7 @@ class Drone {
     this.flight = module.put(bytesOf(data.flight));
     this.flying = module.space(module.calls.playground_flying_bytes());
     [this.time, this.target, this.sensors, this.gusts] =
-      [8, 48, 48 * data.ticks, 24 * (data.ticks + 1)].map((size) => module.space(size));
+      [8, 8 * TARGET_COLUMNS, 48 * data.ticks, 24 * (data.ticks + 1)].map((size) => module.space(size));
     this.draws = module.pointers(this.sensors, this.gusts, 0);
     const arrays = TRACE_AXES.map((axes) => module.space(8 * axes));
     this.trace = module.pointers(...arrays);
@@ -22,8 +22,15 @@ class Drone {
     [this.position, this.velocity, this.angles] = arrays.slice(0, 3).map((address) => module.at(address, 3));
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
-      module.at(address, [1, 6, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
+      module.at(address, [1, TARGET_COLUMNS, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
+    if (entry.lifts) this.lift(data.height_m);
     this.setMembers("simulation", { disturbed: [1], windy: [1], sensed: [0], captured: [0] }, BigInt64Array);
+  }
+
+  /* The controller commands the thrust too, at the height of a level course. */
+  lift(height) {
+    this.inputs[1].set([height, 0, 0], LEVEL_COLUMNS);
+    this.setMembers("simulation", { lifting: [1], target_columns: [TARGET_COLUMNS] }, BigInt64Array);
   }
 
   setMembers(record, members, Kind = Float64Array) {

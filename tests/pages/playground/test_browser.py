@@ -102,14 +102,14 @@ def test_the_browser_flies_the_bits_of_the_native_engine(made: tuple[Path, Any],
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("crazyflie", "pd", "--vehicle", "crazyflie"),
+        ("height.toml", "crazyflie", "pd", "--vehicle", "crazyflie"),
         ("fixed.toml", "double.toml", "one-norm.toml", "--vehicle", "mambo"),
     ],
 )
 def test_other_drones_and_scalar_types_have_the_same_bits(
     arguments: tuple[str, ...], tab: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another attitude loop, fixed point and float64; each also flies."""
+    """Another attitude loop, a controller of the height, fixed point and float64; each also flies."""
     require("wasm-ld", "lld")
     monkeypatch.chdir(tmp_path)
     for name, preset, scalar in (
@@ -122,6 +122,7 @@ def test_other_drones_and_scalar_types_have_the_same_bits(
         changed = re.sub(r'^scalar = "\w+"', f'scalar = "{scalar}"', text, flags=re.MULTILINE)
         assert changed != text
         Path(f"{name}.toml").write_text(changed, "utf-8")
+    command.run("design", "crazyflie", "-o", "height.toml")
     command.run("playground", *arguments, "-o", "other.html")
     other = Page(tab, tmp_path / "other.html")
     assert "The same bits" in other.text("#proof")

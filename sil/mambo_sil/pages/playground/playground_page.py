@@ -14,6 +14,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.engine_library import ffi, record_type
 from mambo_sil.flight.engine.native import pd_function
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
 from mambo_sil.pages.playground import bit_proof
 from mambo_sil.pages.playground.dials import Dial, dials, weight_dial
@@ -110,18 +111,26 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
     """Return title, type of the C's numbers, and in base64 the record of a law without a model.
 
-    `metre` is 1 m in the numbers of the C's limits; None: the controller has none.
+    `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `lifts`: whether it
+    commands the thrust, and reads the height of its target.
     """
     if isinstance(one.kind, Settings):
         method = method_of(one.kind)
         metre = method.numbers.quantize(np.ones(1), ("position",)).item() if method.limiting else None
-        return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None, "metre": metre}
+        return {
+            "title": one.title,
+            "scalar": one.kind.code.scalar,
+            "constants": None,
+            "metre": metre,
+            "lifts": method.has_height,
+        }
     constants = pd_function(pd_controller(one.kind, flight))[1]
     return {
         "title": one.title,
         "scalar": "float64",
         "constants": _text(bytes(ffi.buffer(constants))),
         "metre": None,
+        "lifts": False,
     }
 
 
@@ -132,6 +141,7 @@ def _simulation(flight: Flight) -> dict[str, Any]:
     read = bit_proof.inputs(flight)
     return {
         "period_s": flight.update_period_s,
+        "height_m": HOVER_HEIGHT_M,
         "ticks": flight.ticks_per_update,
         "offsets": {
             "simulation": _offsets("engine_simulation_t"),
