@@ -22,7 +22,15 @@ def _has_room_for_thrust(settings: Settings) -> bool:
     return ranges.thrust_acceleration_min_m_s2 < 6.8 and ranges.thrust_acceleration_max_m_s2 > 12.9
 
 
+_ROUNDING: Final = "the clamp tells a proof by intervals what holds but for rounding, which no case meets"
+
 REASONS: Final[tuple[Reason, ...]] = (
+    *reasons(
+        "nmpc.c",
+        "return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD",
+        _ROUNDING,
+        *(f"branch {branch} never taken" for branch in range(4)),
+    ),
     *reasons(_FILE, _STATUS_AND_ROLL, _SELF_TEST, "branch 1 never taken", "branch 3 never taken"),
     *(
         Reason(_FILE, line, what, _SELF_TEST)

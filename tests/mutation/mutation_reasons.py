@@ -93,7 +93,43 @@ _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
 _CLAMP: Final = "return (value > limit) ? limit : ((value < -limit) ? -limit : value);"
 _NEAREST: Final = ("one more", "one less")
 
+_TURN: Final = "nmpc_slew_heading: "
+_SLEWS: Final = (
+    (
+        "if ((within(wanted_rad, NMPC_YAW_RANGE_RAD) == 0) || !(most_change_rad > (nmpc_real_t)0)) {",
+        "a most change of 0 changes nothing",
+        ("> -> >=",),
+    ),
+    ("if (change_rad > most_change_rad) {", "equal numbers are alike", ("> -> >=",)),
+    ("} else if (change_rad < -most_change_rad) {", "equal numbers are alike", ("< -> <=",)),
+    (
+        "return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD",
+        "the clamp is for the proof",
+        ("> -> >=",),
+    ),
+    (
+        ": ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));",
+        "the clamp is for the proof",
+        ("< -> <=", "- -> #1"),
+    ),
+)
+
 REASONS: Final[tuple[Reason, ...]] = (
+    *(reason for line, why, changes in _SLEWS for reason in reasons("nmpc.c", line, _TURN + why, *changes)),
+    *reasons(
+        "nmpc.c",
+        _SLEWS[0][0],
+        "the least number more than -1 is 0, which changes nothing",
+        "0 -> (-1) #1",
+        holds=_is_fixed,
+    ),
+    *reasons(
+        "nmpc.c",
+        "change_rad = change_rad - ((((change_rad * <real>) + NMPC_ROUNDING) - NMPC_ROUNDING) * turn_rad);",
+        "the nearest whole number of turns is the same",
+        "next number",
+        holds=lambda settings: not _is_fixed(settings),
+    ),
     *reasons("nmpc.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
     *reasons(
         "nmpc.c",

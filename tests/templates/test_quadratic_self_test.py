@@ -95,7 +95,7 @@ def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
 ) -> None:
     """Each plus made a minus and the other way round, from the attitude model to the interface.
 
-    The self-test makes steps only: it does not set a command in place of the last one.
+    The self-test makes steps only: it does not set a command in place of the last one, nor turn a heading.
     """
     bench = SelfTest(files, tmp_path)
     unnoticed, count = [], 0
@@ -103,7 +103,9 @@ def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
     start = text.index("/* ---- Attitude")
     others = [
         range(found.start(), text.index("\n}\n", found.start()))
-        for found in re.finditer(r"^.* (attitude_change_command|nmpc_set_command)\(", text, re.MULTILINE)
+        for found in re.finditer(
+            r"^.* (attitude_change_command|nmpc_set_command|nmpc_slew_heading)\(", text, re.MULTILINE
+        )
     ]
     for mutant in mutants(CONTROLLER, text):
         if {text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} != {"+", "-"}:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods.heading import slew_heading
 from mambo_codegen.methods.inputs import Status, choose
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
@@ -46,6 +47,7 @@ class ApiFunction(IntEnum):
     INIT = 3
     SET_LIMITS = 4
     SET_THRUST = 5
+    SLEW_HEADING = 6
 
 
 _POINTERS: Final = {
@@ -55,12 +57,14 @@ _POINTERS: Final = {
     ApiFunction.INIT: NULL_SELF,
     ApiFunction.SET_LIMITS: NULL_SELF | NULL_FIRST,
     ApiFunction.SET_THRUST: NULL_SELF,
+    ApiFunction.SLEW_HEADING: 0,
 }
 
 _OTHER_BIT: Final = 64
 _WRITTEN_AS: Final = {
     ApiFunction.SET_LIMITS: ApiFunction.SET_WEIGHTS | _OTHER_BIT,
     ApiFunction.SET_THRUST: ApiFunction.INIT | _OTHER_BIT,
+    ApiFunction.SLEW_HEADING: ApiFunction.RESET | _OTHER_BIT,
 }
 """How functions are written for which two bits are too few."""
 
@@ -74,6 +78,7 @@ def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
         ApiFunction.INIT: method.command,
         ApiFunction.SET_LIMITS: method.limiting.quantities if method.limiting else (),
         ApiFunction.SET_THRUST: THRUST,
+        ApiFunction.SLEW_HEADING: ("yaw",) * 3,
     }
 
 
@@ -142,7 +147,11 @@ class _Runs:
         self._others = {
             function: written
             for function, written in _WRITTEN_AS.items()
-            if (self._method.has_height if function == ApiFunction.SET_THRUST else self._method.limiting)
+            if {
+                ApiFunction.SET_LIMITS: self._method.limiting is not None,
+                ApiFunction.SET_THRUST: self._method.has_height,
+                ApiFunction.SLEW_HEADING: True,
+            }[function]
         }
         self._level: dict[str, Any] = {"command_rad": 0}
         if self._method.has_height:
@@ -180,9 +189,10 @@ class _Runs:
             if ApiFunction.SET_THRUST in self._others:
                 thrusts = call(ApiFunction.SET_THRUST, lambda values: controller.set_thrust(values[:, 0]))
             steps = call(ApiFunction.STEP, step)
+            none, slewed = np.zeros_like(steps), self._slewed(now)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, np.zeros_like(steps), limits, thrusts])
+        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)
@@ -191,7 +201,16 @@ class _Runs:
             column = (slice(None), *[None] * (outcome[name].ndim - 1))
             sent = np.where(((nulls & NULL_SELF) != 0)[column], level, outcome[name])
             outcome[name] = np.where(writes[column], sent, UNWRITTEN)
+        turns = function == ApiFunction.SLEW_HEADING
+        outcome["command_rad"][:, 0] = np.where(turns, slewed, outcome["command_rad"][:, 0])
         return outcome
+
+    def _slewed(self, now: Tape) -> NDArray[Any]:
+        """Return the headings (n,) of calls of nmpc_slew_heading, in the numbers of the C."""
+        numbers, quantities = self._method.numbers, self._quantities[ApiFunction.SLEW_HEADING]
+        given = numbers.to_si(now["values"][:, : len(quantities)], *quantities)
+        slewed = slew_heading(self._method, *given.T)
+        return numbers.quantize(slewed[:, np.newaxis], quantities[:1])[:, 0]
 
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:
         self._controller.memory = choose(chosen, self._fresh, self._controller.memory)

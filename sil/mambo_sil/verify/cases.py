@@ -43,6 +43,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *_limits(settings, rng),
         *_nulls(settings, rng),
         *_quadrants(settings, rng),
+        *_headings(settings),
         *(_convergence(settings) if method.iterates else []),
         *(_zero_errors(settings) if method.iterates else []),
         *(_outages(settings, rng, method.outage_steps) if method.outage_steps is not None else []),
@@ -86,6 +87,7 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
         if method.weight_limits
         else calls(settings, ApiFunction.SET_COMMAND, command[::-1]),
         *([] if limits is None else [calls(settings, ApiFunction.SET_LIMITS, limits)]),
+        calls(settings, ApiFunction.SLEW_HEADING, _random_headings(n, rng)),
         calls(settings, ApiFunction.STEP, steps[5]),
         *(
             [calls(settings, ApiFunction.SET_THRUST, _random_thrusts(settings, n, rng))]
@@ -95,6 +97,20 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
         *(calls(settings, ApiFunction.STEP, drawn) for drawn in steps[6:]),
     ]
     return list(np.stack(columns, axis=1))
+
+
+def _random_headings(n: int, rng: np.random.Generator) -> Array:
+    """Draw previous and wanted headings and most changes (n, 3), some beside the range's ends, some bad."""
+    previous = rng.uniform(-1.1, 1.1, n) * YAW_LIMIT_RAD
+    ends = YAW_LIMIT_RAD - rng.uniform(0, 0.05, n)
+    previous = np.where(np.arange(n) % 3 == 0, rng.choice([-1, 1], n) * ends, previous)
+    beyond = previous - (np.sign(previous) * (2.0 * np.pi - rng.uniform(0, 0.2, n)))
+    within = previous + (2.0 * np.pi * rng.integers(-3, 4, n)) + rng.uniform(-np.pi, np.pi, n)
+    wanted = np.where(np.abs(previous) > YAW_LIMIT_RAD - 1.0, beyond, within)
+    most = rng.choice([0.01, 0.04, 1.0, 0.0, -0.1], n, p=[0.3, 0.3, 0.3, 0.05, 0.05])
+    headings = np.stack([previous, wanted, most], axis=1)
+    headings[rng.random((n, 3)) < 0.03] = np.nan
+    return headings
 
 
 def _random_thrusts(settings: Settings, n: int, rng: np.random.Generator) -> Array:
@@ -216,6 +232,19 @@ def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
         good[:, YAW] = yaw
         columns.append(calls(settings, ApiFunction.STEP, good))
     return list(np.stack(columns, axis=1))
+
+
+def _headings(settings: Settings) -> Iterator[Tape]:
+    """Turn to the ends of the range and beside them, with every most change around 0 and that of the turn."""
+    good = (YAW_LIMIT_RAD, YAW_LIMIT_RAD, 0.5)
+    for index in range(3):
+        low, high = ((-YAW_LIMIT_RAD, YAW_LIMIT_RAD), (0.0, 0.25))[index == 2]
+        for sign in (1.0, -1.0):
+            rows = np.tile(np.array(good) * [sign, sign, 1.0], (2, 1))
+            for value in _around(settings, "yaw", low, high):
+                rows[1, index] = value
+                rows[1, 1] = value if index < 2 else sign * (YAW_LIMIT_RAD - 0.25)
+                yield calls(settings, ApiFunction.SLEW_HEADING, rows)
 
 
 def _convergence(settings: Settings) -> list[Tape]:

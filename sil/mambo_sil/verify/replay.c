@@ -363,6 +363,15 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
 }
 #endif
 
+/* A heading in floats is that in numbers. */
+static int turns_alike(void)
+{
+    const float found_rad = nmpc_float_slew_heading(0.25f, -0.5f, 0.0625f);
+    const nmpc_real_t expected = nmpc_slew_heading(NMPC_YAW(0.25), NMPC_YAW(-0.5), NMPC_YAW(0.0625));
+
+    return found_rad == ((float)expected / (float)((nmpc_sum_t)1 << NMPC_YAW_BITS));
+}
+
 /* A step with floats gives the same as one with the equal numbers of fixed point; floats outside every format are
  * refused. */
 static int passes_floats(nmpc_t *self)
@@ -448,7 +457,7 @@ static int passes_floats(nmpc_t *self)
                               (expected == NMPC_OK) ? NMPC_BAD_THRUST : expected, &found, &command);
 #endif
     }
-    return is_good && rounds_halves(self) && takes_the_ends(self);
+    return is_good && rounds_halves(self) && takes_the_ends(self) && turns_alike();
 }
 #else
 static int passes_floats(nmpc_t *self)
