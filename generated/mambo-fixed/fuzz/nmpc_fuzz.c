@@ -33,6 +33,7 @@
 #define NMPC_FUZZ_SET_COMMAND 2U
 #define NMPC_FUZZ_INIT 3U
 #define NMPC_FUZZ_SET_LIMITS 4U /* written as 2 with bit 6 */
+#define NMPC_FUZZ_SLEW_HEADING 6U /* written as 1 with bit 6 */
 #define NMPC_FUZZ_NULL_SELF 1U
 #define NMPC_FUZZ_NULL_FIRST 2U
 #define NMPC_FUZZ_NULL_SECOND 4U
@@ -54,6 +55,7 @@ typedef struct {
     nmpc_target_t target;
     nmpc_real_t thrust_acceleration_m_s2;
     nmpc_command_t start;
+    nmpc_real_t headings_rad[3]; /* previous, wanted, most change */
     nmpc_limits_t limits;
 } nmpc_fuzz_call_t;
 
@@ -77,6 +79,12 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.target.velocity_m_s[0] = values[9];
     call.target.velocity_m_s[1] = values[10];
     call.thrust_acceleration_m_s2 = values[11];
+    call.headings_rad[0] = values[0];
+    call.headings_rad[1] = values[1];
+    call.headings_rad[2] = values[2];
+    if ((call.function == NMPC_FUZZ_RESET) && (((unsigned int)bytes[0] & 64U) != 0U)) {
+        call.function = NMPC_FUZZ_SLEW_HEADING;
+    }
     call.start.roll_rad = values[0];
     call.start.pitch_rad = values[1];
     if ((call.function == 2U) && (((unsigned int)bytes[0] & 64U) != 0U)) {
@@ -92,7 +100,7 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     return call;
 }
 
-/* Make `call`; a step writes `command`. */
+/* Make `call`; a step writes `command`, a heading its roll. */
 static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *call, nmpc_command_t *command)
 {
     nmpc_t *self = ((call->nulls & NMPC_FUZZ_NULL_SELF) != 0U) ? 0 : controller;
@@ -114,6 +122,9 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
         break;
     case NMPC_FUZZ_SET_LIMITS:
         status = nmpc_set_limits(self, no_first ? 0 : &call->limits);
+        break;
+    case NMPC_FUZZ_SLEW_HEADING:
+        command->roll_rad = nmpc_slew_heading(call->headings_rad[0], call->headings_rad[1], call->headings_rad[2]);
         break;
     default:
         nmpc_init(self);
@@ -292,6 +303,10 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     } else if (call->function == NMPC_FUZZ_SET_LIMITS) {
         last->roll_rad = nmpc_fuzz_limited(self, last->roll_rad);
         last->pitch_rad = nmpc_fuzz_limited(self, last->pitch_rad);
+    } else if (call->function == NMPC_FUZZ_SLEW_HEADING) {
+        NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, twin_command.roll_rad));
+        NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.roll_rad, -NMPC_YAW_RANGE_RAD, NMPC_YAW_RANGE_RAD));
+        NMPC_FUZZ_REQUIRE(memcmp(&before, self, sizeof(before)) == 0);
     } else if (has_self) {
         last->roll_rad = (nmpc_real_t)0;
         last->pitch_rad = (nmpc_real_t)0;

@@ -32,6 +32,7 @@
 #define NMPC_FUZZ_RESET 1U
 #define NMPC_FUZZ_SET_WEIGHTS 2U
 #define NMPC_FUZZ_INIT 3U
+#define NMPC_FUZZ_SLEW_HEADING 6U /* written as 1 with bit 6 */
 #define NMPC_FUZZ_NULL_SELF 1U
 #define NMPC_FUZZ_NULL_FIRST 2U
 #define NMPC_FUZZ_NULL_SECOND 4U
@@ -53,6 +54,7 @@ typedef struct {
     nmpc_target_t target;
     nmpc_real_t thrust_acceleration_m_s2;
     nmpc_command_t start;
+    nmpc_real_t headings_rad[3]; /* previous, wanted, most change */
     nmpc_weights_t weights;
 } nmpc_fuzz_call_t;
 
@@ -76,6 +78,12 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.target.velocity_m_s[0] = values[9];
     call.target.velocity_m_s[1] = values[10];
     call.thrust_acceleration_m_s2 = values[11];
+    call.headings_rad[0] = values[0];
+    call.headings_rad[1] = values[1];
+    call.headings_rad[2] = values[2];
+    if ((call.function == NMPC_FUZZ_RESET) && (((unsigned int)bytes[0] & 64U) != 0U)) {
+        call.function = NMPC_FUZZ_SLEW_HEADING;
+    }
     call.start.roll_rad = values[0];
     call.start.pitch_rad = values[1];
     call.weights.tracking = values[0];
@@ -83,7 +91,7 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     return call;
 }
 
-/* Make `call`; a step writes `command`. */
+/* Make `call`; a step writes `command`, a heading its roll. */
 static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *call, nmpc_command_t *command)
 {
     nmpc_t *self = ((call->nulls & NMPC_FUZZ_NULL_SELF) != 0U) ? 0 : controller;
@@ -102,6 +110,9 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
         break;
     case NMPC_FUZZ_SET_WEIGHTS:
         status = nmpc_set_weights(self, no_first ? 0 : &call->weights);
+        break;
+    case NMPC_FUZZ_SLEW_HEADING:
+        command->roll_rad = nmpc_slew_heading(call->headings_rad[0], call->headings_rad[1], call->headings_rad[2]);
         break;
     default:
         nmpc_init(self);
@@ -232,7 +243,7 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
             last->roll_rad = (nmpc_real_t)0;
             last->pitch_rad = (nmpc_real_t)0;
         } else {
-            /* New weights do not change the command. */
+            /* New weights do not change the command, nor does a heading. */
         }
     } else {
         /* nmpc_init(NULL) does nothing. */
