@@ -51,7 +51,7 @@ SEEN = {
         "\N{EN DASH}",
     ),
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
-    "verify": ("incomplete: 1 of 2 checks passed", "cppcheck is missing", "update_period_s"),
+    "verify": ("1 of 2 checks passed, 1 incomplete", "cppcheck is missing", "update_period_s"),
     "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --repeat", ">1.5<", "0.750"),
     "identify": (
         "roll good: gain 0.83",

@@ -211,7 +211,7 @@ def test_a_stopped_campaign_resumes_to_the_same_bytes(
     killed = code == -signal.SIGKILL
     before = [] if killed else (tmp_path / "flights.csv").read_text().splitlines()
     assert len(before) == (0 if killed else 1 + 3)
-    assert "ratio of pd to the other" in run(*map(str, arguments))[0]
+    assert "improvement on pd: " in run(*map(str, arguments))[0]
     assert contents(tmp_path) == contents(whole)
     assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
 
