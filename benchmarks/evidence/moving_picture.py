@@ -152,7 +152,7 @@ def _draw_scene(axes: Any, laps: Mapping[str, tuple[Points, Points, Points]], no
     trail = round(_TRAIL_S / _period_s(laps))
     for name, (_, drone, _) in laps.items():
         colour = FLOWN[name][1]
-        path = _seen(np.concatenate([drone, drone[: now + 1]])[len(drone) + now - trail :][: trail + 1])
+        path = _seen(drone[np.arange(now - trail, now + 1)])  # before the lap that of its end
         axes.plot(*path.T, color=colour)
         axes.plot(*path[-1], color=colour, marker="o", markersize=1.5 * DOT)
     axes.plot(*_seen(target[now : now + 1]).T, color=QUIET, marker="x", markersize=1.5 * DOT)

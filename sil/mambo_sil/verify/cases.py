@@ -236,15 +236,18 @@ def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
 
 def _headings(settings: Settings) -> Iterator[Tape]:
     """Turn to the ends of the range and beside them, with every most change around 0 and that of the turn."""
-    good = (YAW_LIMIT_RAD, YAW_LIMIT_RAD, 0.5)
-    for index in range(3):
-        low, high = ((-YAW_LIMIT_RAD, YAW_LIMIT_RAD), (0.0, 0.25))[index == 2]
-        for sign in (1.0, -1.0):
-            rows = np.tile(np.array(good) * [sign, sign, 1.0], (2, 1))
-            for value in _around(settings, "yaw", low, high):
-                rows[1, index] = value
-                rows[1, 1] = value if index < 2 else sign * (YAW_LIMIT_RAD - 0.25)
-                yield calls(settings, ApiFunction.SLEW_HEADING, rows)
+    ends, changes = (
+        _around(settings, "yaw", -YAW_LIMIT_RAD, YAW_LIMIT_RAD),
+        _around(settings, "yaw", 0.0, 0.25),
+    )
+    for last in (YAW_LIMIT_RAD, -YAW_LIMIT_RAD):
+        near = math.copysign(YAW_LIMIT_RAD - 0.25, last)
+        rows = [
+            *((end, end, 0.5) for end in ends),
+            *((last, end, 0.5) for end in ends),
+            *((last, near, change) for change in changes),
+        ]
+        yield calls(settings, ApiFunction.SLEW_HEADING, np.array(rows))
 
 
 def _convergence(settings: Settings) -> list[Tape]:

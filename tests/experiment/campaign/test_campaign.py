@@ -1,11 +1,10 @@
-"""Draws, campaign.toml and statistics of campaigns, without flying."""
+"""Draws and campaign.toml of campaigns, without flying."""
 
 import math
 import re
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
-from statistics import NormalDist, median
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -14,16 +13,8 @@ from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, Unreadabl
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.experiment.campaign import campaign_file
-from mambo_sil.experiment.campaign.campaign_flights import INDICES
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
-from mambo_sil.experiment.campaign.statistics import (
-    improvement,
-    improvements,
-    proportion,
-    quantiles,
-    worst_flights,
-)
 
 ROOT = Path(__file__).parents[3]
 WIDE = Domain(-1e3, 1e3)
@@ -337,107 +328,6 @@ def test_a_missing_campaign_is_named(tmp_path: Path) -> None:
     """A campaign.toml that does not exist raises `UnreadableFileError`."""
     with pytest.raises(UnreadableFileError, match="no such file"):
         campaign_file.read(tmp_path / "absent.toml")
-
-
-def table(**columns: list[float]) -> dict[str, np.ndarray]:
-    """Return a table of controllers a and b with the given columns; by default nothing crashes."""
-    n = len(next(iter(columns.values())))
-    healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
-    return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
-
-
-def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
-    """For 0 of 10 the upper limit solves (1 - p)^10 = 2.5 %; the interval for 10 of 10 mirrors it."""
-    none, every = proportion(0, 10), proportion(10, 10)
-    limit = 1.0 - 0.025 ** (1 / 10)
-    assert [none.low, none.high] == pytest.approx([0.0, limit])
-    assert [every.low, every.high] == pytest.approx([1.0 - limit, 1.0])
-    assert proportion(3, 12).share == 0.25
-
-
-@pytest.mark.parametrize(("count", "flights"), [(1, 2), (3, 12), (40, 41), (7, 500)])
-def test_the_limits_of_a_proportion_leave_two_and_a_half_percent_on_each_side(
-    count: int, flights: int
-) -> None:
-    """With the lower limit as probability, `count` or more have that chance; with the upper one, no more."""
-
-    def chance(counts: range, share: float) -> float:
-        return sum(math.comb(flights, k) * share**k * (1.0 - share) ** (flights - k) for k in counts)
-
-    found = proportion(count, flights)
-    assert chance(range(count, flights + 1), found.low) == pytest.approx(0.025, rel=1e-9)
-    assert chance(range(count + 1), found.high) == pytest.approx(0.025, rel=1e-9)
-
-
-def test_quantiles_are_values_of_the_sample() -> None:
-    """Quantiles are not interpolated, so an infinite value affects only quantiles that select it."""
-    values = np.array([4.0, math.inf, 1.0, 3.0, 2.0])
-    found = quantiles(values)
-    assert (found["0"], found["0.25"], found["0.5"], found["0.75"]) == (1.0, 2.0, 3.0, 4.0)
-    assert (found["0.95"], found["1"]) == (math.inf, math.inf)
-
-
-def test_improvement_is_the_median_of_the_ratios() -> None:
-    """Median and share of better flights are those of the ratios flight by flight."""
-    found = improvement(
-        table(a_iae_m_s=[2.0, 9.0, 4.0, 1.0, 8.0], b_iae_m_s=[1.0, 3.0, 1.0, 2.0, 8.0]), "a", "b", "iae_m_s"
-    )
-    assert found is not None
-    assert found.median == 2.0  # of 2, 3, 4, 0.5, 1
-    assert (found.better.count, found.better.flights) == (3, 5)
-    assert 0.5 <= found.low <= 2.0 <= found.high <= 4.0
-
-
-def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
-    """For lognormal ratios the interval contains exp(mu) and has about the asymptotic width."""
-    ratios = np.exp(np.random.default_rng(1).normal(math.log(3.0), 0.5, 1000))
-    found = improvement(table(a_iae_m_s=ratios.tolist(), b_iae_m_s=[1.0] * 1000), "a", "b", "iae_m_s")
-    assert found is not None
-    assert found.low < 3.0 < found.high
-    width = 2.0 * 1.96 * 3.0 * 0.5 * math.sqrt(math.pi / 2.0 / 1000)
-    assert found.high - found.low == pytest.approx(width, rel=0.25)
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
-def test_the_interval_of_the_median_is_that_of_all_resamples(n: int) -> None:
-    """Its ends are quantiles of the medians of all n^n resamples, each equally probable."""
-    ratios = [float(2**k) for k in range(n)]
-    medians = sorted(median(resample) for resample in product(ratios, repeat=n))
-    found = improvement(table(a_iae_m_s=ratios, b_iae_m_s=[1.0] * n), "a", "b", "iae_m_s")
-    assert found is not None
-    ends = [medians[math.ceil(tail * len(medians)) - 1] for tail in (0.025, 0.975)]
-    assert [found.low, found.high] == ends
-
-
-def test_a_crash_is_infinitely_bad() -> None:
-    """A controller that crashes is worse in that flight; flights in which both crash are left out."""
-    columns = table(
-        a_iae_m_s=[1.0, 1.0, 1.0, 1.0],
-        b_iae_m_s=[0.5, 0.5, 0.5, 0.5],
-        a_crashed=[0.0, 1.0, 0.0, 1.0],
-        b_crashed=[0.0, 0.0, 1.0, 1.0],
-    )
-    found = improvement(columns, "a", "b", "iae_m_s")
-    assert found is not None
-    assert found.flights == 3
-    assert found.median == 2.0  # of 2, infinite, 0
-    assert found.better.count == 2
-    hopeless = table(a_iae_m_s=[1.0], b_iae_m_s=[1.0], a_crashed=[1.0], b_crashed=[1.0])
-    assert improvement(hopeless, "a", "b", "iae_m_s") is None
-
-
-def test_the_worst_flights_are_crashes_then_the_largest_iae() -> None:
-    """At most five flights are returned; a lost flight, whose IAE is NaN, is among the crashes."""
-    columns = table(a_iae_m_s=[1.0, 7.0, math.nan, 3.0, 2.0, 9.0], a_crashed=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
-    assert worst_flights(columns, "a") == [2, 3, 5, 1, 4]
-
-
-def test_statistics_are_reproducible() -> None:
-    """The same table gives the same statistics, bootstrap intervals included."""
-    rng = np.random.default_rng(2)
-    columns = {f"{name}_{index}": rng.uniform(1.0, 2.0, 20) for name in "ab" for index in INDICES}
-    columns |= {f"{name}_{key}": np.zeros(20) for name in "ab" for key in ("crashed", "refused_updates")}
-    assert improvements(columns, "ab", sensed=False) == improvements(columns, "ab", sensed=False)
 
 
 def test_every_parameter_is_documented() -> None:
