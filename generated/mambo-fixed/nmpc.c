@@ -340,7 +340,7 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     const nmpc_sum_t fine_rad = (angle_rad * ((nmpc_sum_t)1 << (40 - NMPC_YAW_BITS)))
                                 - (count * NMPC_QUARTER_TURN_RAD);
     const nmpc_real_t rest = (nmpc_real_t)NMPC_ROUNDED(fine_rad, 40 - NMPC_SINE_BITS);
-    const unsigned int quadrant = (unsigned int)count;
+    const unsigned int quadrant = (unsigned int)count & 3U;
     const nmpc_real_t one = (nmpc_real_t)1 << NMPC_SINE_BITS;
     const nmpc_real_t square = sine_product(rest, rest);
     nmpc_real_t sine_rest = sine_terms[NMPC_SINE_TERMS - 1];
@@ -1364,6 +1364,7 @@ static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     self->command_rad[1] = pitch_rad;
     self->tilt_rad[0] = (nmpc_real_t)0;
     self->tilt_rad[1] = (nmpc_real_t)0;
+    self->limited = 0U;
     self->missed = NMPC_AT_REST;
     attitude_reset(&self->attitude, roll_rad, pitch_rad);
     observer_clear(&self->observer);
@@ -1393,7 +1394,6 @@ static void limits_init(nmpc_t *self)
     };
 
     self->bounds = bounds;
-    self->limited = 0U;
 }
 
 nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)

@@ -273,7 +273,8 @@ void nmpc_default_limits(nmpc_limits_t *limits);
 nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits);
 
 /* Which limits changed what the last step that computed a command aimed at, or cut its command off: NMPC_LIMIT_SPEED,
- * NMPC_LIMIT_BRAKING, NMPC_LIMIT_FENCE and NMPC_LIMIT_TILT, added; 0 for none. `self` must not be null. */
+ * NMPC_LIMIT_BRAKING, NMPC_LIMIT_FENCE and NMPC_LIMIT_TILT, added; 0 for none, and after nmpc_reset().
+ * `self` must not be null. */
 unsigned int nmpc_limits_active(const nmpc_t *self);
 
 /* Return the next set-point of a yaw loop on the shortest way from `previous_rad` to `wanted_rad`, at most

@@ -1139,6 +1139,7 @@ static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     self->command_rad[1] = pitch_rad;
     self->tilt_rad[0] = (nmpc_real_t)0;
     self->tilt_rad[1] = (nmpc_real_t)0;
+    self->limited = 0U;
     self->missed = NMPC_AT_REST;
     attitude_reset(&self->attitude, roll_rad, pitch_rad);
     observer_clear(&self->observer);
@@ -1168,7 +1169,6 @@ static void limits_init(nmpc_t *self)
     };
 
     self->bounds = bounds;
-    self->limited = 0U;
 }
 
 nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)

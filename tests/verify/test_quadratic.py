@@ -201,6 +201,9 @@ def test_the_cases_have_limits_of_every_kind() -> None:
     [
         pytest.param("float32", dialects.check, "clang", "clang", id="float32-warnings"),
         pytest.param("float32", bits.check, "clang", "clang", id="float32-bits"),
+        pytest.param(
+            "fixed", sanitizers.check, "clang", "clang", id="fixed-sanitizers", marks=pytest.mark.long
+        ),
         *(
             pytest.param("float64", check, tool, tool, id=f"float64-{name}", marks=pytest.mark.long)
             for name, check, tool in (

@@ -261,12 +261,13 @@ class OneNormController:
 
     def _held(self, command: Real) -> OneNormMemory:
         """Return the memory of controllers that hold commands (n, 2) and have forgotten the target."""
-        n = len(command)
+        n, limits = len(command), self.memory.limits
         return replace(
             self.memory,
             command_rad=command,
             plan_rad=np.broadcast_to(command[:, None], self.memory.plan_rad.shape),
             target=unknown_motion(command),
+            limits=replace(limits, active=np.zeros_like(limits.active)),
             missed=np.zeros(n, np.int64),
             sent_rad=command,
             has_tilt=np.zeros(n, np.bool_),
@@ -279,11 +280,7 @@ class OneNormController:
         bad = status == Status.BAD_STATE
         missed = np.where(bad, np.minimum(memory.missed + 1, self._outage_steps), memory.missed)
         memory = replace(memory, missed=missed)
-        level = replace(
-            self._held(np.zeros_like(memory.sent_rad)),
-            limits=replace(memory.limits, active=np.zeros_like(memory.limits.active)),
-            missed=missed,
-        )
+        level = replace(self._held(np.zeros_like(memory.sent_rad)), missed=missed)
         return choose(bad & (missed == self._outage_steps), level, memory)
 
     def _track(self, target: Real) -> TargetMotion:

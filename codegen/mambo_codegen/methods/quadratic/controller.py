@@ -235,7 +235,7 @@ class QuadraticController:
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self._model.steady(command_rad, self._weight(height)),
             target=unknown_motion(zeros),
-            limits=limits,
+            limits=replace(limits, active=np.zeros_like(limits.active)),
             tilt_rad=zeros,
             command_rad=command_rad,
             missed=np.full(n, self._at_rest),
