@@ -2,6 +2,7 @@
 # make check      style, types, and the tests that need no compiler: what to run while editing
 # make test       set up everything, check style and types, run the tests; with CI=true also the long ones
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
+# make thorough   the same with every case of the tests of which CI runs a sample
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
 # make docs       build the manual; its first page is build/docs/index.html
@@ -31,7 +32,7 @@ TOOL_COMMANDS = gcc g++ clang make cmake nm \
     frama-c cppcheck wasm-ld chromium
 
 ifeq ($(CI),true)
-MARKED = -m "long or not long"
+MARKED = -m "not thorough"
 endif
 
 # Tests that need no compiler and take seconds. They run with a PATH on which there is none.
@@ -39,7 +40,7 @@ CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/r
     $(filter-out %/test_generations.py %/test_quadratic_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/drone/plant tests/drone/sensors
 
-.PHONY: fly check test tools generated docs evidence bench bench-peers clean
+.PHONY: fly check test thorough tools generated docs evidence bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -53,6 +54,10 @@ check: $(SETUP_TEST)
 test: tools $(SETUP_TEST)
 	$(STYLE_AND_TYPES)
 	$(BIN)/python -m pytest -n auto --dist worksteal $(MARKED)
+
+# All cases of the tests that CI samples too.
+thorough: MARKED = -m "thorough or not thorough"
+thorough: test
 
 # As root on a system with apt, install all packages if a command is missing; elsewhere name them.
 tools:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections import Counter
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from hypothesis import HealthCheck, settings
 
 from mambo_codegen.errors import BuildError
 from tests.support.tools import require
+
+GOLDEN_SECTION = 0.6180339887498949
 
 # Arrays of tests are small: threads of NumPy's linear algebra take processor time from the other workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -26,14 +29,21 @@ settings.load_profile("house")
 
 @pytest.hookimpl(tryfirst=True)  # before the marks select
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark as long all cases but the first of a test that says `first_is_quick`."""
-    known = set[str]()
+    """Mark the cases of a test that says `first_is_quick` or `sampled`; the first case is always run.
+
+    The sample takes every n-th case at golden sections, so that no column of a table of cases is left out.
+    """
+    earlier = Counter[str]()
     for item in items:
-        if item.get_closest_marker("first_is_quick"):
-            function = item.nodeid.partition("[")[0]
-            if function in known:
-                item.add_marker("long")
-            known.add(function)
+        function = item.nodeid.partition("[")[0]
+        index = earlier[function]
+        earlier[function] += 1
+        if index > 0 and item.get_closest_marker("first_is_quick"):
+            item.add_marker("long")
+        sampled = item.get_closest_marker("sampled")
+        if sampled and index * GOLDEN_SECTION % 1 >= 1 / sampled.args[0]:
+            item.add_marker("long")
+            item.add_marker("thorough")
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,6 +20,7 @@ def make(**options: Any) -> Any:
     return importlib.import_module("gymnasium").make(NAME, **options)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("action", ["target", "attitude"])
 def test_the_checker_of_gymnasium_finds_nothing(action: str) -> None:
     """No error, and no warning: the tests turn warnings into errors."""
@@ -27,6 +28,7 @@ def test_the_checker_of_gymnasium_finds_nothing(action: str) -> None:
     importlib.import_module("gymnasium.utils.env_checker").check_env(environment.unwrapped)
 
 
+@pytest.mark.long
 def test_a_policy_that_aims_at_the_curve_follows_it() -> None:
     """The C flies to the targets within the limits that info tells; the seed draws the start."""
     environment = make(tilt_rad=0.3, speed_m_s=2.0)
@@ -44,6 +46,7 @@ def test_a_policy_that_aims_at_the_curve_follows_it() -> None:
     assert info["status"] == 0
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("vehicle", ["crazyflie", "crazyflie-l250"])
 def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
     """By the thrust of the C, of a drone without [height] by an altitude loop, as where the policy tilts."""
@@ -70,6 +73,7 @@ def test_a_thrust_that_the_mixer_caps_is_told() -> None:
     assert np.isnan(drone.tell_thrust())
 
 
+@pytest.mark.long
 def test_a_crash_ends_the_episode() -> None:
     """Of a policy that tilts the drone until it is far away, or lower than the ground."""
     environment = make(action="attitude", tilt_rad=1.1)

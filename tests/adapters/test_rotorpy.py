@@ -25,6 +25,7 @@ MADE = pytest.mark.parametrize(
 START_M = np.array([0.0, 0.0, 1.0])
 
 
+@pytest.mark.first_is_quick
 @MADE
 def test_a_drone_of_rotorpy_goes_where_it_shall(made: Callable[[], Controller]) -> None:
     """A step of 0.4 m forward and 0.2 m to the left and up, in RotorPy's own closed loop."""
@@ -59,6 +60,7 @@ def test_each_flight_starts_afresh(made: Callable[[], Controller]) -> None:
     assert (adapter.update(0.0, state, flat)["cmd_q"] == first["cmd_q"]).all()
 
 
+@pytest.mark.long
 def test_wrong_arguments_are_refused() -> None:
     """By name."""
     with pytest.raises(ArgumentError, match="controller: was made for 2 drones; RotorPy simulates one"):

@@ -26,6 +26,7 @@ KF: Final = 3.16e-10
 LEVEL: Final = np.array([0.0, 0.0, 0.0, 1.0])
 
 
+@pytest.mark.long
 def test_adapters_import_no_simulator() -> None:
     """But that for Gymnasium, whose class of environments is one of its own."""
     script = (
@@ -158,6 +159,7 @@ def test_a_base_control_gets_thrust_and_attitude() -> None:
     np.testing.assert_array_equal(after, angles)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_pybullet")
 def test_a_base_control_refuses_what_does_not_fit() -> None:
     """Another control period, and several drones."""

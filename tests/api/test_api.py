@@ -46,6 +46,7 @@ AXES: dict[FrameName, NDArray[np.float64]] = {
 """North, east and down of the world's axes in each frame."""
 
 
+@pytest.mark.long
 def test_the_examples_of_the_document_run() -> None:
     """One after another, as a reader types them; their assertions hold."""
     blocks = [block.partition("```")[0] for block in DOCUMENT.read_text("utf-8").split("```python\n")[1:]]

@@ -50,6 +50,7 @@ def stock(height: AltitudeName, n: int = 1) -> Controller:
     return Controller.from_preset("crazyflie", n, vehicle="crazyflie", height=height)
 
 
+@pytest.mark.long
 def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     """By name or as a file."""
     assert Controller.from_vehicle("crazyflie").settings == DERIVED
@@ -62,6 +63,7 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     assert Controller.from_vehicle(str(file)).settings == derived
 
 
+@pytest.mark.long
 def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     """From a vehicle, a preset and a file alike."""
     document: dict[str, Any] = presets.load("crazyflie").model_dump()
@@ -91,6 +93,7 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("options", "message"),
     [

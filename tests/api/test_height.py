@@ -18,6 +18,7 @@ REST = np.zeros((2, 3))
 STATE, GOAL = DroneState([0, 0, -1], [0, 0, 0], [0, 0, 0]), TargetState([0, 0, -1], [0, 0, 0])
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("acceleration", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleration: str) -> None:
@@ -44,6 +45,7 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleratio
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
 
 
+@pytest.mark.long
 def test_a_reset_hovers_unless_a_thrust_is_told() -> None:
     """The first command after it is that of a new controller."""
     ours, new = Controller.from_vehicle("crazyflie"), Controller.from_vehicle("crazyflie")
@@ -64,6 +66,7 @@ def thrust_of(pilot: Controller, target: TargetState, state: DroneState | None =
     return float(thrust)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -82,6 +85,7 @@ def test_wrong_arguments_are_refused(call: Any, message: str) -> None:
         call(Controller.from_vehicle("crazyflie"))
 
 
+@pytest.mark.long
 def test_what_needs_a_height_says_so() -> None:
     """And a given acceleration has three components."""
     level = Controller.from_preset("crazyflie")

@@ -155,6 +155,7 @@ def test_a_command_that_refuses_is_an_error() -> None:
         run("python -c 'raise SystemExit(2)'")
 
 
+@pytest.mark.long
 def test_an_unknown_item_is_refused() -> None:
     """With the names of those that there are."""
     command = [sys.executable, "-m", "benchmarks.evidence", "table3"]

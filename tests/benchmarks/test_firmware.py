@@ -66,6 +66,7 @@ def test_a_folder_without_firmware_is_refused(tmp_path: Path) -> None:
         build(tmp_path, SETTINGS)
 
 
+@pytest.mark.long
 def test_the_command_asks_for_a_clone() -> None:
     """By the option and the variable."""
     environment = {name: value for name, value in os.environ.items() if name != VARIABLE}

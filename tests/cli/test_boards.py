@@ -24,6 +24,7 @@ def _crazyflie() -> None:
         require(compiler.candidates[0], compiler.packages[0])
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_crazyflie")
 def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) -> None:
     """PNG, SVG, HTML and the summary, which stdout repeats; a hostile name is text on the page."""
@@ -61,6 +62,7 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
         assert word in page
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_crazyflie")
 def test_over_budget_is_exit_1_with_names_and_excess(tmp_path: Path) -> None:
     """A board of one's own with little flash: the table says OVER, a line below by how much and where."""
@@ -96,6 +98,7 @@ def test_missing_compilers_are_named() -> None:
         assert boards.load(name).compiler.packages[0] in talk
 
 
+@pytest.mark.long
 def test_what_has_a_compiler_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others are named on stderr; the table and the exit code are about what was measured."""
     require("avr-gcc", "gcc-avr")
@@ -120,6 +123,7 @@ def test_flying_on_a_board_is_the_flight_of_this_machine(tmp_path: Path) -> None
     assert (tmp_path / "plain" / "trace.csv").read_bytes() == (tmp_path / "flight" / "trace.csv").read_bytes()
 
 
+@pytest.mark.long
 def test_flying_on_the_mega_is_the_flight_of_this_machine(tmp_path: Path) -> None:
     """Eight bits with a floating-point library of their own, in a process of its own."""
     board_builder("mega")

@@ -24,6 +24,7 @@ pitch = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
 """
 
 
+@pytest.mark.long
 def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
@@ -53,6 +54,7 @@ def test_a_log_gives_settings_with_two_commands() -> None:
     assert errors["controller.toml"] < 0.6 * min(errors["mambo"], errors["crazyflie"])
 
 
+@pytest.mark.long
 def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
     """At the worst ends of the intervals a loop stands too little, and the widest interval is in the way."""
     Path("mine.toml").write_text(DRONE, "utf-8")
@@ -66,6 +68,7 @@ def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
     assert "the main cause is the interval of attitude.roll.dead_time_s +- 0.08: " in said
 
 
+@pytest.mark.long
 def test_it_warns_of_slow_motors() -> None:
     """A Mambo with motors of 0.12 s is unstable through its sensors, and they are named."""
     text = run("vehicles", "mambo")[0]
@@ -85,6 +88,7 @@ def test_tune_starts_from_it() -> None:
     assert tuning.base == load("controller.toml")
 
 
+@pytest.mark.long
 def test_to_stdout_it_prints_the_file_alone() -> None:
     """Which is that of -o."""
     text, said = run("design", "generic", "-o", "-")

@@ -207,6 +207,7 @@ def test_a_repeated_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
         assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
 
 
+@pytest.mark.long
 def test_the_pd_with_feed_forward_flies_closer_than_the_stock_pd(tmp_path: Path) -> None:
     """The page names which of them flew."""
     iae_m_s = []
@@ -248,6 +249,7 @@ def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
     assert [summary[key] for key in ("push_m_s2", "motor_lag_s", "start")] == [[90, 0], 0, "hover"]
 
 
+@pytest.mark.long
 def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither a backend that does not exist nor LaTeX, nor a name that reads like a formula."""
     monkeypatch.setenv("MPLBACKEND", "no-such-backend")

@@ -31,6 +31,7 @@ def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     assert not {*HEAVY, SETTINGS} & set(done.stderr.split())
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("arguments", "unwanted"),
     [

@@ -29,6 +29,7 @@ def names(folder: str) -> set[str]:
     return {path.name for path in Path(folder).iterdir()}
 
 
+@pytest.mark.long
 def test_a_log_becomes_a_model() -> None:
     """Text, files, settings that are valid, and a vehicle with what was found."""
     said, talk = run("identify", made("a.csv", Flown()), "-o", "out")
@@ -103,6 +104,7 @@ def test_a_bad_log_of_several_is_left_out() -> None:
     assert "a.csv: 16.0 s used" in said
 
 
+@pytest.mark.long
 def test_json_is_the_summary() -> None:
     """And the same logs give the same files."""
     log = made("a.csv", Flown(duration_s=20.0))
@@ -123,6 +125,7 @@ def test_two_logs_of_a_crazyflie_are_pooled() -> None:
     assert "b.csv: units, signs and axes agree with the motion" in said
 
 
+@pytest.mark.long
 def test_a_log_without_excitation_is_refused_with_advice() -> None:
     """Exit 1, no model; the picture is there, and what an earlier run left is not."""
     run("identify", made("good.csv", Flown(duration_s=16.0)), "-o", "out")
@@ -134,6 +137,7 @@ def test_a_log_without_excitation_is_refused_with_advice() -> None:
     assert "model.toml" not in talk
 
 
+@pytest.mark.long
 def test_a_contradiction_is_mended_as_the_message_says() -> None:
     """The option that it names makes the same model as a sound log."""
     log = fly(TRUTH, Flown(duration_s=16.0), 1)[0]

@@ -122,6 +122,7 @@ def test_a_refused_command_leaves_nothing(line: str, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_tune_without_optuna_names_what_to_install(tmp_path: Path) -> None:
     """Before a folder is made; the extra of this package, not a name of a package index."""
     script = "import sys; sys.modules['optuna'] = None; from mambo_sil.cli.app import main; main()"

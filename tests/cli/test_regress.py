@@ -50,6 +50,7 @@ def break_suite() -> None:
     Path("mine.toml").write_text(SUITE.replace("iae_m_s = 0.5", "iae_m_s = 1e-6"), "utf-8")
 
 
+@pytest.mark.long
 def test_a_suite_passes_and_leaves_its_results(passed: Path) -> None:
     """Summary, which --json prints, JUnit XML and pictures; no record, because no flight failed."""
     out, said = passed / "out", (passed / "stdout.json").read_text("utf-8")

@@ -106,6 +106,7 @@ def test_sensors_of_another_drone_are_refused() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     """With its own sensors, and draws around its own mass; the records do not need its file."""
     Path("campaign.toml").write_text('controllers = ["pd"]\n[flight]\nduration_s = 1.0\n', "utf-8")

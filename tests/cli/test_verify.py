@@ -55,6 +55,7 @@ def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
         assert word in page
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_no_tool")
 def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
     """Exit 1, never "passed", and every package that is missing is named; the C is kept all the same."""

@@ -73,6 +73,7 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
     return list(np.stack(columns, axis=1))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "name",
@@ -146,6 +147,7 @@ def test_the_value_that_a_refusal_names_is_taken() -> None:
         parse(text.format(0.9 * fits), "x.toml")
 
 
+@pytest.mark.long
 @given(valid_values())
 def test_any_refusal_has_a_way_out(values: Values) -> None:
     """Whatever floating point takes: with what refusals name in its place, fixed point takes it as well."""
@@ -186,6 +188,7 @@ def test_numbers_mean_what_was_given() -> None:
         assert np.array_equal(numbers.quantize(numbers.to_si(given, *quantities), quantities), given)
 
 
+@pytest.mark.long
 def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) -> None:
     """Interface with floats, macros of nmpc.h: statuses, commands and costs of the nearest numbers."""
     gcc = require("gcc", "gcc")

@@ -124,6 +124,7 @@ def test_the_source_digest_covers_all_that_a_digest_imports() -> None:
             assert covered or module in {"mambo_codegen.user_cache", "mambo_codegen.plain_file"}, module
 
 
+@pytest.mark.long
 def test_a_bundle_is_the_same_with_and_without_a_cache(forgetful: Path) -> None:
     """Computed, remembered, from the cache, from a damaged cache, and without one."""
     settings = with_option(presets.preset("mambo-1norm"), "cost.tracking_weight", 1.25)

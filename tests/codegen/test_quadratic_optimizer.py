@@ -96,6 +96,7 @@ def test_the_minimum_is_that_of_every_active_set(index: int) -> None:
     compare_with_a_simulated_program(drawn(index), 10_000, index)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.long
 @pytest.mark.parametrize("index", MANY)
 def test_a_hundred_thousand_minima_are_those_of_every_active_set(index: int) -> None:

@@ -63,6 +63,7 @@ def test_empty_file_is_table_1() -> None:
     assert settings.horizon.update_period_s == 0.01
 
 
+@pytest.mark.long
 @given(any_settings())
 def test_written_settings_read_back_equal_and_fit_their_schema(settings: Settings) -> None:
     """A controller.toml holds every bit of its settings, whatever they are, and the JSON schema admits it."""
@@ -305,6 +306,7 @@ def test_byte_order_mark_is_read_over(tmp_path: Path) -> None:
     assert controller_toml.read(path).horizon.control == 3
 
 
+@pytest.mark.long
 @given(st.text())
 def test_any_text_is_settings_or_our_error(text: str) -> None:
     """No text whatever ends in an exception that is not ours."""

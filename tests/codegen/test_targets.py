@@ -15,6 +15,7 @@ LONGEST_PAGE = 100
 """Lines of a README that is one page."""
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", TARGETS)
 def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_path: Path) -> None:
     """Without a source it has the target's preset; its own controller.toml makes it again; --check agrees."""

@@ -89,6 +89,7 @@ def test_walls_of_the_settings_are_a_fence_too() -> None:
     assert measure_limits(beside, walled, [Scenario()]).past_wall_m == [2.5]
 
 
+@pytest.mark.long
 def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
     """One line for each wall, and none without a fence."""
     trace = trace_of([0.0, 1.0], [0.0, 0.0], [0.0, 1.0])
@@ -100,6 +101,7 @@ def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
     assert dashes == [0, 2, 4]
 
 
+@pytest.mark.long
 def test_the_picture_of_a_fast_flight_has_its_speed_limit(tmp_path: Path) -> None:
     """With the speed over time; a flight slower than half of the limit, or without one, has neither."""
     fast = trace_of([0.0, 4.0], [0.0, 4.0], [0.0, 8.0])

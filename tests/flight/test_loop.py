@@ -125,6 +125,7 @@ def test_controller_receives_the_recorded_state_and_target() -> None:
         np.testing.assert_array_equal(np.stack(values), recorded)
 
 
+@pytest.mark.long
 def test_recorded_velocity_is_the_rate_of_the_position() -> None:
     """Velocities are in the world frame for any heading and tilt."""
     trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=10.0, yaw_rad=0.8), PdController())

@@ -56,6 +56,7 @@ def test_a_command_of_other_bits_is_found() -> None:
         demand_reference(flight, trace, method_of(settings).reference_controller())
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("preset", ["mambo", pytest.param("table1", marks=pytest.mark.long)])
@@ -69,6 +70,7 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     demand_reference(flight, flown, method_of(settings).reference_controller())
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_flight_in_numpy_with_the_reference_is_the_flight_with_the_c(condition: str) -> None:
     """Nothing of C in one of them: all arrays of both traces are equal bit for bit."""

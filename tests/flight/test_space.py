@@ -123,6 +123,7 @@ def test_targets_have_the_columns_of_their_courses() -> None:
     np.testing.assert_array_equal(both.given_targets[:, 1, 6:], vertical_of(space, both.times_s()))
 
 
+@pytest.mark.long
 def test_pictures_of_a_course_with_a_height_show_it(tmp_path: Path) -> None:
     """Two panels more than on a level course: from the side, and over time."""
     trace = flown("helix", 0.5, 1.0)

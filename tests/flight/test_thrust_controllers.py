@@ -41,6 +41,8 @@ def assert_same(ours: Trace, theirs: Trace) -> None:
         assert getattr(ours, column.name).tobytes() == getattr(theirs, column.name).tobytes(), column.name
 
 
+@pytest.mark.first_is_quick
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("acceleration", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", ["float32", *SLOW])
 @pytest.mark.parametrize("batch", FLOWN)
@@ -93,6 +95,7 @@ class Recorder:
         return self.controller.step(state, target, thrust)
 
 
+@pytest.mark.long
 def test_the_thrust_of_the_trace_is_the_commanded_one_and_reaches_the_rotors() -> None:
     """A level course is one at the hover height; at rest the thrust is g, with a fifth more mass 1.2 g."""
     vehicle = Vehicle.of(CRAZYFLIE)
@@ -109,6 +112,7 @@ def test_the_thrust_of_the_trace_is_the_commanded_one_and_reaches_the_rotors() -
         assert np.isnan(recorder.told).all()
 
 
+@pytest.mark.long
 def test_the_floor_is_reported_while_it_carries_the_drone() -> None:
     """Before take-off and after landing; in between not."""
     scenario = Scenario(

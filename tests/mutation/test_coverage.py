@@ -65,6 +65,7 @@ def gaps(its: Subject) -> Iterator[Key]:
             )
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_line_runs_and_every_branch_is_taken(name: str, tmp_path: Path) -> None:

@@ -144,6 +144,7 @@ def test_the_generated_code_passes(method: str, benches: dict[str, Bench]) -> No
     assert benches[method].differences({}) == {}
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("method", "fault"),
     [

@@ -201,6 +201,7 @@ def test_data_of_a_flight_cannot_end_its_script() -> None:
     assert json.loads(data)["drones"][0]["name"] == f"NMPC, {HOSTILE}"
 
 
+@pytest.mark.long
 def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     """Partial results: Table II keeps its rows when the traces are gone."""
     made("table2")

@@ -53,6 +53,7 @@ def test_distances_are_in_cm_up_to_a_metre(value_m: float, text: str) -> None:
     assert distance(value_m) == text
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.usefixtures("in_an_empty_folder")
 @pytest.mark.parametrize(
     ("arguments", "answer"),

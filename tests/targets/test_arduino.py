@@ -57,6 +57,7 @@ def sketch(folder: Path) -> Path:
     return source
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Path) -> None:
     """The self-test passes, no input is refused, and the drone stands within a centimetre of its target."""

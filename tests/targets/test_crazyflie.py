@@ -103,6 +103,7 @@ def test_every_sign_of_the_frames_counts(built: Built, alone: Trace) -> None:
     assert not {name for name, value in zip(FRAME_MUTANTS, wrong, strict=True) if value < 0.04}
 
 
+@pytest.mark.long
 def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built, alone: Trace) -> None:
     """With 10 set-points a second it flies as by itself; without their age or acceleration it does not."""
     apps = [built.app(), *(built.mutant(name, *mutant) for name, mutant in AGE_MUTANTS.items())]
@@ -120,6 +121,7 @@ def test_a_set_point_that_no_other_follows_does_not_run_away(built: Built) -> No
     assert app.logged("saturated") == 0
 
 
+@pytest.mark.long
 def test_a_given_acceleration_is_that_of_the_set_point(tmp_path: Path) -> None:
     """With target.acceleration = "given" the flight is that of the controller alone; a wrong sign counts."""
     given = build(folder_of(with_option(SETTINGS, "target.acceleration", "given"), tmp_path))
@@ -410,6 +412,7 @@ void nmpc_app_hook(const nmpc_state_t *state, nmpc_target_t *wanted)
 """
 
 
+@pytest.mark.long
 def test_a_file_of_the_user_s_own_stays_and_is_called(tmp_path: Path) -> None:
     """`generate` neither writes nor removes src/user.c; Kbuild lists it, and its hook changes the target."""
     folder = tmp_path / "app"

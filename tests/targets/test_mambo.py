@@ -152,6 +152,7 @@ def distances_m(folders: Sequence[Path]) -> FloatArray:
     return np.asarray(np.abs(trace.position_m - alone.position_m).max(axis=(0, 2)))
 
 
+@pytest.mark.long
 def test_the_library_flies_in_a_flight_process_as_the_controller_alone(tmp_path: Path) -> None:
     """To the rounding of conversions: the stock estimator has floats, and velocities along the heading."""
     (right,) = distances_m([build(presets.preset("mambo"), tmp_path)])

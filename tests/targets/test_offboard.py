@@ -134,6 +134,7 @@ def flown(script: ModuleType, radio: Radio, source: Callable[..., Any] | None = 
     return fly_offboard(script, Controller(SETTINGS), radio, source)
 
 
+@pytest.mark.long
 def test_it_flies_the_circle_through_a_radio_with_losses(script: ModuleType) -> None:
     """A short flight: within 2 cm at a delay of 10 ms each way, every tenth packet lost."""
     vars(script).update({"FLIGHT_S": 3.0, "CLIMB_S": 1.0})
@@ -156,6 +157,7 @@ def test_delays_and_losses_cost_what_the_page_says(row: tuple[str, str], script:
     assert (circle_cm.mean(), circle_cm.max()) == pytest.approx(told_cm, rel=0.06, abs=0.05)
 
 
+@pytest.mark.long
 def test_nothing_is_sent_while_the_state_is_old(script: ModuleType) -> None:
     """From 0.1 s on; the drone levels out meanwhile, and flies on when the state comes back."""
     vars(script).update({"FLIGHT_S": 4.0, "CLIMB_S": 1.0})
@@ -167,6 +169,7 @@ def test_nothing_is_sent_while_the_state_is_old(script: ModuleType) -> None:
     assert found.error_m[found.time_s < 5.0].max() < 0.11
 
 
+@pytest.mark.long
 def test_it_ends_when_the_state_stays_away(script: ModuleType) -> None:
     """After 2 s, when the firmware has stopped the motors."""
     vars(script).update({"FLIGHT_S": 3.0, "CLIMB_S": 1.0})
@@ -175,6 +178,7 @@ def test_it_ends_when_the_state_stays_away(script: ModuleType) -> None:
     assert found.sent[-1][0] == pytest.approx(2.6, abs=0.03)
 
 
+@pytest.mark.long
 def test_the_page_s_motion_capture_flies_as_well(script: ModuleType) -> None:
     """Its function makes velocities of positions."""
     block = re.search(r'```python title="mocap.py"\n(.*?)```', PAGE.read_text("utf-8"), re.DOTALL)

@@ -96,6 +96,7 @@ def dialects_by_turns() -> list[tuple[str, str]]:
     return sorted(pairs, key=lambda pair: pair[0] != "mambo")
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(("name", "dialect"), dialects_by_turns())
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
@@ -120,6 +121,7 @@ def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> Non
     assert not re.findall(r" [bBdDC] \w+", shell("nm", *objects, folder=tmp_path)), "writable static memory"
 
 
+@pytest.mark.long
 def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
     """Two controllers of different settings link into one program, and both pass their self-test."""
     require("gcc", "gcc")
@@ -162,6 +164,7 @@ def test_no_prefix_that_is_admitted_takes_a_name_of_the_system(tmp_path: Path) -
     assert admitted == []
 
 
+@pytest.mark.long
 def test_the_bundle_builds_and_runs_its_example(tmp_path: Path) -> None:
     """`make run`: the self-test passes and the point mass closes in on its target."""
     require("make", "make")
@@ -258,6 +261,7 @@ def test_another_digest_than_the_reference_s_fails_the_example(mambo: Path) -> N
     ]
 
 
+@pytest.mark.long
 def test_a_changed_header_is_built_anew(mambo: Path) -> None:
     """New settings over a built bundle: the objects follow the header, and the self-test passes."""
     require("make", "make")
@@ -275,6 +279,7 @@ def test_the_example_runs_whatever_the_ranges(tmp_path: Path) -> None:
     assert "all steps equal the reference" in shell("make", "-s", "run", folder=tmp_path)
 
 
+@pytest.mark.long
 def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path) -> None:
     """The example passes its self-test; `find_package` brings library and headers, under the prefix."""
     require("cmake", "cmake")

@@ -85,6 +85,7 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
     assert float(np.max(np.abs(cosine - np.cos(exact)))) < SINE_ERRORS[scalar]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None:
@@ -163,6 +164,8 @@ def quantize_acceleration(blocks: SubBlocks, rng: np.random.Generator) -> NDArra
     return blocks.numbers.quantize(drawn, ("acceleration",) * 2)
 
 
+@pytest.mark.first_is_quick
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("kind", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)

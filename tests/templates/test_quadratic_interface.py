@@ -32,6 +32,7 @@ DIALECTS = {
 }
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("dialect", "scalar"),

@@ -163,6 +163,7 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         compare(model.steady(angles))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:

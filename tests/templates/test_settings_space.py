@@ -85,11 +85,13 @@ def test_a_few_settings_go_the_whole_way(scalar: str) -> None:
     over_valid_settings(settings_in(scalar), 2)()
 
 
+@pytest.mark.long
 def test_some_broken_settings_are_refused_in_words(tmp_path: Path) -> None:
     """Any one broken rule: a line that names file, key, value and rule, exit code 2, nothing written."""
     over_broken_settings(40, tmp_path)()
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_sixty_settings_go_the_whole_way(shard: int) -> None:
@@ -97,6 +99,7 @@ def test_sixty_settings_go_the_whole_way(shard: int) -> None:
     seed(shard)(over_valid_settings(any_settings(), VALID_EACH))()
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_three_hundred_broken_settings_are_refused_in_words(tmp_path: Path, shard: int) -> None:

@@ -14,6 +14,7 @@ from tests.support.extension import build_extension
 ODD = (np.nan, np.inf, -np.inf, 0.0, 1024.0, -1024.0, 1025.0, np.pi, -np.pi, 3.5, -3.5)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("name", ["mambo", "table1"])
 def test_slewed_headings_equal_the_reference(name: str, scalar: str) -> None:

@@ -50,6 +50,7 @@ def _compilers() -> None:
     require("clang", "clang")
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("name", presets.names())
 def test_no_call_breaks_a_promise(name: str, tmp_path: Path) -> None:

@@ -74,6 +74,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
     assert len(np.unique(outcomes["thrust_m_s2"])) > 200
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_random_calls_have_the_bits_of_the_reference(scalar: str, tmp_path: Path) -> None:
     """The thrust, all that is stored, and in fixed point the interface in floats."""

@@ -187,6 +187,7 @@ def test_a_fault_of_fixed_point_raises_an_alarm(names: tuple[str, ...], tmp_path
     assert unnoticed(settings, tmp_path, faults, FEW_HEADINGS) == []
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize("index", [0, 1, 2, 3, 5, 6, 9, 14])
 def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
@@ -215,6 +216,7 @@ def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None
     assert unnoticed(of_few_steps(ONE_NORM), tmp_path, {name: FAULTS[name] for name in names}) == []
 
 
+@pytest.mark.long
 def test_an_alarm_fails_the_check_and_is_named_by_file_and_line(tmp_path: Path) -> None:
     """The evidence has the first alarms, the figures all."""
     result = check(subject(of_few_steps(ONE_NORM), tmp_path, UNINITIALISED))

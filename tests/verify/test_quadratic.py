@@ -176,6 +176,7 @@ def without_limits(settings: Settings) -> Settings:
     return with_option(with_option(settings, "limits.speed_m_s", 0.0), "limits.braking_m_s2", 0.0)
 
 
+@pytest.mark.long
 def test_the_cases_have_outcomes_of_every_status() -> None:
     """All statuses but that of weights, a command at its limit, and an outage longer than the estimate."""
     outcomes = np.concatenate(cases(without_limits(quadratic_settings()))[1])
@@ -187,6 +188,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
     assert set(outcomes["missed"]) == set(range(52))
 
 
+@pytest.mark.long
 def test_the_cases_have_limits_of_every_kind() -> None:
     """Limits that are set and refused, each limit acting, and commands after an outage."""
     outcomes = np.concatenate(cases(with_option(quadratic_settings(), "limits.speed_m_s", 2.0))[1])
@@ -225,6 +227,7 @@ def test_a_check_passes(
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("chosen", OTHERS, ids=lambda chosen: " ".join(map(str, chosen)))
 def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:

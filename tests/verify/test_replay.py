@@ -28,6 +28,7 @@ GOOD = np.array([[0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9.81]])
 REFUSED = np.full((1, 12), np.nan)
 
 
+@pytest.mark.long
 def test_the_cases_have_outcomes_of_every_status() -> None:
     """No status of the interface is left untried."""
     limited = with_option(MAMBO, "limits.speed_m_s", 2.0)

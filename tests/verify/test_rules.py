@@ -54,6 +54,7 @@ def assert_each_occurs(its: Subject, result: Result) -> None:
     assert {(rule, file) for rule, files in result.figures["deviations"].items() for file in files} == listed
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> None:

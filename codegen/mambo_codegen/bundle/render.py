@@ -198,7 +198,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "yaw_limit_rad": YAW_LIMIT_RAD,
             "turn_rad": TURN_RAD,
             "turns_per_rad": TURNS_PER_RAD,
-            "vectors": self_test(method),
+            "vectors": self_test(settings),
             "episodes": episode_count(method),
             "ticks": TICKS,
             "held": TICKS_PER_INPUT,

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
-from mambo_codegen.methods import Method
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS
+from mambo_codegen.settings.model import Settings
 
 STEPS: Final = 24
 STEPS_WITH_HEIGHT: Final = 18
@@ -33,7 +35,8 @@ class SelfTestStep:
     others: tuple[float, ...]
 
 
-def self_test(method: Method) -> list[SelfTestStep]:
+@lru_cache(maxsize=64)
+def self_test(settings: Settings) -> tuple[SelfTestStep, ...]:
     """Run the reference controller through the inputs of a typical flight.
 
     The first input has a position error below the smallest normal number, so that a board that flushes such
@@ -42,7 +45,7 @@ def self_test(method: Method) -> list[SelfTestStep]:
     sixth input is out of range, the last of them a height, and the drone touches the floor in every fifth
     step. The values are a Weyl sequence; a library's random numbers may change with its version.
     """
-    settings = method.settings
+    method = method_of(settings)
     controller = method.reference_controller()
 
     def step(state: list[float], target: list[float], thrust: float) -> SelfTestStep:
@@ -98,7 +101,7 @@ def self_test(method: Method) -> list[SelfTestStep]:
                     state[7:8] = [2 * ranges.position_m] * len(state[7:8])
                     thrust = 0.0
         steps.append(step(state, target, thrust))
-    return steps
+    return tuple(steps)
 
 
 def _weyl_sequence() -> Iterator[float]:

@@ -121,6 +121,8 @@ def choose(chosen: Rows, new: Record, old: Record) -> Record:
 
     What one of them does not have, which is None, neither has.
     """
+    if chosen.all():
+        return new
 
     def rows(name: str) -> Any:
         ours, theirs = getattr(new, name), getattr(old, name)

@@ -54,6 +54,7 @@ def gcc_frames(folder: Path) -> dict[str, int]:
     return {place.rpartition(":")[2]: int(size) for place, size, _ in rows}
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "optimisation"),
@@ -83,6 +84,7 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
     assert all(known.get(name, size) == size for name, size in frames.items())
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     ("board", "scalar"),
     [

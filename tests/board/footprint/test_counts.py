@@ -235,6 +235,7 @@ def test_counting_blocks_agrees_with_counting_instructions(name: str, tmp_path: 
         assert step.by_function["nmpc_step"] == by_function["nmpc_step"] > 50
 
 
+@pytest.mark.long
 def test_the_figures_are_those_of_consecutive_ticks(crazyflie: Path) -> None:
     """Of every tick of the flight from its start, as the same C flies it on this machine."""
     trace = fly(Flight(FLIGHT, duration_s=0.29), CompiledController(MAMBO))
@@ -262,6 +263,7 @@ def test_a_tick_can_be_repeated_with_the_plan_that_it_had(crazyflie: Path) -> No
     assert len(controller.steps) == 20
 
 
+@pytest.mark.long
 def test_the_search_never_returns_less_than_the_flight(crazyflie: Path) -> None:
     """A longer search finds at least as much; least and mean are those of the flight alone."""
     found = [counted(MAMBO, crazyflie, 20, steps) for steps in (0, 10, 60)]
@@ -271,6 +273,7 @@ def test_the_search_never_returns_less_than_the_flight(crazyflie: Path) -> None:
     assert counted(MAMBO, crazyflie, 20, 60) == found[2]
 
 
+@pytest.mark.long
 def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
     """They take half as much again as any of the flight, whose target is within the limits."""
     settings = presets.load("mambo")
@@ -279,6 +282,7 @@ def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
     assert searched.most_met > 1.4 * flight.most_met
 
 
+@pytest.mark.long
 def test_refused_ticks_are_not_counted(tmp_path: Path) -> None:
     """They return early and would reduce least and mean; if all are refused, there is no figure."""
     counts = []

@@ -174,6 +174,7 @@ CLASSES: dict[str, Any] = {
 """Mutants of the model of the Cortex-M4: a table and what is left of it."""
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("table", CLASSES)
 def test_a_class_that_is_missing_changes_the_sum(
     table: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -192,6 +193,7 @@ def test_every_model_has_its_core() -> None:
     assert all(model.source for model in MODELS.values())
 
 
+@pytest.mark.long
 def test_the_crazyflie_takes_the_modelled_cycles() -> None:
     """Bounds around the usual ones; an estimate of the user's own replaces the model."""
     board_builder("crazyflie")

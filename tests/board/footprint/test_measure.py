@@ -37,6 +37,7 @@ def measure_once(board: str, preset: str = "mambo", steps: int = 300) -> Footpri
     return measure_footprint(presets.load(preset), boards.load(board), counted_ticks=steps)
 
 
+@pytest.mark.long
 def test_the_crazyflie_keeps_its_promises() -> None:
     """Preset mambo: 5 KiB of flash, 160 B of RAM, 192 B of stack, 660 instructions, 1100 with a limit."""
     footprint = measure_once("crazyflie")
@@ -63,6 +64,7 @@ def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: flo
     assert counts.most_met <= spread * counts.least
 
 
+@pytest.mark.long
 def test_table_1_runs_on_the_mambo_in_75_000_instructions() -> None:
     """Every step of the paper's controller, all floating point of the ARM926 in software."""
     counts = measure_once("mambo", "table1", steps=100).counts
@@ -71,6 +73,7 @@ def test_table_1_runs_on_the_mambo_in_75_000_instructions() -> None:
     assert counts.by_function["__addsf3"] + counts.by_function["__mulsf3"] > counts.mean / 2
 
 
+@pytest.mark.long
 def test_an_estimated_time_follows_from_instructions_clock_and_band() -> None:
     """Time = instructions x cycles per instruction / clock, with the board's band."""
     footprint = measure_once("teensy41")
@@ -109,6 +112,7 @@ def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     assert "an estimate: 1 per instruction, +/- 40 %" in page
 
 
+@pytest.mark.long
 def test_the_mega_is_measured_whole() -> None:
     """On AVR everything is measured, and avr-libc's arithmetic takes many of the instructions."""
     footprint = measure_once("mega", steps=6)
@@ -236,6 +240,7 @@ def test_sizes_of_five_digits_are_written_out() -> None:
     assert "crazyflie: flash 123456 B is over its budget of 16384 B by 107072 B" in text
 
 
+@pytest.mark.long
 def test_doubles_may_be_linked_for_float64() -> None:
     """On a core with single precision only, double arithmetic is the compiler's and counts as flash."""
     settings = with_option(MAMBO, "code.scalar", "float64")
@@ -265,6 +270,7 @@ def test_a_missing_compiler_is_named(name: str, tmp_path: Path, monkeypatch: pyt
         assert word in str(caught.value)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "scalar", "optimisation"),

@@ -127,6 +127,7 @@ def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
     assert r"$\frac{$ &lt;b&gt;" in (tmp_path / "sweep.svg").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_the_command_writes_table_and_pictures_and_answers_with_the_closest(tmp_path: Path) -> None:
     """The default preset with two response times, the slower of which settings refuse."""
     board_builder("crazyflie")

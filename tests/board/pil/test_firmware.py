@@ -70,6 +70,7 @@ def demand_same_bits(summary: dict[str, Any], steps: int, board: str) -> None:
     assert set(summary["link_faults"]) <= {"repeated"}
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "preset", "scalar"),
@@ -86,6 +87,7 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
     demand_same_bits(summary, 21, names[board])
 
 
+@pytest.mark.long
 def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
     """The target of such a controller has two more numbers."""
     settings = with_option(presets.preset("mambo"), "target.acceleration", "given")
@@ -142,6 +144,7 @@ def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path
     assert silent[10] != told_of[10]
 
 
+@pytest.mark.long
 def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
     """The same trace, byte for byte, and a page of it; through a pseudo terminal as through a socket."""
     elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
@@ -159,6 +162,7 @@ def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
     assert "host process, /dev/pts" in (tmp_path / "page.html").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
     """By same-bits: that of the reference, and with wrong C another one, exit 1."""
     elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
@@ -202,6 +206,7 @@ def test_the_stm32_flies_and_measures(tmp_path: Path) -> None:
     assert summary["stack_bytes"] <= bound or summary["link_faults"], "a repeated request interrupts a step"
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("board", "duration_s", "name"), [("crazyflie", 13, "STM32F405"), ("mega", 4, "Arduino Mega 2560")]

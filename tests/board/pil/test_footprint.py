@@ -101,6 +101,7 @@ def test_a_process_needs_the_name_of_a_board(tmp_path: Path) -> None:
     assert board["on_board"]["ticks"] == board["instructions"]["ticks"]
 
 
+@pytest.mark.long
 def test_other_bits_fail(tmp_path: Path) -> None:
     """Exit 1, in capitals in the text; the report calls it a failure."""
     board_builder("crazyflie")

@@ -127,6 +127,7 @@ def test_a_lost_frame_is_repeated(way: str, elf: Path) -> None:
     assert board.faults["repeated"] >= 7
 
 
+@pytest.mark.long
 def test_an_unplugged_board_is_awaited(elf: Path, desk: Trace) -> None:
     """It kept its power: the flight goes on where it was."""
     faults, said = fly_through(elf, Faults(unplugged=frozenset({20, 45})), desk)
@@ -136,6 +137,7 @@ def test_an_unplugged_board_is_awaited(elf: Path, desk: Trace) -> None:
     assert all("lost: " in words and "waiting 2 s for it" in words for words in said)
 
 
+@pytest.mark.long
 def test_a_restarted_board_flies_its_steps_again(elf: Path, desk: Trace) -> None:
     """It lost its power, and the state of its controller: all steps are sent again, twice."""
     faults, said = fly_through(elf, Faults(restarted=frozenset({20, 45})), desk)
@@ -154,6 +156,7 @@ def test_a_board_that_stays_away_ends_the_flight(elf: Path) -> None:
         fly(FLIGHT, BoardController(SETTINGS, board))
 
 
+@pytest.mark.long
 def test_a_board_that_restarts_with_other_firmware_is_refused(elf: Path, tmp_path: Path) -> None:
     """It would answer every step, with the bits of another controller."""
     other = build_firmware(with_option(SETTINGS, "limits.tilt_rad", 0.34), "host", tmp_path)

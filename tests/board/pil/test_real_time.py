@@ -43,6 +43,7 @@ def demand_consistent(summary: dict[str, Any], periods: int) -> None:
     assert timed["delay_s"]["least"] >= 0.0
 
 
+@pytest.mark.long
 def test_a_flight_by_the_clock_of_a_process_is_told(tmp_path: Path) -> None:
     """In text, summary and report; a flight on request has nothing of it."""
     with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil")) as line:
@@ -123,6 +124,7 @@ def test_an_unplugged_board_leaves_no_flight(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_board_whose_clock_was_left_running_is_taken_over(tmp_path: Path) -> None:
     """By the next flight, on request or by the clock: what it still sends is not taken for an answer."""
     flight = Flight(CURVES["bernoulli"](2.0, 0.5), duration_s=0.2)

@@ -157,6 +157,7 @@ def test_drag_is_proportional_to_the_velocity_relative_to_the_air() -> None:
     assert moving[5, 0] != pushed[5, 0]
 
 
+@pytest.mark.long
 def test_battery_sag_leaves_an_altitude_error() -> None:
     """The altitude loop has no integral action: Kp times the altitude error makes up for the lost thrust."""
     trace = hover(10.0, disturbances=Disturbances(battery_sag_1_s=0.004))

@@ -74,6 +74,7 @@ def lost_height_m(mixer: MixerName, step_rad: float) -> float:
     return lowest_m
 
 
+@pytest.mark.long
 def test_a_step_of_the_heading_costs_height() -> None:
     """Of 2 rad: most where all motors are lowered, least where yaw gives way first."""
     lowered_m, clipped_m, kept_m = (lost_height_m(mixer, 2.0) for mixer in ("lower", "clip", "yaw-last"))

@@ -46,6 +46,7 @@ def errors(trace: Trace) -> dict[str, FloatArray]:
     }
 
 
+@pytest.mark.long
 def test_noise_free_estimates_follow_the_true_state() -> None:
     """Over 6 s the errors stay below 0.01 rad of tilt, 2 mm of height, 0.15 m of position and 0.2 m/s.
 

@@ -29,6 +29,7 @@ def compared(*arguments: str) -> dict[str, Any]:
     return summary
 
 
+@pytest.mark.long
 def test_a_slower_controller_is_told_in_control_terms() -> None:
     """One setting differs: gains and poles fall, the step settles later, the observer stays."""
     Path("slower").mkdir()
@@ -61,6 +62,7 @@ def test_the_same_controller_does_not_fly() -> None:
     assert json.loads(Path("out/summary.json").read_text("utf-8"))["figures_a"] is None
 
 
+@pytest.mark.long
 def test_the_eight_is_that_of_fly_on_the_vehicle() -> None:
     """The same metrics; a 1-norm has them too, but no gains, and a setting that one does not use is null."""
     summary = compared("mambo-1norm", "crazyflie", "--vehicle", "crazyflie")

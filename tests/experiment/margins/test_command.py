@@ -65,6 +65,7 @@ def test_an_unstable_loop_exits_1() -> None:
     assert "roll: UNSTABLE, grows e-fold in " in said
 
 
+@pytest.mark.long
 def test_results_are_pictures_and_files_that_report_shows() -> None:
     """The folder has three pictures, responses, the drawn drones and a summary; a page shows them."""
     _, written = run("margins", "--campaign", "default", "--drones", "3", "-o", "out")

@@ -186,6 +186,7 @@ def test_the_number_of_flights_is_limited(tmp_path: Path, count: int) -> None:
     assert fault.startswith(f"flights = {count} must be 1 to 2000; [flights.name] begins a group")
 
 
+@pytest.mark.long
 def test_the_largest_number_of_flights_is_accepted(tmp_path: Path) -> None:
     """The limit is inclusive, for the flights of all groups together."""
     seeds = f"seed = {{ from = 1, to = {MOST_FLIGHTS // 2}, count = {MOST_FLIGHTS // 2} }}"

@@ -59,6 +59,7 @@ def flown(settings: Settings, drone: VehicleFile, curve: CurveName, *, noisy: bo
     return trace
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", vehicle_toml.names())
 def test_a_shipped_drone_flies_well_with_them(name: str) -> None:
     """Both figures and a step, at every heading, seeing the truth and through its sensors.
@@ -226,6 +227,7 @@ def test_a_strong_drone_may_use_its_thrust() -> None:
     assert settings_for(strong).ranges.thrust_acceleration_max_m_s2 == 71.0
 
 
+@pytest.mark.long
 def test_every_value_has_its_reason() -> None:
     """As a comment above it."""
     lines = controller_text(CRAZYFLIE, "crazyflie").splitlines()

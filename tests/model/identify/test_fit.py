@@ -158,6 +158,7 @@ def test_many_logs_do_not_remove_the_bias_of_gusts() -> None:
     assert share.within - left < abs(share.value - TRUTH.acceleration_per_tilt) < share.within
 
 
+@pytest.mark.long
 def test_several_logs_are_pooled() -> None:
     """Three logs have narrower intervals than the first of them; each may have an offset of its own."""
     logs = fly(TRUTH, Flown(duration_s=20.0), 3)
@@ -230,6 +231,7 @@ def demand_cover(estimates: list[Interval], truths: list[float], least: float) -
     assert np.mean([one.within for one in estimates]) < 12.0 * np.mean(errors)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("truth", "flown"),

@@ -248,6 +248,7 @@ def test_what_is_no_ulog_is_told(tmp_path: Path) -> None:
     assert len(log.signals["roll_rad"].value) < 400
 
 
+@pytest.mark.long
 def test_ulog_without_pyulog_names_what_to_install(tmp_path: Path) -> None:
     """For the Python that runs."""
     (tmp_path / "a.ulg").write_bytes(b"")

@@ -49,6 +49,7 @@ def test_a_simulated_flight_is_repeated_bit_for_bit(options: list[str]) -> None:
     assert summary["refused"] >= 70
 
 
+@pytest.mark.long
 def test_a_controller_of_the_height_is_repeated_bit_for_bit() -> None:
     """In space and on a level course, whose height is in its trace too."""
     run("design", "crazyflie", "-o", "height.toml")

@@ -100,6 +100,7 @@ def row(iae_m_s: float, variation_rad: float, crashed: int = 0) -> dict[str, flo
     return dict(zip(keys, (iae_m_s, variation_rad, crashed), strict=True))
 
 
+@pytest.mark.long
 def test_the_search_starts_at_the_base_and_stays_in_its_ranges(source: Path, whole: Path) -> None:
     """The first trial is the base; in all trials, settings that are not searched are the base's."""
     tuning = tuning_file.read(source)
