@@ -195,6 +195,7 @@ def test_some_of_n_are_reset(made: Callable[[int], Controller]) -> None:
             swarm.reset(which=wrong)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", ["crazyflie", "mambo-1norm", "[height]"])
 def test_a_saved_controller_goes_on_as_the_first(name: str) -> None:
     """Pickled and copied, with what the altitude loop remembers; other C is refused."""
@@ -244,6 +245,7 @@ def test_the_heading_starts_at_the_first_one_in_range() -> None:
     assert (then == [0.6, 0.6, first[2]]).all()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("made", "atol"),
     [(lambda: stock("stock"), 1e-6), (lambda: Controller.from_vehicle("crazyflie"), RECIPROCAL_M_S2)],

@@ -164,6 +164,7 @@ def test_generate_keeps_edited_files_until_forced() -> None:
     assert run("generate", "-o", "out", "--force")[0] == "changed Makefile\n"
 
 
+@pytest.mark.long
 def test_letters_that_the_terminal_has_not_are_shown_by_number() -> None:
     """An edit in another script, on a terminal of another: the diff is shown, not a traceback."""
     run("generate", "-o", "out")

@@ -55,6 +55,7 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert "<svg" in (out / "flight.svg").read_text()
 
 
+@pytest.mark.long
 def test_without_pictures_the_earlier_ones_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What lies in the folder is of one flight; in NumPy its trace is the same."""
     traces = []
@@ -261,6 +262,7 @@ def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pyte
     assert "$x_\u65e5$.toml" in (tmp_path / "flight" / "flight.svg").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     """A limit on the size of files stands for it: one line, exit 2, and the old flight is whole."""
     run("fly", "--controller", "pd", "--duration-s", "0.1")

@@ -21,6 +21,7 @@ except SystemExit as leaving:
 """
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("arguments", [["--help"], ["fly", "--help"], ["generate", "--help"]])
 def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     """It answers at once: a command imports what it needs when it is called."""

@@ -66,6 +66,7 @@ def test_a_log_becomes_a_model() -> None:
     assert curves["time_s"][-1] > summary["split_s"] > 10.0
 
 
+@pytest.mark.long
 def test_a_vehicle_that_is_data_is_identified_again() -> None:
     """What `fly --vehicle` simulates is what its trace shows, and what vehicle.toml says again."""
     run("identify", "--manoeuvre", "eight.csv")
@@ -81,6 +82,7 @@ def test_a_vehicle_that_is_data_is_identified_again() -> None:
     assert found.acceleration_per_tilt_g == pytest.approx(truth.acceleration_per_tilt_g, abs=0.01)
 
 
+@pytest.mark.long
 def test_the_screen_says_what_is_written() -> None:
     """The vehicle of a loop with an integrator has none: its gain, lag and dead time are printed, too."""
     run("identify", "--manoeuvre", "eight.csv")
@@ -96,6 +98,7 @@ def test_the_screen_says_what_is_written() -> None:
     assert " ".join(rows["without it, vehicle.toml"]).startswith(f"{flown.gain:.3f}, {times}")
 
 
+@pytest.mark.long
 def test_a_bad_log_of_several_is_left_out() -> None:
     """Its reason is said, and the exit code is that of the others."""
     Path("broken.csv").write_text("time_s,roll_rad\n0,0\n", "utf-8")
@@ -115,6 +118,7 @@ def test_json_is_the_summary() -> None:
     assert {path.name: path.read_bytes() for path in Path("out").iterdir()} == first
 
 
+@pytest.mark.long
 def test_two_logs_of_a_crazyflie_are_pooled() -> None:
     """The client's CSV needs no option; what was read is said."""
     for name, flown in zip(("a.csv", "b.csv"), fly(TRUTH, Flown(duration_s=16.0), 2), strict=True):
@@ -155,6 +159,7 @@ def test_a_contradiction_is_mended_as_the_message_says() -> None:
     assert odd == pytest.approx(sound, rel=1e-3, abs=1e-5)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("line", "words"),
     [

@@ -98,6 +98,7 @@ def test_recorded_flights_are_the_same_again_and_others_fail() -> None:
     assert "the controller's settings have changed since the metrics were recorded" in said
 
 
+@pytest.mark.long
 def test_the_stock_pd_can_be_tested() -> None:
     """As in a campaign."""
     said, _ = run("regress", "mine.toml", "--controller", "pd", "-o", "out")

@@ -31,6 +31,7 @@ command.typer.echo = stop
 """
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("when", [DURING_IMPORT, DURING_PARSING, DURING_COMMAND])
 def test_a_terminated_command_exits_with_143(when: str) -> None:
     """While modules are imported, while the command line is parsed, and while the command runs."""

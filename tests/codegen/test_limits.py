@@ -249,6 +249,7 @@ def test_drawn_limits_are_of_the_quantities_of_the_struct() -> None:
     assert drawn.shape == (5, len(LIMITS))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
 def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
     """After outage_s without a state the model brakes to rest, and then the command is level."""

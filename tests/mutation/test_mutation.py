@@ -122,6 +122,7 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
     assert bench.difference() is None
 
 
+@pytest.mark.long
 def test_every_reason_is_of_a_mutant_that_there_is() -> None:
     """A row whose line is gone is removed."""
     floats = (MAMBO, TRACKED, presets.load("table1"), in_scalar(MAMBO, "float64"))

@@ -179,6 +179,7 @@ def test_json_has_the_overview_of_the_page() -> None:
         assert one["missing"] == []
 
 
+@pytest.mark.long
 def test_the_same_folders_give_the_same_page() -> None:
     """No clock, no random ids."""
     folders = [made("sweep"), made("verify")]
@@ -221,6 +222,7 @@ def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     assert "7.123" in page
 
 
+@pytest.mark.long
 def test_a_table2_of_one_pd_lacks_nothing() -> None:
     """Results of an earlier version, which flew the paper's PD alone."""
     path = Path(made("table2")) / SUMMARY
@@ -234,6 +236,7 @@ def test_a_table2_of_one_pd_lacks_nothing() -> None:
     assert "feedforward" not in page
 
 
+@pytest.mark.long
 def test_a_campaign_that_goes_on_is_shown_as_it_stands() -> None:
     """Without a summary: the flights so far."""
     Path("campaign").mkdir()
@@ -315,6 +318,7 @@ def test_a_trace_that_cannot_be_drawn_is_refused(
     assert message in run("fly", code=2)
 
 
+@pytest.mark.long
 def test_names_that_are_no_text_or_a_formula_are_shown() -> None:
     """Half a surrogate pair, and what a picture would take for mathematics."""
     made("verify")

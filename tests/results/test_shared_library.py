@@ -34,6 +34,7 @@ def test_every_c_file_is_compiled_with_the_headers_and_libraries() -> None:
     assert (library.answer(), library.rest(7.0)) == (41, 3.0)
 
 
+@pytest.mark.long
 def test_a_library_is_built_once(empty_cache: Path) -> None:
     """For each key, flag, optimisation and compiler; the files are asked for only to build."""
     asked = []

@@ -351,6 +351,7 @@ def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path)
         )
 
 
+@pytest.mark.long
 def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
     """By the compiler's figures, along the calls that it saw: a tick without the PID controller's."""
     compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")

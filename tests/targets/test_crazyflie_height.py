@@ -42,6 +42,7 @@ def ticks(app: Crazyflie, n: int) -> None:
         app.tick()
 
 
+@pytest.mark.long
 def test_the_thrust_that_flies_is_the_commanded_one_times_the_mass(lifting: Built) -> None:
     """In the firmware's scale of a motor, with the height's mode off; parameter `mass` counts."""
     app = hovering(lifting)

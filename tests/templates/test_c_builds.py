@@ -302,6 +302,7 @@ def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path) -> None:
     shell("two/firmware", folder=tmp_path)
 
 
+@pytest.mark.long
 @pytest.mark.first_is_quick
 def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path) -> None:
     """Objects of another processor, of other flags, or without -fPIC are never linked."""

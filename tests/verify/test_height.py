@@ -82,6 +82,7 @@ def test_random_calls_have_the_bits_of_the_reference(scalar: str, tmp_path: Path
     assert played_fault(subject(settings, tmp_path), "-O0", played=played(settings)) is None
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_third_axis_is_found(fault: str, tmp_path: Path) -> None:
     """By other bits than those of the reference."""

@@ -81,6 +81,7 @@ def test_the_reference_answers_as_the_interface_promises() -> None:
     assert made[6].tobytes() == made[0].tobytes()
 
 
+@pytest.mark.long
 def test_tapes_of_unequal_length_do_not_disturb_each_other() -> None:
     """Answers are those of each tape alone; bytes that are no whole call are dropped."""
     tapes = list(cases(MAMBO)[0][::97])

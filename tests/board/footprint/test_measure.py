@@ -89,6 +89,7 @@ def test_an_estimated_time_follows_from_instructions_clock_and_band() -> None:
     assert (time.value, time.budget) == pytest.approx((1000 * time_s[1], 1.0), rel=1e-3)  # four digits
 
 
+@pytest.mark.long
 def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     """In the table, below it, in the summary and on the page."""
     modelled, estimated = measure_once("crazyflie"), measure_once("teensy41")

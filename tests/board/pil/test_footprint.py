@@ -77,6 +77,7 @@ def test_a_flight_on_a_known_board_has_the_count_beside_the_cycles(tmp_path: Pat
             assert emulated is None
 
 
+@pytest.mark.long
 def test_a_flight_says_why_there_is_no_count(tmp_path: Path) -> None:
     """Without the compiler of the board it flies all the same."""
     board_builder("crazyflie")

@@ -304,6 +304,7 @@ def test_a_board_that_receives_nothing_ends_the_flight(elf: Path) -> None:
     )
 
 
+@pytest.mark.long
 def test_inputs_are_known_until_then(elf: Path) -> None:
     """Numbers of which a reply has the lowest byte only."""
     missed = range(300, 300 + OLDEST_INPUTS)

@@ -298,6 +298,7 @@ def report_half(fifo: str) -> None:
     Path(fifo).read_text()
 
 
+@pytest.mark.long
 def test_a_worker_process_reports_its_share(tmp_path: Path) -> None:
     """The pool sees the share while the task runs."""
     fifo = tmp_path / "fifo"

@@ -51,6 +51,7 @@ def test_a_1_norm_is_no_linear_system() -> None:
     assert {True, False} == set(found.values())
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("drone", "sensors"), SEEN)
 def test_response_to_a_push_is_that_of_a_flight(
     drone: str, sensors: SensorsName, monkeypatch: pytest.MonkeyPatch

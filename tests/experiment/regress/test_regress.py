@@ -419,6 +419,7 @@ def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) 
     assert "many with mambo: 0 of 30 flights passed, 30 failed" in text
 
 
+@pytest.mark.long
 def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path: Path) -> None:
     """A suite of 200 groups still has a picture that can be looked at."""
     path = tmp_path / "many.toml"

@@ -83,6 +83,7 @@ def test_sensors_and_estimators(engine: Path, noise_scale: float, derotated: boo
 LOWERING, YAW_LAST = (changed(LIMITED, rotors={"mixer": mixer}) for mixer in ("lower", "yaw-last"))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("drone", "law"),
     [

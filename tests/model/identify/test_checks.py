@@ -95,6 +95,7 @@ FAULTS: dict[str, tuple[Callable[[Columns], Columns], list[str], list[str] | Non
 }
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_contradiction_is_told_by_name(fault: str) -> None:
     """With the motion it is known which column is wrong; without it, which two disagree, or nothing."""

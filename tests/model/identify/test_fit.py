@@ -181,6 +181,7 @@ def test_the_model_section_has_what_was_found() -> None:
     assert {"pitch_lag_s", "pitch_trim_rad", "acceleration_per_tilt", "drag_1_s"} < summary.model.keys()
 
 
+@pytest.mark.long
 def test_stretches_without_flight_are_left_out() -> None:
     """A tumble, a gap and the time on the ground, each with garbage in it."""
     log = dict(fly(TRUTH, Flown(duration_s=45.0), 1)[0])

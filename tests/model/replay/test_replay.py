@@ -62,6 +62,7 @@ def test_a_controller_of_the_height_is_repeated_bit_for_bit() -> None:
     assert (summary["steps"], summary["equal_steps"]) == (401, 401)
 
 
+@pytest.mark.long
 def test_another_controller_is_told_apart() -> None:
     """Exit 1: its commands are others; of the same one in another scalar type only the last digits are."""
     run(*FLOWN)
@@ -72,6 +73,7 @@ def test_another_controller_is_told_apart() -> None:
     assert min(summary["explained"]) > 0.999999
 
 
+@pytest.mark.long
 def test_where_a_log_begins_to_differ_is_told() -> None:
     """One command with another last digit."""
     run(*FLOWN)

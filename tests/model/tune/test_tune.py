@@ -115,12 +115,14 @@ def test_the_search_starts_at_the_base_and_stays_in_its_ranges(source: Path, who
     assert len({trial.values["cost.effort_weight"] for trial in found}) == TRIALS
 
 
+@pytest.mark.long
 def test_an_extended_study_has_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
     """Two trials, extended to three, equal three trials at once."""
     assert len(search_on_threads(source, tmp_path, 2)) == 2
     assert search_on_threads(source, tmp_path) == found_in(whole, source)
 
 
+@pytest.mark.long
 def test_an_interrupted_study_resumes_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
     """The next run flies the trials that were proposed and not finished."""
 
@@ -134,6 +136,7 @@ def test_an_interrupted_study_resumes_to_the_same_trials(source: Path, whole: Pa
     assert search_on_threads(source, tmp_path) == found_in(whole, source)
 
 
+@pytest.mark.long
 def test_folders_share_a_storage(source: Path, whole: Path, tmp_path: Path) -> None:
     """A second folder with the same URL has the trials of the first and no database of its own."""
     url = f"sqlite:///{whole / 'study.db'}"
@@ -157,6 +160,7 @@ def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, 
     assert (whole / "front.svg").is_file()
 
 
+@pytest.mark.long
 def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_path: Path) -> None:
     """Base and chosen point are printed, progress only on a terminal; no trial is flown again."""
     folder = tmp_path / "out"
@@ -170,6 +174,7 @@ def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_
     assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
 
 
+@pytest.mark.long
 def test_the_summary_is_what_json_prints(source: Path, whole: Path, tmp_path: Path) -> None:
     """It has base, chosen trial and front, with the values of controller.toml."""
     folder = tmp_path / "out"
@@ -227,6 +232,7 @@ def test_missing_optuna_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         tune(output=tmp_path, trials=1)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("url", [None, "nonsense", "nosuch://host/db", "sqlite:////no/such/folder/a.db"])
 def test_a_database_that_refuses_access_is_reported(url: str | None, source: Path, tmp_path: Path) -> None:
     """The message is one line that names option or study.db and shows the form of a URL."""

@@ -109,6 +109,7 @@ def test_a_missing_tool_is_named(
         module(page_controllers(["pd"])[0])
 
 
+@pytest.mark.long
 def test_the_c_of_the_page_compiles_without_a_warning(tmp_path: Path) -> None:
     """Without a C library, for WebAssembly."""
     files, _, step = program(page_controllers(["pd"])[0])
