@@ -24,6 +24,9 @@ PAGES: Final = {
 _TABLE: Final = re.compile(r"^\[(Table: [^\]]+)\]\(([^)]+\.md)\)$", re.MULTILINE)
 """A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
 
+_NOT_SEARCHED: Final = ("explanation/decisions/", "archive/")
+"""Folders for developers, and of figures that are no more those of today's C."""
+
 _LONG_TABLE: Final = 15
 """A table of more rows than that is folded."""
 
@@ -45,6 +48,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
     """Put each linked table and drawing in place of its link; raises OSError for one that is not there."""
+    if page.file.src_uri.startswith(_NOT_SEARCHED):
+        page.meta["search"] = {"exclude": True}
     if page.file.abs_src_path is None:
         return markdown
     folder = Path(page.file.abs_src_path).parent
