@@ -82,6 +82,14 @@ def test_formulas_are_typeset(site: Path) -> None:
     assert [page for page in site.rglob("*.html") if 'class="arithmatex"' in page.read_text("utf-8")] == []
 
 
+def test_formulas_have_no_macro_that_github_refuses() -> None:
+    """There such a formula is an error in red; the build would draw it."""
+    for page in (ROOT / "docs").rglob("*.md"):
+        assert not re.search(
+            r"\\(?:operatorname|mbox|phantom|DeclareMathOperator)\b", page.read_text("utf-8")
+        ), page
+
+
 @pytest.mark.long
 def test_long_tables_are_folded(site: Path) -> None:
     """With their title and number of rows; a short table stands as it is."""
