@@ -1,9 +1,11 @@
-"""The hooks of MkDocs: pages that the code writes, tables that `make evidence` writes, and drawings."""
+"""The hooks of MkDocs: pages that the code writes, tables that `make evidence` writes, drawings, formulas."""
 
 import re
+from html import unescape
 from pathlib import Path
 from typing import Final
 
+from math_core import LatexToMathML
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -19,11 +21,22 @@ PAGES: Final = {
     "reference/python-api.md": python_page,
 }
 
-_TABLE: Final = re.compile(r"^\[Table: [^\]]+\]\(([^)]+\.md)\)$", re.MULTILINE)
+_TABLE: Final = re.compile(r"^\[(Table: [^\]]+)\]\(([^)]+\.md)\)$", re.MULTILINE)
 """A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
+
+_NOT_SEARCHED: Final = ("explanation/decisions/", "archive/")
+"""Folders for developers, and of figures that are no more those of today's C."""
+
+_LONG_TABLE: Final = 15
+"""A table of more rows than that is folded."""
 
 _DRAWING: Final = re.compile(r"^!\[[^\]]+\]\(([^)]*drawings/[^)]+\.svg)\)$", re.MULTILINE)
 """A line that is a drawing; as part of the page it has the colour of its text, light or dark."""
+
+_FORMULA: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+"""A formula in LaTeX as `pymdownx.arithmatex` leaves it: `span` in a line, `div` on lines of its own."""
+
+_LATEX: Final = LatexToMathML(fancy_error=False)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -35,8 +48,30 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
     """Put each linked table and drawing in place of its link; raises OSError for one that is not there."""
+    if page.file.src_uri.startswith(_NOT_SEARCHED):
+        page.meta["search"] = {"exclude": True}
     if page.file.abs_src_path is None:
         return markdown
     folder = Path(page.file.abs_src_path).parent
-    markdown = _TABLE.sub(lambda link: (folder / link[1]).read_text("utf-8"), markdown)
+    markdown = _TABLE.sub(lambda link: _table(link[1], (folder / link[2]).read_text("utf-8")), markdown)
     return _DRAWING.sub(lambda link: f"<div>\n{(folder / link[1]).read_text('utf-8')}</div>", markdown)
+
+
+def _table(title: str, text: str) -> str:
+    """Return a table as part of a page, folded if it is long."""
+    head, rule, *rows = text.splitlines()
+    if len(rows) <= _LONG_TABLE:
+        return text
+    return "\n    ".join([f'??? note "{title} ({len(rows)} rows)"\n', head, rule, *rows])
+
+
+def on_page_content(html: str, /, **_: object) -> str:
+    """Typeset the formulas as MathML, which browsers draw; raises LatexError for one that is wrong."""
+    return _FORMULA.sub(_typeset, html)
+
+
+def _typeset(formula: re.Match[str]) -> str:
+    """Return a formula as MathML; one on lines of its own scrolls where it is too wide."""
+    tag, latex = formula.groups()
+    mathml = _LATEX.convert_with_local_state(unescape(latex).strip(), displaystyle=tag == "div")
+    return f'<div class="formula">{mathml}</div>' if tag == "div" else mathml

@@ -19,6 +19,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     require_module("mkdocs")
     require_module("material")
     require_module("mkdocstrings")
+    require_module("math_core")
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -71,6 +72,30 @@ def test_drawings_have_the_colour_of_the_page(site: Path) -> None:
             == text.count("prefers-color-scheme: dark) { .drawing")
             == count
         )
+
+
+@pytest.mark.long
+def test_formulas_are_typeset(site: Path) -> None:
+    """As MathML, on the pages that derive something; no LaTeX is left for a script."""
+    for page in ("kernel", "limits", "plant"):
+        assert (site / "explanation" / f"{page}.html").read_text("utf-8").count("<math") > 5, page
+    assert [page for page in site.rglob("*.html") if 'class="arithmatex"' in page.read_text("utf-8")] == []
+
+
+def test_formulas_have_no_macro_that_github_refuses() -> None:
+    """There such a formula is an error in red; the build would draw it."""
+    for page in (ROOT / "docs").rglob("*.md"):
+        assert not re.search(
+            r"\\(?:operatorname|mbox|phantom|DeclareMathOperator)\b", page.read_text("utf-8")
+        ), page
+
+
+@pytest.mark.long
+def test_long_tables_are_folded(site: Path) -> None:
+    """With their title and number of rows; a short table stands as it is."""
+    faults = (site / "evidence" / "faults.html").read_text("utf-8")
+    assert re.search(r'<details class="note">\s*<summary>Table: faults \(\d\d rows\)</summary>', faults)
+    assert "<details" not in (site / "evidence" / "opponents.html").read_text("utf-8")
 
 
 def test_links_of_the_readme_lead_somewhere() -> None:
