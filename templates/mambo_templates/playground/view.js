@@ -44,8 +44,9 @@ class View {
     };
   }
 
-  /* Approaches what is wanted for some time; Infinity: is there at once. */
+  /* Approaches what is wanted for some time; Infinity: is there at once. A page that is hidden has no size. */
   follow(seconds) {
+    if (!this.canvas.clientWidth) return;
     const { centre, width } = this.wanted, share = 1 - Math.exp(-EASE_1_S * seconds);
     this.centre = this.centre.map((value, axis) => value + share * (centre[axis] - value));
     this.width *= (width / this.width) ** share;

@@ -266,6 +266,15 @@ def test_a_lost_drone_says_why_and_starts_again(page: Page, tab: Browser) -> Non
     assert tab.complaints == []
 
 
+def test_a_page_that_was_hidden_shows_the_field_again(page: Page, tab: Browser) -> None:
+    """As in a frame without a size; the view is where it was."""
+    for display in ("none", ""):
+        tab.find(f'document.querySelector(".desk").style.display = "{display}"')
+        page.advance(1.0)
+    assert page.find("page.player.views[0].view.width") == page.find("VIEW_M")
+    assert page.find("page.player.views[0].view.centre") == [0, 0]
+
+
 def test_the_verdict_names_the_closest(page: Page) -> None:
     """Distances in cm, the others as multiples, and a longer bar for a larger distance."""
     page.advance(20.0)
