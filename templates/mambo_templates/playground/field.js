@@ -63,7 +63,7 @@ class Field {
     const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
     const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
     for (const index of shown) { /* the first one on top */
-      const first = 3 + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
+      const first = FIRST + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
       stroke(recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
     }
     for (const index of shown) this.drone(context, palette, now, index, stroke);
@@ -100,11 +100,7 @@ class Field {
 
   /* An arrow with the mean wind, in the upper left corner. */
   wind(context, palette) {
-    const { dials } = this.world.data, value = (key) => {
-      const index = dials.findIndex((dial) => dial.key === key);
-      return dials[index].values[this.world.dials[index]];
-    };
-    const speed = value("wind"), way = value("towards") * Math.PI / 180, length = 8 + speed;
+    const speed = this.world.value("wind"), way = this.world.value("towards") * Math.PI / 180, length = 8 + speed;
     if (!speed) return;
     const end = (angle, size) => [30 + size * Math.cos(way + angle), 30 + size * Math.sin(way + angle)];
     Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2, fillStyle: palette.ink });
@@ -132,7 +128,7 @@ class Field {
 
   /* A disc with the number of the table; at the edge of the field if the drone is beyond it. */
   drone(context, palette, now, index, stroke) {
-    const [x, y, roll, pitch] = now.slice(3 + PER_DRONE * index, 3 + PER_DRONE * (index + 1));
+    const [x, y, , roll, pitch] = stateOf(now, index);
     const one = this.world.drones[index], colour = palette.hues[one.entry.hue], length = TILT_M_RAD * this.view.width / VIEW_M;
     if (one.lost) return this.wreck(context, palette, one, colour, stroke);
     stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);

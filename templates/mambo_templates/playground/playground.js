@@ -73,9 +73,10 @@ async function start() {
   const drones = await Promise.all(data.drones.map(async (entry) => new Drone(await Module.load(entry), entry, data)));
   const world = new World(drones, data), field = new Field(find("field"), world);
   const plots = [
-    new Plot(find("errors"), world, (row, drone) => 100 * errorOf(row, drone), LOGARITHMIC_CM),
+    new Plot(find("errors"), world, (row, drone) => 100 * world.error(row, drone), LOGARITHMIC_CM),
     new Plot(find("tilts"), world, tiltOf, DEGREES),
   ];
+  if (data.spatial) plots.push(new Plot(find("heights"), world, (row, drone) => stateOf(row, drone)[2], HEIGHT_M, (row) => row[3]));
   const player = new Player(world, [field, ...plots]);
   player.controls = new Controls(world, field, player);
   player.play(!still.matches);

@@ -29,7 +29,7 @@ class View {
     if (target.kind === "hand") points.push(target.goal);
     if (fence) points.push(fence.slice(0, 2), fence.slice(2));
     world.drones.forEach((drone, index) => {
-      const first = 3 + PER_DRONE * index;
+      const first = FIRST + PER_DRONE * index;
       if (drone.shown && !drone.lost) points.push([now[first], now[first + 1]]);
     });
     const aspect = canvas.clientHeight / canvas.clientWidth, home = [VIEW_M / 2, VIEW_M / 2 * aspect];

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from mambo_sil.drone.plant import elementary
+from mambo_sil.flight.height_profiles import Swing
 from mambo_sil.flight.trajectories import Bernoulli, Circle
 from tests.support import command
 from tests.support.browser import Browser, browser
@@ -59,7 +60,7 @@ class Page:
 
     def error_m(self, drone: int) -> float:
         """Return the distance of a drone to the target now."""
-        return float(self.find(f"errorOf(page.world.history.at(-1), {drone})"))
+        return float(self.find(f"page.world.error(page.world.history.at(-1), {drone})"))
 
     def target(self) -> list[float]:
         """Return the position of the target now."""
@@ -109,7 +110,10 @@ def test_the_browser_flies_the_bits_of_the_native_engine(made: tuple[Path, Any],
 def test_other_drones_and_scalar_types_have_the_same_bits(
     arguments: tuple[str, ...], tab: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another attitude loop, a controller of the height, fixed point and float64; each also flies."""
+    """Another attitude loop, a controller of the height, fixed point and float64; each also flies.
+
+    The ceiling of the settings, 2.5 m, holds when the fence is drawn and when it is removed.
+    """
     require("wasm-ld", "lld")
     monkeypatch.chdir(tmp_path)
     for name, preset, scalar in (
@@ -123,6 +127,9 @@ def test_other_drones_and_scalar_types_have_the_same_bits(
         assert changed != text
         Path(f"{name}.toml").write_text(changed, "utf-8")
     command.run("design", "crazyflie", "-o", "height.toml")
+    text = Path("height.toml").read_text("utf-8")
+    walls = "[limits]\nfence = { floor_m = 0.4, ceiling_m = 2.5 }"
+    Path("height.toml").write_text(text.replace("[limits]", walls), "utf-8")
     command.run("playground", *arguments, "-o", "other.html")
     other = Page(tab, tmp_path / "other.html")
     assert "The same bits" in other.text("#proof")
@@ -134,7 +141,30 @@ def test_other_drones_and_scalar_types_have_the_same_bits(
     )
     other.advance(5.0)
     assert float(other.find("page.world.drones[0].position[0]")) == pytest.approx(0.5, abs=0.02)
+    follow_heights(other)
     assert tab.complaints == []
+
+
+def follow_heights(page: Page) -> None:
+    """Demand that a step of the height is followed, and a swing, if a controller commands the thrust."""
+    if not page.find("page.world.data.spatial"):
+        assert page.find('document.getElementById("heights")') is None
+        return
+    page.find("(page.world.enclose(null), page.world.target.drag(0, 0))")
+    page.slide("height", 12)
+    page.slide("swing", 3)
+    page.advance(6.0)
+    heights = page.find("page.world.history.slice(-400).map((row) => row[3])")
+    assert (min(heights), max(heights)) == (pytest.approx(1.7, abs=1e-3), pytest.approx(2.3, abs=1e-3))
+    swung = page.find("page.world.history.slice(-400).map((row) => row[3] - stateOf(row, 0)[2])")
+    stock = page.find("page.world.history.slice(-400).map((row) => row[3] - stateOf(row, 1)[2])")
+    assert np.abs(swung).max() < 0.02
+    assert np.abs(stock).max() > 0.1
+    assert "height=2&swing=0.3" in page.find("location.hash")
+    page.slide("swing", 0)
+    page.slide("height", 22)
+    page.advance(6.0)
+    assert page.find("stateOf(page.world.history.at(-1), 0)[2]") == pytest.approx(2.5, abs=0.02)
 
 
 @pytest.mark.parametrize(("drone", "place"), [(MAMBO, "constant"), (PD, "constant"), (ONE_NORM, "header")])
@@ -159,13 +189,17 @@ def test_a_flipped_byte_is_not_the_same_bits(
 
 
 def test_the_curves_are_those_of_the_simulation(page: Page) -> None:
-    """Eight and circle have the bits of trajectories.py, velocity and acceleration included."""
+    """Eight, circle and swing have the bits of the simulation's, velocity and acceleration included."""
     times = [0.0, 0.01, 1.0, 3.14, 12.5, 1000.01]
     for kind, curve in (("eight", Bernoulli(2.0, 0.5)), ("circle", Circle(1.2, 0.8))):
         page.find(f'page.world.target.kind = "{kind}"')
         found = page.find(f"{times}.map((time) => [...page.world.target.at(time)])")
-        expected = np.concatenate([curve.target(times), curve.acceleration(times)], axis=-1)
+        swing = Swing(0.0, 1.5).vertical(times)
+        expected = np.concatenate([curve.target(times), curve.acceleration(times), swing], axis=-1)
         assert found == expected.tolist()
+    page.find("page.world.target.swing = 0.3")
+    heights = page.find(f"{times}.map((time) => [...page.world.target.at(time).slice(6)])")
+    assert heights == Swing(0.3, 1.5).vertical(times).tolist()
 
 
 @pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
