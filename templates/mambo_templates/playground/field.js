@@ -1,5 +1,5 @@
 /* The field seen from above: target, trails and drones. A line from each drone shows where, and how much, it tilts. */
-const TRAIL_S = 3, RADIUS_PX = 10, TILT_M_RAD = 1.6, EDGE_PX = 14, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
+const TRAIL_S = 3, TILT_M_RAD = 1.6, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
 
 /* Resizes a canvas to its place on the page; returns its context, in CSS pixels, and its size. */
 function fit(canvas) {
@@ -66,7 +66,8 @@ class Field {
       const first = FIRST + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
       stroke(recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
     }
-    for (const index of shown) this.drone(context, palette, now, index, stroke);
+    const words = shown.map((index) => this.drone(context, palette, now, index, stroke)).reverse();
+    labels(context, palette, this.canvas, words);
     if (this.arrow) stroke(this.arrow, palette.ink, 2.5, [2, 5]);
   }
 
@@ -126,44 +127,17 @@ class Field {
     context.stroke();
   }
 
-  /* A disc with the number of the table; at the edge of the field if the drone is beyond it. */
+  /* A quadrotor, at the edge of the field if it is beyond it; a cross where it was lost. Returns what to say beside it. */
   drone(context, palette, now, index, stroke) {
-    const [x, y, , roll, pitch] = stateOf(now, index);
-    const one = this.world.drones[index], colour = palette.hues[one.entry.hue], length = TILT_M_RAD * this.view.width / VIEW_M;
-    if (one.lost) return this.wreck(context, palette, one, colour, stroke);
-    stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
-    const inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
-    const [px, py] = this.pixels(x, y);
-    const [cx, cy] = [inside(px, this.canvas.clientWidth), inside(py, this.canvas.clientHeight)];
-    Object.assign(context, { fillStyle: colour, strokeStyle: palette.paper, lineWidth: 1.5, font: "bold 12px system-ui, sans-serif" });
-    context.beginPath();
-    context.arc(cx, cy, RADIUS_PX, 0, 2 * Math.PI);
-    context.fill();
-    context.stroke();
-    Object.assign(context, { fillStyle: palette.paper, textAlign: "center", textBaseline: "middle" });
-    context.fillText(index + 1, cx, cy + 0.5);
-    Object.assign(context, { textAlign: "start", textBaseline: "alphabetic" });
-    if (one.active.length) this.label(context, palette, one.speedWords, cx, cy);
-  }
-
-  /* A cross where a drone was lost, at the edge of the field if that is beyond it, and why. */
-  wreck(context, palette, drone, colour, stroke) {
-    const { clientWidth, clientHeight } = this.canvas, inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
-    const [px, py] = this.pixels(...drone.lost.place), [x, y] = [inside(px, clientWidth), inside(py, clientHeight)];
-    for (const way of [1, -1]) {
-      stroke([[-1, -way], [1, way]].map(([dx, dy]) => this.view.metres(x + RADIUS_PX * dx, y + RADIUS_PX * dy)), colour, 3);
+    const [x, y, , ...angles] = stateOf(now, index), one = this.world.drones[index], { title, hue } = one.entry;
+    const colour = palette.hues[hue], place = inside(this.canvas, this.pixels(...(one.lost ? one.lost.place : [x, y])));
+    if (one.lost) {
+      cross(context, colour, place);
+      return { words: `${title} is lost: ${one.lost.why}`, colour, place };
     }
-    context.font = "bold 12px system-ui, sans-serif";
-    this.label(context, palette, `${drone.entry.title} is lost: ${drone.lost.why}`, x, y);
-  }
-
-  /* Words beside a drone, on the side where there is room. */
-  label(context, palette, words, x, y) {
-    const room = x + 18 + context.measureText(words).width < this.canvas.clientWidth;
-    context.setLineDash([]);
-    Object.assign(context, { fillStyle: palette.ink, strokeStyle: palette.paper, lineWidth: 4, textAlign: room ? "left" : "right" });
-    context.strokeText(words, x + (room ? 18 : -18), y - 18);
-    context.fillText(words, x + (room ? 18 : -18), y - 18);
-    context.textAlign = "start";
+    const length = TILT_M_RAD * this.view.width / VIEW_M, [roll, pitch] = angles;
+    stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
+    quadrotor(context, palette, colour, index + 1, place, angles);
+    return { words: one.active.length ? `${title} ${one.speedWords}` : title, colour, place };
   }
 }
