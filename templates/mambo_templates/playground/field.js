@@ -38,37 +38,51 @@ class Field {
   }
 
   draw(palette) {
-    const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn, now = rows.at(-1);
+    const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn;
+    const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
     context.lineJoin = context.lineCap = "round";
     this.grid(context, width, height, palette);
-    this.wind(context, palette);
-    const stroke = (points, colour, thickness, dash = []) => {
-      Object.assign(context, { strokeStyle: colour, lineWidth: thickness });
-      context.setLineDash(dash);
-      context.beginPath();
-      points.forEach(([x, y]) => context.lineTo(...this.pixels(x, y)));
-      context.stroke();
-    };
-    stroke(rows.map((row) => [row[1], row[2]]), palette.target, 4);
+    drawStreaks(context, palette, this, width, height);
+    this.aims(context, palette, rows);
+    const words = this.drones(context, palette, rows, shown);
+    drawInset(context, palette, this, rows, shown);
+    labels(context, palette, this.canvas, words);
+    if (this.arrow) this.stroke(context, this.arrow, palette.ink, 2.5, [2, 5]);
+  }
+
+  stroke(context, points, strokeStyle, lineWidth, dash = []) {
+    Object.assign(context, { strokeStyle, lineWidth });
+    context.setLineDash(dash);
+    context.beginPath();
+    points.forEach(([x, y]) => context.lineTo(...this.pixels(x, y)));
+    context.stroke();
+  }
+
+  /* The target with its trail and the place that it glides to, and the fence. */
+  aims(context, palette, rows) {
+    const now = rows.at(-1), { target, fence } = this.world, corners = this.corners ?? (fence && [fence.slice(0, 2), fence.slice(2)]);
+    this.stroke(context, rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
-    const corners = this.corners ?? (world.fence && [world.fence.slice(0, 2), world.fence.slice(2)]);
     if (corners) {
       const [[x, y], [u, v]] = corners;
-      stroke([[x, y], [u, y], [u, v], [x, v], [x, y]], palette.ink, 2, [8, 6]);
+      this.stroke(context, [[x, y], [u, y], [u, v], [x, v], [x, y]], palette.ink, 2, [8, 6]);
     }
-    const { target } = world;
     if (target.kind === "hand" && (this.held || target.goal.some((value, axis) => Math.abs(value - now[1 + axis]) > 0.05))) {
-      stroke([[now[1], now[2]], target.goal], palette.quiet, 1.5, [2, 6]);
+      this.stroke(context, [[now[1], now[2]], target.goal], palette.quiet, 1.5, [2, 6]);
     }
-    const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
-    const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
-    for (const index of shown) { /* the first one on top */
+  }
+
+  /* Trails and drones, the first on top and with the wind at it; returns the words beside them. */
+  drones(context, palette, rows, shown) {
+    const { world } = this, now = rows.at(-1), recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
+    for (const index of shown) {
       const first = FIRST + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
-      stroke(recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
+      this.stroke(context, recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
     }
-    const words = shown.map((index) => this.drone(context, palette, now, index, stroke)).reverse();
-    labels(context, palette, this.canvas, words);
-    if (this.arrow) stroke(this.arrow, palette.ink, 2.5, [2, 5]);
+    const words = shown.map((index) => this.drone(context, palette, now, index)).reverse();
+    const flying = words.find((one) => !one.lost);
+    if (flying && windSpeed(world)) words.push(windArrow(context, palette, world, flying.place));
+    return words;
   }
 
   grid(context, width, height, palette) {
@@ -99,21 +113,6 @@ class Field {
     context.fillText(`${step} m`, left + 4, y - 5);
   }
 
-  /* An arrow with the mean wind, in the upper left corner. */
-  wind(context, palette) {
-    const speed = this.world.value("wind"), way = this.world.value("towards") * Math.PI / 180, length = 8 + speed;
-    if (!speed) return;
-    const end = (angle, size) => [30 + size * Math.cos(way + angle), 30 + size * Math.sin(way + angle)];
-    Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2, fillStyle: palette.ink });
-    context.setLineDash([]);
-    context.beginPath();
-    [end(Math.PI, length), end(0, length)].forEach((point) => context.lineTo(...point));
-    [end(0.5, length - 7), end(0, length), end(-0.5, length - 7)].forEach((point, place) =>
-      (place ? context.lineTo(...point) : context.moveTo(...point)));
-    context.stroke();
-    context.fillText(`wind ${speed} m/s`, 56, 34);
-  }
-
   target(context, palette, now) {
     const [x, y] = this.pixels(now[1], now[2]);
     Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2 });
@@ -128,15 +127,15 @@ class Field {
   }
 
   /* A quadrotor, at the edge of the field if it is beyond it; a cross where it was lost. Returns what to say beside it. */
-  drone(context, palette, now, index, stroke) {
+  drone(context, palette, now, index) {
     const [x, y, , ...angles] = stateOf(now, index), one = this.world.drones[index], { title, hue } = one.entry;
     const colour = palette.hues[hue], place = inside(this.canvas, this.pixels(...(one.lost ? one.lost.place : [x, y])));
     if (one.lost) {
       cross(context, colour, place);
-      return { words: `${title} is lost: ${one.lost.why}`, colour, place };
+      return { words: `${title} is lost: ${one.lost.why}`, colour, place, lost: true };
     }
     const length = TILT_M_RAD * this.view.width / VIEW_M, [roll, pitch] = angles;
-    stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
+    this.stroke(context, [[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
     quadrotor(context, palette, colour, index + 1, place, angles);
     return { words: one.active.length ? `${title} ${one.speedWords}` : title, colour, place };
   }

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from mambo_sil.drone.plant import elementary
+from mambo_sil.drone.plant.gusts import mean_speed_m_s
 from mambo_sil.flight.height_profiles import Swing
 from mambo_sil.flight.trajectories import Bernoulli, Circle
 from tests.support import command
@@ -22,6 +23,17 @@ PHONE_PX, DESK_PX = 390, 1280
 SPACE, ARROW_RIGHT = 32, 39
 MAMBO, ONE_NORM, FEEDFORWARD, PD = range(4)
 """The drones of the page, in its order."""
+BLUE = [0, 0x67, 0xA3, 255]
+"""The colour of the first one on a light page."""
+
+PIXELS = (
+    "((canvas, ...box) => { const copy = new OffscreenCanvas(canvas.width, canvas.height)"
+    ".getContext('2d', { willReadFrequently: true }); copy.drawImage(canvas, 0, 0);"
+    " return [...copy.getImageData(...box).data]; })"
+)
+"""Pixels of a canvas in a box: left, top, width and height."""
+AXES = f"page.player.views.slice(1).map(({{ canvas }}) => {PIXELS}(canvas, 0, 0, 36, canvas.height)).join()"
+"""Those of the vertical axes of all plots."""
 
 pytestmark = pytest.mark.long
 
@@ -283,7 +295,7 @@ def test_a_lost_drone_says_why_and_starts_again(page: Page, tab: Browser) -> Non
     """Verdict and table say it, view and axes stay, and the others fly on, bit for bit."""
     others = "JSON.stringify(page.world.drones.slice(0, 3).map((drone) => [...drone.position]))"
     page.advance(6.0)
-    calm = page.find(others)
+    calm, axes = page.find(others), page.find(AXES)
     page.find("page.world.begin()")
     page.advance(2.0)
     hit = "(one) => one.push([5, 0], (page.world.updates - one.born) * page.world.data.ticks)"
@@ -292,6 +304,7 @@ def test_a_lost_drone_says_why_and_starts_again(page: Page, tab: Browser) -> Non
     assert "PD is lost: it turned over; it starts again at the target." in page.text("#verdict")
     assert page.text(f".standing tbody tr:nth-child({PD + 1}) .error") == "lost"
     assert page.find("page.player.views[0].view.wanted.width") == page.find("VIEW_M")
+    assert page.find(AXES) == axes
     page.advance(2.0)
     assert page.find(others) == calm
     page.advance(1.0)
@@ -307,6 +320,32 @@ def test_a_page_that_was_hidden_shows_the_field_again(page: Page, tab: Browser) 
         page.advance(1.0)
     assert page.find("page.player.views[0].view.width") == page.find("VIEW_M")
     assert page.find("page.player.views[0].view.centre") == [0, 0]
+
+
+def test_the_inset_shows_the_target_20_times_larger(page: Page) -> None:
+    """A drone 1 cm right of it and 2 cm below; it makes room for a target in its corner."""
+    page.find("(page.world.target.drag(0, 0), page.world.begin())")
+    page.find(f"page.world.drones[{MAMBO}].position.set([0.01, 0.02])")
+    page.find("(page.world.record(), page.player.redraw())")
+    field = "page.player.views[0]"
+    inset = "(({ left, top, size }, scale) => [left + size / 2 + 0.2 * scale, top + size / 2 + 0.4 * scale])"
+    place = f"{inset}(insetPlace({field}, [0, 0]), {field}.view.scale)"
+    assert page.find(f"{PIXELS}({field}.canvas, ...{place}, 1, 1)") == BLUE
+    assert page.find(f"insetPlace({field}, [{field}.canvas.clientWidth, 0]).left") == 8
+
+
+def test_the_arrow_of_the_wind_points_where_drones_drift(page: Page) -> None:
+    """With the mean speed at the height of a level course."""
+    page.find("page.world.target.drag(0, 0)")
+    page.slide("wind", 16)
+    for place, way in ((0, [1.0, 0.0]), (6, [0.0, 1.0])):
+        page.slide("towards", place)
+        page.find("page.world.begin()")
+        page.advance(2.0)
+        x, y = page.find(f"[...page.world.drones[{PD}].position.slice(0, 2)]")
+        assert page.find("windWay(page.world)") == pytest.approx(way)
+        assert np.dot((x, y), way) > 0.2
+    assert page.find("windSpeed(page.world)") == pytest.approx(mean_speed_m_s(np.array([8.0]), 1.1)[0])
 
 
 def test_the_verdict_names_the_closest(page: Page) -> None:

@@ -27,7 +27,8 @@ from mambo_sil.results.summary import Summary
 STYLES: Final = ("style.css", "playground.css")
 SCRIPTS: Final = (
     *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js", "view.js"),
-    *("marks.js", "field.js", "plots.js", "pointer.js", "controls.js", "playground.js"),
+    *("marks.js", "wind.js", "inset.js", "field.js", "plots.js"),
+    *("pointer.js", "controls.js", "playground.js"),
 )
 """The files of the page's script, in their order."""
 _PD_HUES: Final = {"pd": 1, "pd-feedforward": 2, "pid-feedforward": 3}
