@@ -1,9 +1,10 @@
 /* The field seen from above: target, trails and drones. A line from each drone shows where, and how much, it tilts. */
 const TRAIL_S = 3, TILT_M_RAD = 1.6, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
+const MOST_RATIO = 2; /* pixels of a canvas per CSS pixel: more are slow, and not seen */
 
 /* Resizes a canvas to its place on the page; returns its context, in CSS pixels, and its size. */
 function fit(canvas) {
-  const { clientWidth: width, clientHeight: height } = canvas, ratio = devicePixelRatio;
+  const { clientWidth: width, clientHeight: height } = canvas, ratio = Math.min(devicePixelRatio, MOST_RATIO);
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   }
@@ -39,6 +40,7 @@ class Field {
 
   draw(palette) {
     const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn;
+    this.view.measure();
     const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
     context.lineJoin = context.lineCap = "round";
     this.grid(context, width, height, palette);

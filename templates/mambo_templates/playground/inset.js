@@ -1,9 +1,9 @@
 /* The surroundings of the target, larger, in a corner of the field: each drone with its way of the last second, as seen from the target. */
-const INSET_TIMES = 20, INSET_PX = 132, INSET_SHARE = 0.3, INSET_GAP_PX = 8, INSET_TRAIL_S = 1, INSET_DOT_PX = 4, INSET_BARS_CM = [1, 2, 5, 10, 20, 50, 100];
+const INSET_TIMES = 20, INSET_PX = 132, INSET_SHARE = 0.3, INSET_GAP_PX = 8, INSET_REACH_PX = 40, INSET_TRAIL_S = 1, INSET_DOT_PX = 4, INSET_BARS_CM = [1, 2, 5, 10, 20, 50, 100];
 
 /* Its place: upper right, or upper left while the target is there. */
 function insetPlace(field, [x, y]) {
-  const width = field.canvas.clientWidth, size = Math.min(INSET_PX, INSET_SHARE * width), reach = size + 3 * INSET_GAP_PX;
+  const width = field.canvas.clientWidth, size = Math.min(INSET_PX, INSET_SHARE * width), reach = size + INSET_REACH_PX;
   return { left: x > width - reach && y < reach ? INSET_GAP_PX : width - size - INSET_GAP_PX, top: INSET_GAP_PX, size };
 }
 

@@ -9,10 +9,17 @@ const DEGREES = { marks: [0, 20, 40], share: (value) => value / 40 };
 class Plot {
   /* `value` of a row and a drone; `goal`, if there is one, of a row: where all drones are to be. */
   constructor(canvas, world, value, axis, goal = null) {
-    Object.assign(this, { canvas, world, value, axis, goal });
+    Object.assign(this, { canvas, world, value, axis, goal, palette: null, seen: true });
+    new IntersectionObserver(([{ isIntersecting }]) => {
+      this.seen = isIntersecting;
+      if (this.palette) this.draw(this.palette);
+    }).observe(canvas);
   }
 
+  /* Draws, if it is in the window; else when it comes there. */
   draw(palette) {
+    this.palette = palette;
+    if (!this.seen) return;
     const [context, width, height] = fit(this.canvas), { drawn: rows, drones } = this.world;
     const bottom = height - BOTTOM_PX, last = rows.at(-1)[0], first = Math.max(last, HISTORY_S) - HISTORY_S;
     const shown = drones.map((drone, index) => index).filter((index) => drones[index].shown).reverse();

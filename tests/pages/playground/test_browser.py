@@ -520,6 +520,20 @@ def test_nothing_is_wider_than_the_window(made: tuple[Path, Any], tab: Browser, 
     assert tab.find(heights) >= (44 if width_px == PHONE_PX else 24)
 
 
+def test_on_a_phone_the_field_stays_above_the_sliders(made: tuple[Path, Any], tab: Browser) -> None:
+    """Each one that has the focus is in the window, below the field; sliders come before plots."""
+    page = Page(tab, made[0], PHONE_PX)
+    box = "(({ top, bottom }) => [top, bottom])(document.getElementById('{0}').getBoundingClientRect())"
+    for key in ("lag", "wind"):
+        tab.find(f"document.getElementById('{key}').focus()")
+        top, bottom = page.find(box.replace("{0}", "field"))
+        assert top == 0
+        assert bottom <= 0.46 * 800
+        slider = page.find(box.replace("{0}", key))
+        assert bottom <= slider[0] < slider[1] <= 800
+    assert page.find(box.replace("{0}", "lag"))[1] < page.find(box.replace("{0}", "errors"))[0]
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
 def test_axe_finds_no_fault(made: tuple[Path, Any], tab: Browser, width_px: int, scheme: str) -> None:
