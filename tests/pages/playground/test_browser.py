@@ -520,6 +520,20 @@ def test_nothing_is_wider_than_the_window(made: tuple[Path, Any], tab: Browser, 
     assert tab.find(heights) >= (44 if width_px == PHONE_PX else 24)
 
 
+def test_the_page_is_as_light_or_dark_as_what_surrounds_it(made: tuple[Path, Any], tab: Browser) -> None:
+    """Whatever the system is, once it is told, and again; any other message is ignored."""
+    page = Page(tab, made[0])
+    papers = []
+    for told in ("dark", "light", "dark", "blue"):
+        come = "new Promise((done) => addEventListener('message', done, { once: true }))"
+        page.find(f"(postMessage('{told}', '*'), await {come}, true)")
+        papers.append(
+            page.find("[getComputedStyle(document.body).backgroundColor, page.player.palette.paper]")
+        )
+    black, white = ["rgb(20, 23, 26)", "#14171a"], ["rgb(255, 255, 255)", "#ffffff"]
+    assert papers == [black, white, black, black]
+
+
 def test_on_a_phone_the_field_stays_above_the_sliders(made: tuple[Path, Any], tab: Browser) -> None:
     """Each one that has the focus is in the window, below the field; sliders come before plots."""
     page = Page(tab, made[0], PHONE_PX)
