@@ -13,8 +13,13 @@ import pytest
 
 from mambo_sil.drone.plant import elementary
 from mambo_sil.drone.plant.gusts import mean_speed_m_s
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import Swing
-from mambo_sil.flight.trajectories import Bernoulli, Circle
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.trajectories import Bernoulli, Circle, InSpace
+from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support import command
 from tests.support.browser import Browser, browser
 from tests.support.tools import require, require_module
@@ -155,6 +160,23 @@ def test_other_drones_and_scalar_types_have_the_same_bits(
     assert float(other.find("page.world.drones[0].position[0]")) == pytest.approx(0.5, abs=0.02)
     follow_heights(other)
     assert tab.complaints == []
+
+
+def test_what_flies_on_the_page_has_the_bits_of_a_simulated_flight(
+    tab: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Update by update and with a height that swings, not only in the flight that proves the bits."""
+    require("wasm-ld", "lld")
+    monkeypatch.chdir(tmp_path)
+    command.run("design", "crazyflie", "-o", "height.toml")
+    command.run("playground", "height.toml", "pd", "--vehicle", "crazyflie")
+    page = Page(tab, tmp_path / "play.html", DESK_PX, "#swing=0.3")
+    vehicle = Vehicle.of(vehicle_toml.preset("crazyflie"))
+    flight = Flight(InSpace(Bernoulli(2.0, 0.5), Swing(0.3, 1.5)), duration_s=4.0, vehicle=vehicle)
+    page.advance(4.01)
+    for index, one in enumerate(page_controllers(["height.toml", "pd"])):
+        expected = fly(flight, one.controller(flight)).position_m[-1, 0].tolist()
+        assert page.find(f"[...page.world.drones[{index}].position]") == expected
 
 
 def follow_heights(page: Page) -> None:
