@@ -60,7 +60,14 @@ def dials(flight: Flight) -> list[Dial]:
         return {name: records[name].reshape(count, -1).tolist() for name in names}
 
     found = [
-        Dial("wind", "Wind", "m/s", steps.tolist(), 0, members(len(steps), _WIND, disturbances=windy)),
+        Dial(
+            "wind",
+            "Wind 20 ft above the ground",
+            "m/s",
+            steps.tolist(),
+            0,
+            members(len(steps), _WIND, disturbances=windy),
+        ),
         Dial(
             *("towards", direction, "\N{DEGREE SIGN}", degrees.tolist(), 6),
             members(len(degrees), ("gust_heading",), disturbances=heading),
