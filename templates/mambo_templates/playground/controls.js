@@ -8,8 +8,8 @@ const titles = (drones) => drones.map((drone) => drone.entry.title).join(", ");
 const say = (text) => { find("status").textContent = text; };
 
 /* Mean distance of a drone to the target over the history, without the time in which it was lost. */
-function meanOf(history, drone) {
-  const errors = history.map((row) => errorOf(row, drone)).filter(Number.isFinite);
+function meanOf(world, drone) {
+  const errors = world.history.map((row) => world.error(row, drone)).filter(Number.isFinite);
   return errors.reduce((sum, one) => sum + one, 0) / errors.length;
 }
 
@@ -62,7 +62,7 @@ class Controls {
     const { world } = this;
     find("target").value = world.target.kind;
     world.data.dials.forEach((dial, index) => {
-      const slider = find(dial.key), words = dial.values[world.dials[index]] + (dial.unit.length > 1 ? ` ${dial.unit}` : dial.unit);
+      const slider = find(dial.key), words = dial.values[world.dials[index]] + (/^[a-z]/.test(dial.unit) ? ` ${dial.unit}` : dial.unit);
       slider.value = world.dials[index];
       slider.setAttribute("aria-valuetext", words);
       document.querySelector(`output[for="${dial.key}"]`).textContent = words;
@@ -78,11 +78,11 @@ class Controls {
 
   /* The table's figures, and the verdict. */
   numbers() {
-    const { history, drones } = this.world, now = history.at(-1), means = drones.map((_, index) => meanOf(history, index));
+    const { history, drones } = this.world, now = history.at(-1), means = drones.map((_, index) => meanOf(this.world, index));
     this.rows.forEach((row, index) => {
       const put = (name, text) => { row.querySelector(name).textContent = text; };
       const { lost, answer } = drones[index];
-      put(".error", lost ? "lost" : answer[0] > 0n ? "refused" : distance(errorOf(now, index)));
+      put(".error", lost ? "lost" : answer[0] > 0n ? "refused" : distance(this.world.error(now, index)));
       put(".mean span", Number.isFinite(means[index]) ? distance(means[index]) : "\u2013");
       put(".tilt", lost ? "\u2013" : `${tiltOf(now, index).toFixed(0)}\u00b0`);
       row.querySelector(".bar").style.width = `${100 * Math.min(LOGARITHMIC_CM.share(100 * (means[index] || 0)), 1)}%`;

@@ -23,14 +23,8 @@ class Drone {
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
       module.at(address, [1, TARGET_COLUMNS, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
-    if (entry.lifts) this.lift(data.height_m);
-    this.setMembers("simulation", { disturbed: [1], windy: [1], sensed: [0], captured: [0] }, BigInt64Array);
-  }
-
-  /* The controller commands the thrust too, at the height of a level course. */
-  lift(height) {
-    this.inputs[1].set([height, 0, 0], LEVEL_COLUMNS);
-    this.setMembers("simulation", { lifting: [1], target_columns: [TARGET_COLUMNS] }, BigInt64Array);
+    const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], lifting: [entry.lifts] };
+    this.setMembers("simulation", flies, BigInt64Array);
   }
 
   setMembers(record, members, Kind = Float64Array) {
@@ -84,10 +78,10 @@ class Drone {
   begin(target, draws) {
     this.module.reset();
     this.sensed = false;
-    this.setMembers("flight", { body_start: [target[0], target[1]] });
+    this.setMembers("flight", { body_start: [target[0], target[1], -target[LEVEL_COLUMNS]] });
     this.setMembers("flight", { impulse_tick: [-1] }, BigInt64Array);
     this.inputs[3].set(draws);
-    this.position.set([target[0], target[1], 0]);
+    this.position.set([target[0], target[1], -target[LEVEL_COLUMNS]]);
     this.velocity.fill(0);
     this.angles.fill(0);
     this.module.calls.engine_begin(this.simulation, this.flight, this.draws, this.flying);

@@ -1,9 +1,10 @@
 /* The field seen from above: target, trails and drones. A line from each drone shows where, and how much, it tilts. */
-const TRAIL_S = 3, RADIUS_PX = 10, TILT_M_RAD = 1.6, EDGE_PX = 14, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
+const TRAIL_S = 3, TILT_M_RAD = 1.6, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
+const MOST_RATIO = 2; /* pixels of a canvas per CSS pixel: more are slow, and not seen */
 
 /* Resizes a canvas to its place on the page; returns its context, in CSS pixels, and its size. */
 function fit(canvas) {
-  const { clientWidth: width, clientHeight: height } = canvas, ratio = devicePixelRatio;
+  const { clientWidth: width, clientHeight: height } = canvas, ratio = Math.min(devicePixelRatio, MOST_RATIO);
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   }
@@ -38,36 +39,52 @@ class Field {
   }
 
   draw(palette) {
-    const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn, now = rows.at(-1);
+    const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn;
+    this.view.measure();
+    const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
     context.lineJoin = context.lineCap = "round";
     this.grid(context, width, height, palette);
-    this.wind(context, palette);
-    const stroke = (points, colour, thickness, dash = []) => {
-      Object.assign(context, { strokeStyle: colour, lineWidth: thickness });
-      context.setLineDash(dash);
-      context.beginPath();
-      points.forEach(([x, y]) => context.lineTo(...this.pixels(x, y)));
-      context.stroke();
-    };
-    stroke(rows.map((row) => [row[1], row[2]]), palette.target, 4);
+    drawStreaks(context, palette, this, width, height);
+    this.aims(context, palette, rows);
+    const words = this.drones(context, palette, rows, shown);
+    drawInset(context, palette, this, rows, shown);
+    labels(context, palette, this.canvas, words);
+    if (this.arrow) this.stroke(context, this.arrow, palette.ink, 2.5, [2, 5]);
+  }
+
+  stroke(context, points, strokeStyle, lineWidth, dash = []) {
+    Object.assign(context, { strokeStyle, lineWidth });
+    context.setLineDash(dash);
+    context.beginPath();
+    points.forEach(([x, y]) => context.lineTo(...this.pixels(x, y)));
+    context.stroke();
+  }
+
+  /* The target with its trail and the place that it glides to, and the fence. */
+  aims(context, palette, rows) {
+    const now = rows.at(-1), { target, fence } = this.world, corners = this.corners ?? (fence && [fence.slice(0, 2), fence.slice(2)]);
+    this.stroke(context, rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
-    const corners = this.corners ?? (world.fence && [world.fence.slice(0, 2), world.fence.slice(2)]);
     if (corners) {
       const [[x, y], [u, v]] = corners;
-      stroke([[x, y], [u, y], [u, v], [x, v], [x, y]], palette.ink, 2, [8, 6]);
+      this.stroke(context, [[x, y], [u, y], [u, v], [x, v], [x, y]], palette.ink, 2, [8, 6]);
     }
-    const { target } = world;
     if (target.kind === "hand" && (this.held || target.goal.some((value, axis) => Math.abs(value - now[1 + axis]) > 0.05))) {
-      stroke([[now[1], now[2]], target.goal], palette.quiet, 1.5, [2, 6]);
+      this.stroke(context, [[now[1], now[2]], target.goal], palette.quiet, 1.5, [2, 6]);
     }
-    const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
-    const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
-    for (const index of shown) { /* the first one on top */
-      const first = 3 + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
-      stroke(recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
+  }
+
+  /* Trails and drones, the first on top and with the wind at it; returns the words beside them. */
+  drones(context, palette, rows, shown) {
+    const { world } = this, now = rows.at(-1), recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
+    for (const index of shown) {
+      const first = FIRST + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
+      this.stroke(context, recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
     }
-    for (const index of shown) this.drone(context, palette, now, index, stroke);
-    if (this.arrow) stroke(this.arrow, palette.ink, 2.5, [2, 5]);
+    const words = shown.map((index) => this.drone(context, palette, now, index)).reverse();
+    const flying = words.find((one) => !one.lost);
+    if (flying && windSpeed(world)) words.push(windArrow(context, palette, world, flying.place));
+    return words;
   }
 
   grid(context, width, height, palette) {
@@ -98,25 +115,6 @@ class Field {
     context.fillText(`${step} m`, left + 4, y - 5);
   }
 
-  /* An arrow with the mean wind, in the upper left corner. */
-  wind(context, palette) {
-    const { dials } = this.world.data, value = (key) => {
-      const index = dials.findIndex((dial) => dial.key === key);
-      return dials[index].values[this.world.dials[index]];
-    };
-    const speed = value("wind"), way = value("towards") * Math.PI / 180, length = 8 + speed;
-    if (!speed) return;
-    const end = (angle, size) => [30 + size * Math.cos(way + angle), 30 + size * Math.sin(way + angle)];
-    Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2, fillStyle: palette.ink });
-    context.setLineDash([]);
-    context.beginPath();
-    [end(Math.PI, length), end(0, length)].forEach((point) => context.lineTo(...point));
-    [end(0.5, length - 7), end(0, length), end(-0.5, length - 7)].forEach((point, place) =>
-      (place ? context.lineTo(...point) : context.moveTo(...point)));
-    context.stroke();
-    context.fillText(`wind ${speed} m/s`, 56, 34);
-  }
-
   target(context, palette, now) {
     const [x, y] = this.pixels(now[1], now[2]);
     Object.assign(context, { strokeStyle: palette.ink, lineWidth: 2 });
@@ -130,44 +128,17 @@ class Field {
     context.stroke();
   }
 
-  /* A disc with the number of the table; at the edge of the field if the drone is beyond it. */
-  drone(context, palette, now, index, stroke) {
-    const [x, y, roll, pitch] = now.slice(3 + PER_DRONE * index, 3 + PER_DRONE * (index + 1));
-    const one = this.world.drones[index], colour = palette.hues[one.entry.hue], length = TILT_M_RAD * this.view.width / VIEW_M;
-    if (one.lost) return this.wreck(context, palette, one, colour, stroke);
-    stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
-    const inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
-    const [px, py] = this.pixels(x, y);
-    const [cx, cy] = [inside(px, this.canvas.clientWidth), inside(py, this.canvas.clientHeight)];
-    Object.assign(context, { fillStyle: colour, strokeStyle: palette.paper, lineWidth: 1.5, font: "bold 12px system-ui, sans-serif" });
-    context.beginPath();
-    context.arc(cx, cy, RADIUS_PX, 0, 2 * Math.PI);
-    context.fill();
-    context.stroke();
-    Object.assign(context, { fillStyle: palette.paper, textAlign: "center", textBaseline: "middle" });
-    context.fillText(index + 1, cx, cy + 0.5);
-    Object.assign(context, { textAlign: "start", textBaseline: "alphabetic" });
-    if (one.active.length) this.label(context, palette, one.speedWords, cx, cy);
-  }
-
-  /* A cross where a drone was lost, at the edge of the field if that is beyond it, and why. */
-  wreck(context, palette, drone, colour, stroke) {
-    const { clientWidth, clientHeight } = this.canvas, inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
-    const [px, py] = this.pixels(...drone.lost.place), [x, y] = [inside(px, clientWidth), inside(py, clientHeight)];
-    for (const way of [1, -1]) {
-      stroke([[-1, -way], [1, way]].map(([dx, dy]) => this.view.metres(x + RADIUS_PX * dx, y + RADIUS_PX * dy)), colour, 3);
+  /* A quadrotor, at the edge of the field if it is beyond it; a cross where it was lost. Returns what to say beside it. */
+  drone(context, palette, now, index) {
+    const [x, y, , ...angles] = stateOf(now, index), one = this.world.drones[index], { title, hue } = one.entry;
+    const colour = palette.hues[hue], place = inside(this.canvas, this.pixels(...(one.lost ? one.lost.place : [x, y])));
+    if (one.lost) {
+      cross(context, colour, place);
+      return { words: `${title} is lost: ${one.lost.why}`, colour, place, lost: true };
     }
-    context.font = "bold 12px system-ui, sans-serif";
-    this.label(context, palette, `${drone.entry.title} is lost: ${drone.lost.why}`, x, y);
-  }
-
-  /* Words beside a drone, on the side where there is room. */
-  label(context, palette, words, x, y) {
-    const room = x + 18 + context.measureText(words).width < this.canvas.clientWidth;
-    context.setLineDash([]);
-    Object.assign(context, { fillStyle: palette.ink, strokeStyle: palette.paper, lineWidth: 4, textAlign: room ? "left" : "right" });
-    context.strokeText(words, x + (room ? 18 : -18), y - 18);
-    context.fillText(words, x + (room ? 18 : -18), y - 18);
-    context.textAlign = "start";
+    const length = TILT_M_RAD * this.view.width / VIEW_M, [roll, pitch] = angles;
+    this.stroke(context, [[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
+    quadrotor(context, palette, colour, index + 1, place, angles);
+    return { words: one.active.length ? `${title} ${one.speedWords}` : title, colour, place };
   }
 }

@@ -7,8 +7,13 @@ class Player {
   constructor(world, views) {
     Object.assign(this, { world, views, playing: false, before: null, owed: 0, request: 0, drawn: -Infinity, told: -Infinity });
     this.palette = colours();
-    dark.addEventListener("change", () => { this.palette = colours(); this.redraw(); });
+    dark.addEventListener("change", () => this.recolour());
     addEventListener("resize", () => this.redraw());
+  }
+
+  recolour() {
+    this.palette = colours();
+    this.redraw();
   }
 
   /* Draws all; what stands still, or moves without motion, is looked at where it is. */
@@ -73,15 +78,25 @@ async function start() {
   const drones = await Promise.all(data.drones.map(async (entry) => new Drone(await Module.load(entry), entry, data)));
   const world = new World(drones, data), field = new Field(find("field"), world);
   const plots = [
-    new Plot(find("errors"), world, (row, drone) => 100 * errorOf(row, drone), LOGARITHMIC_CM),
+    new Plot(find("errors"), world, (row, drone) => 100 * world.error(row, drone), LOGARITHMIC_CM),
     new Plot(find("tilts"), world, tiltOf, DEGREES),
   ];
+  if (data.spatial) plots.push(new Plot(find("heights"), world, (row, drone) => stateOf(row, drone)[2], HEIGHT_M, (row) => row[3]));
   const player = new Player(world, [field, ...plots]);
   player.controls = new Controls(world, field, player);
   player.play(!still.matches);
   if (still.matches) say("Paused, since this device asks for reduced motion.");
   return { world, player, advance(seconds) { world.advance(Math.round(seconds / data.period_s)); player.controls.numbers(); player.redraw(); } };
 }
+
+/* What surrounds this page, such as the manual, may say whether it is light or dark. */
+const { media } = [...document.styleSheets[0].cssRules].find((rule) => rule.media?.mediaText === dark.media);
+addEventListener("message", ({ source, data }) => {
+  if (source !== parent || !["light", "dark"].includes(data)) return;
+  media.mediaText = data === "dark" ? "all" : "not all";
+  document.documentElement.style.colorScheme = data;
+  globalThis.playground.then(({ player }) => player.recolour());
+});
 
 /* For the console: playground.then((page) => page.advance(10)). */
 globalThis.playground = start();

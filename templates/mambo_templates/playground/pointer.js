@@ -69,7 +69,7 @@ class Pointer {
     const { world, field } = this.controls, now = world.history.at(-1);
     const away = (x, y) => Math.hypot(x - point[0], y - point[1]) * field.view.scale;
     const drones = world.drones.map((drone, index) =>
-      drone.shown ? away(now[3 + PER_DRONE * index], now[4 + PER_DRONE * index]) : Infinity);
+      drone.shown ? away(...stateOf(now, index)) : Infinity);
     const nearest = Math.min(...drones.filter(Number.isFinite));
     return nearest < NEAR_PX && nearest < away(now[1], now[2]) - 1;
   }

@@ -1,4 +1,4 @@
-/* The target: on a curve, or where it was dragged: far away at once, else with a speed and an acceleration that drones have. */
+/* The target, with its height: on a curve, or where it was dragged: far away at once, else with a speed and an acceleration that drones have. */
 const SPEED_M_S = 2, ACCELERATION_M_S2 = 2.5, APPROACH_1_S = 1.25, ADJUST_1_S = 5, REACH_M = 30, FAR_M = 4;
 
 /* Shortens a vector to a length; without Math.hypot, which may differ between browsers. */
@@ -8,10 +8,10 @@ function atMost(length, [x, y]) {
 }
 
 class Target {
-  /* The curves are computed in the module of a drone. */
-  constructor(drone, curves, period) {
-    Object.assign(this, { drone, curves, period, kind: "eight", goal: [0, 0] });
-    this.now = new Float64Array(6);
+  /* The curves are computed in the module of a drone. Its height swings about `height` by `swing`, in m. */
+  constructor(drone, data) {
+    Object.assign(this, { drone, data, kind: "eight", goal: [0, 0], height: data.height_m, swing: 0 });
+    this.now = new Float64Array(TARGET_COLUMNS);
   }
 
   /* Stands at its goal, or at the beginning of its curve. */
@@ -21,19 +21,22 @@ class Target {
     if (this.kind !== "hand") this.goal = [this.now[0], this.now[1]];
   }
 
-  /* Moves to its place at a time: x, y, vx, vy, ax, ay. */
+  /* Moves to its place at a time: x, y, vx, vy, ax, ay, height, climb, vertical acceleration. */
   at(time) {
-    if (this.kind === "hand") return this.now;
-    const { module, curve } = this.drone, compute = module.calls[`playground_${this.kind}`];
-    compute(...this.curves[this.kind], time, curve);
-    this.now.set(module.at(curve, 6));
+    const { data, drone: { module, curve } } = this;
+    if (this.kind !== "hand") {
+      module.calls[`playground_${this.kind}`](...data.curves[this.kind], time, curve);
+      this.now.set(module.at(curve, LEVEL_COLUMNS));
+    }
+    module.calls.playground_swing(this.height, this.swing, data.swing_rad_s, time, curve);
+    this.now.set(module.at(curve, TARGET_COLUMNS - LEVEL_COLUMNS), LEVEL_COLUMNS);
     return this.now;
   }
 
   /* Follows its goal for a period, if it is dragged. */
   move() {
     if (this.kind !== "hand") return;
-    const [x, y, vx, vy, ax, ay] = this.now, h = this.period;
+    const [x, y, vx, vy, ax, ay] = this.now, h = this.data.period_s;
     const [px, py, ux, uy] = [x + h * vx + h * h / 2 * ax, y + h * vy + h * h / 2 * ay, vx + h * ax, vy + h * ay];
     const wanted = atMost(SPEED_M_S, [APPROACH_1_S * (this.goal[0] - px), APPROACH_1_S * (this.goal[1] - py)]);
     const change = atMost(ACCELERATION_M_S2, [ADJUST_1_S * (wanted[0] - ux), ADJUST_1_S * (wanted[1] - uy)]);

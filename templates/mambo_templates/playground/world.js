@@ -20,12 +20,13 @@ function normals(seed) {
 class World {
   constructor(drones, data) {
     Object.assign(this, { drones, data, fence: null, dials: data.dials.map((dial) => dial.start) });
-    this.target = new Target(drones[0], data.curves, data.period_s);
+    this.target = new Target(drones[0], data);
     this.begin();
   }
 
   begin() {
     Object.assign(this, { updates: 0, history: [], impulse: null, draw: normals(1) });
+    this.lift();
     this.target.begin();
     this.first = [...this.draw(3), ...new Float64Array(3 * this.data.ticks)];
     this.drones.forEach((drone) => { drone.losses = 0; this.start(drone); });
@@ -43,7 +44,19 @@ class World {
   /* Sets a slider. */
   turn(index, place) {
     this.dials[index] = place;
+    this.lift();
     this.drones.forEach((drone) => this.apply(drone, this.data.dials[index], place));
+  }
+
+  /* What a slider says. */
+  value(key) {
+    const index = this.data.dials.findIndex((dial) => dial.key === key);
+    return this.data.dials[index].values[this.dials[index]];
+  }
+
+  /* Gives the target the height that the sliders say, if there are any. */
+  lift() {
+    if (this.data.spatial) Object.assign(this.target, { height: this.value("height"), swing: this.value("swing") });
   }
 
   /* Gives one drone what a slider says, if the slider is for it. */
@@ -100,10 +113,16 @@ class World {
     const [x, y, z] = drone.position, [roll, pitch] = drone.angles;
     const why = Math.cos(roll) * Math.cos(pitch) < 0 ? "it turned over"
       : z >= 0 ? "it hit the ground"
-      : Math.hypot(x - target[0], y - target[1]) < LOST_M ? null : `it is more than ${LOST_M} m from the target`;
+      : Math.hypot(x - target[0], y - target[1], z + target[LEVEL_COLUMNS]) < LOST_M ? null : `it is more than ${LOST_M} m from the target`;
     if (!why) return;
     drone.losses++;
     drone.lost = { why, place: drone.last, until: this.time + LOST_S };
+  }
+
+  /* Of a row of the history, the distance of a drone to the target in m; horizontal if no controller commands the height. */
+  error(row, drone) {
+    const first = FIRST + PER_DRONE * drone, above = this.data.spatial ? row[first + 2] - row[3] : 0;
+    return Math.hypot(row[first] - row[1], row[first + 1] - row[2], above);
   }
 
   /* The rows that are drawn: every fourth, the same ones from picture to picture, and the last. */
@@ -112,25 +131,27 @@ class World {
     return this.history.filter((_, place) => (first + place) % 4 === 0 || place === last);
   }
 
-  /* Keeps the last seconds for trails and plots: time, target, and of each drone x, y, roll, pitch. */
+  /* Keeps the last seconds for trails and plots: time, target, and of each drone x, y, height, roll, pitch, yaw. */
   record() {
     const { now } = this.target;
     const states = this.drones.flatMap((drone) => {
-      if (drone.lost) return [NaN, NaN, NaN, NaN];
-      const { position: [x, y], angles: [roll, pitch] } = drone;
+      if (drone.lost) return Array(PER_DRONE).fill(NaN);
+      const { position: [x, y, z], angles } = drone;
       drone.last = [x, y];
-      return [x, y, roll, pitch];
+      return [x, y, -z, ...angles];
     });
-    this.history.push([this.time, now[0], now[1], ...states]);
+    this.history.push([this.time, now[0], now[1], now[LEVEL_COLUMNS], ...states]);
     if (this.history.length > HISTORY_S / this.data.period_s) this.history.shift();
   }
 }
 
-const PER_DRONE = 4;
+const FIRST = 4, PER_DRONE = 6;
 
-/* Of a row of the history: distance of a drone to the target in m, and its tilt in degrees; NaN if it is lost. */
-const errorOf = (row, drone) => Math.hypot(row[3 + PER_DRONE * drone] - row[1], row[4 + PER_DRONE * drone] - row[2]);
+/* Of a row of the history: x, y, height, roll, pitch and yaw of a drone; all NaN if it is lost. */
+const stateOf = (row, drone) => row.slice(FIRST + PER_DRONE * drone, FIRST + PER_DRONE * (drone + 1));
+
+/* Its tilt in degrees. */
 const tiltOf = (row, drone) => {
-  const [roll, pitch] = row.slice(5 + PER_DRONE * drone, 7 + PER_DRONE * drone);
+  const first = FIRST + PER_DRONE * drone, [roll, pitch] = [row[first + 3], row[first + 4]];
   return Math.acos(Math.cos(roll) * Math.cos(pitch)) * 180 / Math.PI;
 };

@@ -1,171 +1,17 @@
-"""The playground in a real browser: the same bits, a target that is followed, and controls for all."""
+"""The playground in a real browser: a target that is followed, and controls for all."""
 
 import json
-import re
-from base64 import b64decode, b64encode
-from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from mambo_sil.drone.plant import elementary
-from mambo_sil.flight.trajectories import Bernoulli, Circle
-from tests.support import command
-from tests.support.browser import Browser, browser
-from tests.support.tools import require, require_module
+from tests.support.browser import Browser
+from tests.support.playground import DESK_PX, FEEDFORWARD, MAMBO, PD, PHONE_PX, Page
 
-PHONE_PX, DESK_PX = 390, 1280
 SPACE, ARROW_RIGHT = 32, 39
-MAMBO, ONE_NORM, FEEDFORWARD, PD = range(4)
-"""The drones of the page, in its order."""
 
 pytestmark = pytest.mark.long
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
-    """Return the default page and its summary."""
-    require("clang", "clang")
-    require("wasm-ld", "lld")
-    page = tmp_path_factory.mktemp("playground") / "play.html"
-    return page, json.loads(command.run("playground", "-o", str(page), "--json")[0])
-
-
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Return a tab of a browser for all tests of this file."""
-    with browser(tmp_path_factory.mktemp("profile")) as one:
-        yield one
-
-
-class Page:
-    """The playground in a tab, which stands still until it is advanced."""
-
-    def __init__(self, tab: Browser, page: Path, width_px: int = DESK_PX, fragment: str = "") -> None:
-        self._tab = tab
-        tab.open(page, width_px, fragment, prefers_reduced_motion="reduce")
-        self.find("true")
-
-    def find(self, expression: str) -> Any:
-        """Return the value of an expression of `page`, what the page's script offers, when it is ready."""
-        return self._tab.find(f"playground.then(async (page) => ({expression}))")
-
-    def advance(self, seconds: float) -> None:
-        """Fly on."""
-        self.find(f"page.advance({seconds})")
-
-    def error_m(self, drone: int) -> float:
-        """Return the distance of a drone to the target now."""
-        return float(self.find(f"errorOf(page.world.history.at(-1), {drone})"))
-
-    def target(self) -> list[float]:
-        """Return the position of the target now."""
-        return list(self.find("[...page.world.target.now.slice(0, 2)]"))
-
-    def pixels(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place of a point of the field in the window."""
-        place = "const box = page.player.views[0].canvas.getBoundingClientRect()"
-        found = self._tab.find(
-            f"playground.then((page) => {{ {place}; const [x, y] = page.player.views[0].pixels({x}, {y});"
-            " return [box.x + x, box.y + y]; })"
-        )
-        return found[0], found[1]
-
-    def slide(self, key: str, place: int) -> None:
-        """Move a slider."""
-        self._tab.find(
-            f'{{ const slider = document.getElementById("{key}"); slider.value = {place};'
-            ' slider.dispatchEvent(new Event("input")); }'
-        )
-
-    def text(self, selector: str) -> str:
-        """Return the text of an element."""
-        return str(self._tab.find(f'document.querySelector("{selector}").textContent'))
-
-
-@pytest.fixture
-def page(made: tuple[Path, Any], tab: Browser) -> Page:
-    """Return the page at a desk, at its start."""
-    return Page(tab, made[0])
-
-
-def test_the_browser_flies_the_bits_of_the_native_engine(made: tuple[Path, Any], page: Page) -> None:
-    """The digest of each flight in the browser is that which the command printed."""
-    here = page.find('proveAll(JSON.parse(document.getElementById("data").textContent))')
-    assert here == [one["trace_sha256"] for one in made[1]["controllers"]]
-    assert "The same bits" in page.text("#proof")
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("height.toml", "crazyflie", "pd", "--vehicle", "crazyflie"),
-        ("fixed.toml", "double.toml", "one-norm.toml", "--vehicle", "mambo"),
-    ],
-)
-def test_other_drones_and_scalar_types_have_the_same_bits(
-    arguments: tuple[str, ...], tab: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another attitude loop, a controller of the height, fixed point and float64; each also flies."""
-    require("wasm-ld", "lld")
-    monkeypatch.chdir(tmp_path)
-    for name, preset, scalar in (
-        ("fixed", "mambo", "fixed"),
-        ("double", "mambo", "float64"),
-        ("one-norm", "mambo-1norm", "fixed"),
-    ):
-        command.run("init", preset, "-o", f"{name}.toml")
-        text = Path(f"{name}.toml").read_text("utf-8")
-        changed = re.sub(r'^scalar = "\w+"', f'scalar = "{scalar}"', text, flags=re.MULTILINE)
-        assert changed != text
-        Path(f"{name}.toml").write_text(changed, "utf-8")
-    command.run("design", "crazyflie", "-o", "height.toml")
-    command.run("playground", *arguments, "-o", "other.html")
-    other = Page(tab, tmp_path / "other.html")
-    assert "The same bits" in other.text("#proof")
-    other.advance(8.0)
-    assert other.error_m(0) < 0.15
-    other.find("page.world.target.drag(0, 0)")
-    other.find(
-        "(page.world.begin(), page.world.enclose([-0.5, -0.5, 0.5, 0.5]), page.world.target.drag(1.2, 0))"
-    )
-    other.advance(5.0)
-    assert float(other.find("page.world.drones[0].position[0]")) == pytest.approx(0.5, abs=0.02)
-    assert tab.complaints == []
-
-
-@pytest.mark.parametrize(("drone", "place"), [(MAMBO, "constant"), (PD, "constant"), (ONE_NORM, "header")])
-def test_a_flipped_byte_is_not_the_same_bits(
-    made: tuple[Path, Any], tab: Browser, tmp_path: Path, drone: int, place: str
-) -> None:
-    """The ninth digit of a coefficient of the sine, or a module that does not load."""
-    text = made[0].read_text("utf-8")
-    data = json.loads(text.partition('id="data">')[2].partition("</script>")[0])
-    wasm = b64decode(data["drones"][drone]["wasm"])
-    sine = np.float64(elementary.SINE[0]).tobytes()
-    changed = sine if place == "constant" else wasm[:8]
-    flipped = wasm.replace(changed, changed[:3] + bytes([changed[3] ^ 1]) + changed[4:])
-    (tmp_path / "flipped.html").write_text(
-        text.replace(b64encode(wasm).decode(), b64encode(flipped).decode()), "utf-8"
-    )
-    tab.open(tmp_path / "flipped.html", DESK_PX)
-    tab.find("playground.catch(() => null).then(() => null)")
-    assert "Not the same bits" in str(tab.find('document.getElementById("proof").textContent'))
-    marks = tab.find('[...document.querySelectorAll(".here")].map((cell) => cell.textContent[0])')
-    assert marks == ["✗" if index == drone else "✓" for index in range(4)]
-
-
-def test_the_curves_are_those_of_the_simulation(page: Page) -> None:
-    """Eight and circle have the bits of trajectories.py, velocity and acceleration included."""
-    times = [0.0, 0.01, 1.0, 3.14, 12.5, 1000.01]
-    for kind, curve in (("eight", Bernoulli(2.0, 0.5)), ("circle", Circle(1.2, 0.8))):
-        page.find(f'page.world.target.kind = "{kind}"')
-        found = page.find(f"{times}.map((time) => [...page.world.target.at(time)])")
-        expected = np.concatenate([curve.target(times), curve.acceleration(times)], axis=-1)
-        assert found == expected.tolist()
 
 
 @pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
@@ -243,39 +89,6 @@ def test_a_drawn_fence_keeps_the_drone_inside(made: tuple[Path, Any], tab: Brows
     other = Page(tab, made[0], PHONE_PX, fragment)
     assert other.find("page.world.fence") == pytest.approx([-1.0, -1.0, 1.0, 1.0], abs=0.02)
     assert tab.complaints == []
-
-
-def test_a_lost_drone_says_why_and_starts_again(page: Page, tab: Browser) -> None:
-    """Verdict and table say it, view and axes stay, and the others fly on, bit for bit."""
-    others = "JSON.stringify(page.world.drones.slice(0, 3).map((drone) => [...drone.position]))"
-    page.advance(6.0)
-    calm = page.find(others)
-    page.find("page.world.begin()")
-    page.advance(2.0)
-    hit = "(one) => one.push([5, 0], (page.world.updates - one.born) * page.world.data.ticks)"
-    page.find(f"({hit})(page.world.drones[{PD}])")
-    page.advance(2.0)
-    assert "PD is lost: it turned over; it starts again at the target." in page.text("#verdict")
-    assert page.text(f".standing tbody tr:nth-child({PD + 1}) .error") == "lost"
-    assert page.find("page.player.views[0].view.wanted.width") == page.find("VIEW_M")
-    page.advance(2.0)
-    assert page.find(others) == calm
-    page.advance(1.0)
-    assert page.error_m(PD) < 1.0
-    assert "PD was lost once." in page.text("#verdict")
-    assert tab.complaints == []
-
-
-def test_the_verdict_names_the_closest(page: Page) -> None:
-    """Distances in cm, the others as multiples, and a longer bar for a larger distance."""
-    page.advance(20.0)
-    verdict = page.text("#verdict")
-    assert re.match(
-        r"mambo(-1norm)? is closest: \d\.\d cm from the target in the mean of the last 10 s, ", verdict
-    )
-    assert re.search(r"PD \d+ times as far", verdict)
-    widths = page.find("[...document.querySelectorAll('.bar')].map((bar) => bar.clientWidth)")
-    assert 0 < widths[MAMBO] < widths[FEEDFORWARD] < widths[PD]
 
 
 def test_the_keyboard_fences_the_target(page: Page, tab: Browser) -> None:
@@ -392,60 +205,3 @@ def test_wind_noise_and_lag_disturb_every_flight(page: Page) -> None:
         flown = json.loads(page.find(states))
         assert all(one != other for one, other in zip(calm, flown, strict=True)), key
         page.slide(key, 0)
-
-
-def test_a_picture_takes_a_bounded_number_of_updates(page: Page) -> None:
-    """A minute without pictures, as in a tab in the background, is not flown at once."""
-    begin = "page.player.playing = true, page.player.frame(0), page.before = page.world.updates"
-    end = "page.player.frame(60000), page.player.playing = false, page.world.updates - page.before"
-    assert page.find(f"({begin}, {end})") == 10
-
-
-def test_reduced_motion_waits_and_draws_once_a_second(page: Page) -> None:
-    """Nothing moves until it is asked to, and then there is one picture a second."""
-    assert not page.find("page.player.playing")
-    assert "reduced motion" in page.text("#status")
-    drawn = page.find(
-        "(page.player.playing = true, Array.from({ length: 151 }, (_, n) => "
-        "(page.player.frame(1e6 + 20 * n), page.player.drawn - 1e6)))"
-    )
-    page.find("page.player.playing = false")
-    assert sorted(set(drawn)) == [0, 1000, 2000, 3000]
-
-
-def test_it_flies_by_itself_where_motion_is_welcome(made: tuple[Path, Any], tab: Browser) -> None:
-    """Picture after picture, without a request, until it is paused."""
-    tab.open(made[0], DESK_PX)
-    frames = "for (let n = 0; n < 20; n++) await new Promise(requestAnimationFrame)"
-    updates = f"playground.then(async (page) => {{ {frames}; return page.world.updates; }})"
-    assert tab.find(updates) > 0
-    tab.find('document.getElementById("pause").click()')
-    held = tab.find(updates)
-    assert tab.find(updates) == held
-    assert tab.complaints == []
-    assert tab.requests == [made[0].as_uri()]
-
-
-@pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
-def test_nothing_is_wider_than_the_window(made: tuple[Path, Any], tab: Browser, width_px: int) -> None:
-    """Fingers find the controls on a phone."""
-    Page(tab, made[0], width_px).advance(3.0)
-    assert tab.find("document.documentElement.scrollWidth") <= width_px
-    beyond = "[...document.querySelectorAll('.scroll')].map((one) => one.scrollWidth - one.clientWidth)"
-    assert tab.find(beyond) == [0, 0]
-    controls = "button, select, input[type=range], label:has(input)"
-    heights = f"Math.min(...[...document.querySelectorAll('{controls}')].map((one) => one.offsetHeight))"
-    assert tab.find(heights) >= (44 if width_px == PHONE_PX else 24)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
-def test_axe_finds_no_fault(made: tuple[Path, Any], tab: Browser, width_px: int, scheme: str) -> None:
-    """Not one of those that it calls serious or critical."""
-    require_module("axe_core_python")
-    tab.open(made[0], width_px, prefers_color_scheme=scheme)
-    tab.find("playground.then((page) => page.player.play(false))")
-    tab.find(resources.files("axe_core_python").joinpath("axe.min.js").read_text("utf-8") + "; null")
-    found = tab.find("axe.run().then((all) => JSON.stringify(all.violations))")
-    grave = [one for one in json.loads(found) if one["impact"] in ("serious", "critical")]
-    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in grave] == []

@@ -26,6 +26,7 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 SLOW = "[horizon]\nupdate_period_s = 0.02\n"
 MAMBO, CRAZYFLIE = vehicle_toml.preset("mambo"), vehicle_toml.preset("crazyflie")
+PDS = page_controllers(["pd"])
 
 
 def run(*arguments: str, code: int = 0) -> tuple[str, str]:
@@ -52,6 +53,14 @@ def test_the_page_holds_everything_and_says_what_it_flies() -> None:
     assert all(one["trace_sha256"] in page for one in summary["controllers"])
     for outside in ("http:", "https:", "src=", "@import", "url("):
         assert outside not in page, outside
+
+
+def test_the_height_of_the_proof_swings_where_a_controller_commands_the_thrust() -> None:
+    """For all controllers of that page; else the flight is level."""
+    assert proof_flight(MAMBO, PDS).given_targets.shape[2] == 6
+    command.run("design", "crazyflie", "-o", "height.toml")
+    spatial = proof_flight(CRAZYFLIE, page_controllers(["pd", "height.toml"])).given_targets
+    assert np.ptp(spatial[:, 0, 6]) == pytest.approx(0.6, abs=1e-3)
 
 
 def test_the_same_command_writes_the_same_page() -> None:
@@ -123,7 +132,7 @@ def test_the_c_of_the_page_compiles_without_a_warning(tmp_path: Path) -> None:
 
 def test_a_slider_writes_what_a_flight_with_its_value_has() -> None:
     """Each position of the slider of the motor lag, and the one where it starts."""
-    flight = calm(proof_flight(MAMBO, 0.01))
+    flight = calm(proof_flight(MAMBO, PDS))
     by_key = {dial.key: dial for dial in dials(flight)}
     own = flight_records(flight, np.zeros((1, 4)))[0]
     for dial in by_key.values():
@@ -132,7 +141,7 @@ def test_a_slider_writes_what_a_flight_with_its_value_has() -> None:
             if member != "gust_heading":
                 assert rows[dial.start] == np.ravel(own[member]).tolist(), member
     assert by_key["lag"].values[by_key["lag"].start] == 0.0
-    lagging = {dial.key: dial for dial in dials(calm(proof_flight(CRAZYFLIE, 0.01)))}["lag"]
+    lagging = {dial.key: dial for dial in dials(calm(proof_flight(CRAZYFLIE, PDS)))}["lag"]
     assert lagging.values[lagging.start] == 1000.0 * CRAZYFLIE.motor_lag_s
 
 

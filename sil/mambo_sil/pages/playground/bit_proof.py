@@ -1,5 +1,6 @@
 """The flight that proves the bits: the engine of this machine flies it, and every page when it loads."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -16,14 +17,18 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.flight.engine.records import Record, flight_records, simulation_record
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.height_profiles import Swing
 from mambo_sil.flight.loop import Flight
-from mambo_sil.flight.trajectories import Bernoulli
-from mambo_sil.pages.playground.page_controllers import PageController
+from mambo_sil.flight.trajectories import Bernoulli, InSpace
+from mambo_sil.pages.playground.page_controllers import PageController, period_s
 
 DURATION_S: Final = 4.0
 HALF_WIDTH_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
 """The eight of Table II."""
+SWING_M: Final = 0.3
+SWING_RAD_S: Final = 1.5
+"""The height of the proof's target, where a controller of the page commands the thrust."""
 _SEED: Final = 0
 _WIND: Final = Disturbances(
     wind_speed_m_s=4.0, wind_direction_rad=1.0, impulse_n_s=(0.02, -0.03, 0.0), impulse_time_s=1.5
@@ -35,7 +40,7 @@ class ProofInputs:
     """What the engine reads for one flight, besides its records."""
 
     targets: FloatArray
-    """(updates, 6)."""
+    """(updates, 6), with heights (updates, 9)."""
     sensors: FloatArray
     """Random numbers (ticks, 6)."""
     gusts: FloatArray
@@ -51,13 +56,17 @@ def motion_capture(drone: VehicleFile) -> MotionCapture:
     return MotionCapture(sensors)
 
 
-def proof_flight(drone: VehicleFile, period_s: float) -> Flight:
-    """Return an eight in gusts, with an impulse and motion capture; raises FlightError."""
+def proof_flight(drone: VehicleFile, found: Sequence[PageController]) -> Flight:
+    """Return an eight in gusts, with an impulse and motion capture; raises FlightError.
+
+    If one of the controllers commands the thrust, the height of the eight swings, for all of them.
+    """
+    eight, spatial = Bernoulli(HALF_WIDTH_M, RATE_RAD_S), any(one.lifts for one in found)
     return Flight(
-        Bernoulli(HALF_WIDTH_M, RATE_RAD_S),
+        InSpace(eight, Swing(SWING_M, SWING_RAD_S)) if spatial else eight,
         duration_s=DURATION_S,
         vehicle=Vehicle.of(drone),
-        update_period_s=period_s,
+        update_period_s=period_s(found),
         seeds=(_SEED,),
         disturbances=_WIND,
         sensors=motion_capture(drone),

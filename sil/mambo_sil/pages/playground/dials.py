@@ -13,9 +13,12 @@ from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.flight.engine.records import flight_records
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
 
 _WIND: Final = ("gust_mean_m_s", "gust_sigma_m_s", "gust_decay", "gust_x", "gust_roots")
+_HEIGHTS_M: Final = tuple(number / 10.0 for number in range(8, 31))
+_SWINGS_M: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 _FACTORS: Final = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 
 
@@ -57,7 +60,14 @@ def dials(flight: Flight) -> list[Dial]:
         return {name: records[name].reshape(count, -1).tolist() for name in names}
 
     found = [
-        Dial("wind", "Wind", "m/s", steps.tolist(), 0, members(len(steps), _WIND, disturbances=windy)),
+        Dial(
+            "wind",
+            "Wind 20 ft above the ground",
+            "m/s",
+            steps.tolist(),
+            0,
+            members(len(steps), _WIND, disturbances=windy),
+        ),
         Dial(
             *("towards", direction, "\N{DEGREE SIGN}", degrees.tolist(), 6),
             members(len(degrees), ("gust_heading",), disturbances=heading),
@@ -69,6 +79,14 @@ def dials(flight: Flight) -> list[Dial]:
         decays = members(len(lags_s), ("rotor_decay",), vehicle=lagging)
         found.append(Dial("lag", "Motor lag", "ms", lags_ms, own, decays))
     return found
+
+
+def height_dials() -> list[Dial]:
+    """Return the sliders of the target's height, which change no record."""
+    return [
+        Dial("height", "Height of the target", "m", list(_HEIGHTS_M), _HEIGHTS_M.index(HOVER_HEIGHT_M), {}),
+        Dial("swing", "Swing of its height (\N{PLUS-MINUS SIGN})", "m", list(_SWINGS_M), 0, {}),
+    ]
 
 
 def weight_dial(settings: Settings, title: str, drone: int) -> Dial:

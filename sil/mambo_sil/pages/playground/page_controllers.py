@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.errors import FlightError
@@ -30,6 +31,11 @@ class PageController:
     def title(self) -> str:
         """The name on the page: of a file or folder without the folders above it."""
         return PD_TITLES.get(self.source, echo(Path(self.source).resolve().name))
+
+    @property
+    def lifts(self) -> bool:
+        """Whether it commands the thrust too."""
+        return isinstance(self.kind, Settings) and method_of(self.kind).has_height
 
     def controller(self, flight: Flight) -> CompiledController | AnyPd:
         """Return the controller of a single flight for this machine; raises BuildError, CacheError."""

@@ -11,6 +11,7 @@ engine_controller_t playground_controller(void);
 size_t playground_flying_bytes(void);
 void playground_eight(double half_width_m, double rate_rad_s, double time_s, double *target);
 void playground_circle(double radius_m, double rate_rad_s, double time_s, double *target);
+void playground_swing(double height_m, double amplitude_m, double rate_rad_s, double time_s, double *vertical);
 
 engine_controller_t playground_controller(void)
 {
@@ -59,4 +60,18 @@ void playground_circle(double radius_m, double rate_rad_s, double time_s, double
     target[3] = rate_rad_s * target[0];
     target[4] = -square * target[0];
     target[5] = -square * target[1];
+}
+
+/* Swing of sil/mambo_sil/flight/height_profiles.py likewise, about any height: height, climb, vertical acceleration. */
+void playground_swing(double height_m, double amplitude_m, double rate_rad_s, double time_s, double *vertical)
+{
+    double sine;
+    double cosine;
+    double swing;
+
+    sine_cosine(rate_rad_s * time_s, &sine, &cosine);
+    swing = amplitude_m * sine;
+    vertical[0] = height_m + swing;
+    vertical[1] = (amplitude_m * rate_rad_s) * cosine;
+    vertical[2] = -(rate_rad_s * rate_rad_s) * swing;
 }

@@ -16,9 +16,10 @@ from mambo_sil.flight.engine.engine_library import ffi, record_type
 from mambo_sil.flight.engine.native import pd_function
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.trajectories import is_spatial
 from mambo_sil.pages.playground import bit_proof
-from mambo_sil.pages.playground.dials import Dial, dials, weight_dial
-from mambo_sil.pages.playground.page_controllers import PageController, period_s
+from mambo_sil.pages.playground.dials import Dial, dials, height_dials, weight_dial
+from mambo_sil.pages.playground.page_controllers import PageController
 from mambo_sil.pages.playground.wasm_build import module
 from mambo_sil.results.html_page import render_page
 from mambo_sil.results.summary import Summary
@@ -26,7 +27,8 @@ from mambo_sil.results.summary import Summary
 STYLES: Final = ("style.css", "playground.css")
 SCRIPTS: Final = (
     *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js", "view.js"),
-    *("field.js", "plots.js", "pointer.js", "controls.js", "playground.js"),
+    *("marks.js", "wind.js", "inset.js", "field.js", "plots.js"),
+    *("pointer.js", "controls.js", "playground.js"),
 )
 """The files of the page's script, in their order."""
 _PD_HUES: Final = {"pd": 1, "pd-feedforward": 2, "pid-feedforward": 3}
@@ -68,7 +70,7 @@ def playground_page(
 
     Raises FlightError if the drone and the update period do not fit, BuildError and CacheError.
     """
-    flight = bit_proof.proof_flight(drone, period_s(found))
+    flight = bit_proof.proof_flight(drone, found)
     flown, drones = [], []
     for number, (one, hue) in enumerate(zip(found, _hues(found), strict=True)):
         wasm, digest = module(one), bit_proof.native_digest(flight, one)
@@ -85,6 +87,7 @@ def playground_page(
         "data": _simulation(flight) | {"drones": drones, "dials": [asdict(dial) for dial in sliders]},
         "flown": list(zip(drones, flown, strict=True)),
         "dials": sliders,
+        "spatial": is_spatial(flight.trajectory),
         "vehicle": drone.name,
         "duration_s": bit_proof.DURATION_S,
         "generator": PlaygroundSummary.model_fields["generator"].default,
@@ -105,24 +108,27 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
         for number, one in enumerate(found)
         if isinstance(one.kind, Settings) and method_of(one.kind).weight_limits
     ]
-    return [*dials(bit_proof.calm(flight)), *weights]
+    heights = height_dials() if is_spatial(flight.trajectory) else []
+    return [*heights, *dials(bit_proof.calm(flight)), *weights]
 
 
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
     """Return title, type of the C's numbers, and in base64 the record of a law without a model.
 
     `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `lifts`: whether it
-    commands the thrust, and reads the height of its target.
+    commands the thrust, and reads the height of its target. `walls`: floor and ceiling in m, if it has them.
     """
     if isinstance(one.kind, Settings):
         method = method_of(one.kind)
+        fence = one.kind.limits.fence
         metre = method.numbers.quantize(np.ones(1), ("position",)).item() if method.limiting else None
         return {
             "title": one.title,
             "scalar": one.kind.code.scalar,
             "constants": None,
             "metre": metre,
-            "lifts": method.has_height,
+            "lifts": one.lifts,
+            "walls": (fence.floor_m, fence.ceiling_m) if fence.floor_m < fence.ceiling_m else (),
         }
     constants = pd_function(pd_controller(one.kind, flight))[1]
     return {
@@ -131,6 +137,7 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
         "constants": _text(bytes(ffi.buffer(constants))),
         "metre": None,
         "lifts": False,
+        "walls": (),
     }
 
 
@@ -141,6 +148,7 @@ def _simulation(flight: Flight) -> dict[str, Any]:
     read = bit_proof.inputs(flight)
     return {
         "period_s": flight.update_period_s,
+        "spatial": is_spatial(flight.trajectory),
         "height_m": HOVER_HEIGHT_M,
         "ticks": flight.ticks_per_update,
         "offsets": {
@@ -150,6 +158,7 @@ def _simulation(flight: Flight) -> dict[str, Any]:
         "simulation": _text(quiet_simulation.tobytes()),
         "flight": _text(quiet.tobytes()),
         "curves": {"eight": (bit_proof.HALF_WIDTH_M, bit_proof.RATE_RAD_S), "circle": _CIRCLE},
+        "swing_rad_s": bit_proof.SWING_RAD_S,
         "proof": {
             "updates": len(read.targets),
             "simulation": _text(simulation.tobytes()),

@@ -21,6 +21,7 @@ from mambo_sil.results.cache import build_cached
 ENGINE_CALLS: Final = (
     *("engine_begin", "engine_update", "engine_start_sensors", "engine_fly"),
     *("playground_controller", "playground_flying_bytes", "playground_eight", "playground_circle"),
+    "playground_swing",
     "__heap_base",
 )
 """What the page calls in every module; it puts its records behind __heap_base."""
