@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.experiment.margins.controller_jacobian import linear_controller
@@ -90,6 +91,20 @@ def test_linear_controller_commands_what_the_c_commands() -> None:
         rest, sent = numbers_of(controller.step(np.stack([np.zeros(10), state]), target, told))
         assert system.c @ memory + system.d @ state[:9] == pytest.approx(sent - rest, rel=1e-3, abs=1e-8)
         memory = system.a @ memory + system.b @ state[:9]
+
+
+def test_the_gain_of_a_thrust_is_an_inverse_load() -> None:
+    """Of a drone that gets 0.8 of the demanded thrust: the height sees it, roll and pitch in hover do not."""
+    text = VEHICLES.text("crazyflie-flown") + "\n[thrust]\nlag_s = 0.06\n"
+    full, weak = (
+        Vehicle.of(vehicle_toml.parse(text + gain, "mine", "mine.toml")) for gain in ("", "gain = 0.8\n")
+    )
+    for settings, axis, factor in (
+        (height_settings(learn="none"), HEIGHT, 0.8),
+        (preset("crazyflie"), 0, 1.0),
+    ):
+        found, expected = (margins_of(settings, one)[axis].command.gain_up for one in (weak, full))
+        assert found == pytest.approx(expected / factor, rel=1e-4)
 
 
 @pytest.mark.usefixtures("in_an_empty_folder")
