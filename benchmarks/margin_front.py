@@ -25,7 +25,6 @@ from mambo_codegen.settings.presets import preset
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_file import Campaign, Entrant, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
-from mambo_sil.experiment.margins.controller_jacobian import linear_controller
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.scenario import flight_of
@@ -102,9 +101,6 @@ def read() -> list[dict[str, Any]]:
 
 def _judge(settings: Settings, campaign: Campaign, flights: int, measured: int) -> dict[str, Any]:
     """Return what drawn drones fly with settings, and what their loops through the sensors stand."""
-    controller = linear_controller(settings)
-    if controller is None:
-        raise ValueError("the settings have no linear law")
     rows: list[dict[str, Any]] = []
     damping: list[float] = []
     for first in range(0, flights, BATCH):
@@ -112,7 +108,7 @@ def _judge(settings: Settings, campaign: Campaign, flights: int, measured: int) 
         rows += fly_scenarios([Entrant("c", "nmpc", settings)], scenarios)
         if first < measured:
             flight = flight_of(scenarios, settings.horizon.update_period_s)
-            for loops in hover_loops(controller, flight):
+            for loops in hover_loops(settings, flight):
                 axes = measure_loops(loops, flight, count=FREQUENCIES)
                 damping.append(min(axis.poles.least_damping for axis in axes))
     crashed = np.array([row["c_crashed"] for row in rows]) > 0

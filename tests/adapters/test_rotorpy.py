@@ -60,6 +60,18 @@ def test_each_flight_starts_afresh(made: Callable[[], Controller]) -> None:
     assert (adapter.update(0.0, state, flat)["cmd_q"] == first["cmd_q"]).all()
 
 
+@pytest.mark.parametrize(
+    ("ground", "height_m", "idle"), [(True, 0.0, True), (True, 0.1, False), (False, 0.0, False)]
+)
+def test_a_drone_on_the_ground_idles(ground: bool, height_m: float, idle: bool) -> None:
+    """If the vehicle has one: without, height 0 is a height as others."""
+    adapter = RotorpyController(Controller.from_vehicle("crazyflie", age_s=0.0), 0.03, enable_ground=ground)
+    here = np.array([0.0, 0.0, height_m])
+    state = {"x": here, "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0])}
+    thrust_n = adapter.update(0.0, state, {"x": here, "x_dot": np.zeros(3)})["cmd_thrust"]
+    assert (thrust_n < 0.03 * 3.0) == idle
+
+
 @pytest.mark.long
 def test_wrong_arguments_are_refused() -> None:
     """By name."""

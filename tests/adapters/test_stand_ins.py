@@ -94,6 +94,18 @@ def test_a_crazyflow_simulation_gets_its_attitude_commands(controller: Callable[
     assert (then[[0, 2], :, 2] > first[[0, 2], :, 2]).all()
 
 
+def test_drones_on_the_floor_of_crazyflow_idle_until_they_shall_climb() -> None:
+    """At -1 mm, where crazyflow holds them, and at rest; one that sinks there still flies."""
+    made = Controller.from_vehicle("crazyflie", 3, age_s=0.0)
+    at_rest = states(3, 1)
+    at_rest["position"] = np.array([[[0.0, 0.0, -0.001]], [[0.0, 0.0, 0.001]], [[0.0, 0.0, 0.02]]])
+    at_rest["velocity"] = np.array([[[0.0, 0.0, 0.0]], [[0.0, 0.0, -0.3]], [[0.0, 0.0, 0.0]]])
+    for height_m, idle in ((0.0, [True, False, False]), (1.0, [False] * 3)):
+        pilot = CrazyflowPilot(simulation(3, 1), made, curve("hover"), height_m=height_m, yaw_rad=0.0)
+        thrust_m_s2 = pilot.command(np.zeros((3, 1)), **at_rest)[:, 0, 3] / MASS_KG
+        assert (thrust_m_s2 < 3.0).tolist() == idle
+
+
 def test_a_crazyflow_simulation_that_does_not_fit_is_refused() -> None:
     """By number of drones, or by frequency."""
     controller = Controller.from_vehicle("crazyflie", 2)
@@ -116,7 +128,7 @@ class DSLPIDControl:
         self.control_counter = 0
 
     def _getURDFParameter(self, parameter_name: str) -> float:  # noqa: N802 - its name
-        return {"m": MASS_KG}[parameter_name]
+        return {"m": MASS_KG, "length": 0.025, "collision_z_offset": 0.0}[parameter_name]
 
     def computeControl(  # noqa: N802 - its name
         self, control_timestep: float, cur_pos: Any, cur_quat: Any, cur_vel: Any, target_pos: Any, **more: Any
@@ -157,6 +169,17 @@ def test_a_base_control_gets_thrust_and_attitude() -> None:
     after = control.computeControl(0.01, here, turned, rest, there, target_rpy=heading)[1]
     assert (again != angles).any()
     np.testing.assert_array_equal(after, angles)
+
+
+@pytest.mark.usefixtures("_pybullet")
+@pytest.mark.parametrize(("height_m", "idle"), [(0.0125, True), (0.02, True), (0.03, False)])
+def test_a_base_control_on_the_floor_idles(height_m: float, idle: bool) -> None:
+    """PyBullet gives the middle of the body: it lies on the floor at half its length, here 12.5 mm."""
+    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", age_s=0.0))
+    here = np.array([0.0, 0.0, height_m])
+    pwm = control.computeControl(0.01, here, LEVEL, np.zeros(3), here)[0]
+    thrust_n = 4.0 * KF * (pwm * control.PWM2RPM_SCALE + control.PWM2RPM_CONST) ** 2
+    assert (thrust_n < 3.0 * MASS_KG) == idle
 
 
 @pytest.mark.long

@@ -108,6 +108,11 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
         ({"tilt_rad": 0.2, "braking_m_s2": 9.0}, "braking_m_s2 = 9.0"),
         ({"fence_m": (0.0, 1.0)}, r"fence_m: has shape \(2,\); it must be \(4,\)"),
         ({"fence_m": (1.0, -1.0, -1.0, 1.0)}, r"fence_m: x_max_m = -1\.0 must be more than 1\.0"),
+        ({"floor_m": 0.5}, r"ceiling_m = 0\.0 must be more than 0\.5 \(floor_m\)"),
+        ({"ceiling_m": -1.0}, r"ceiling_m = -1\.0 must be more than 0"),
+        ({"climb_m_s": 0.0}, r"climb_m_s = 0\.0 must lie in"),
+        ({"descent_m_s": 20.0}, r"descent_m_s = 20\.0 must"),
+        ({"ceiling_m": True}, "ceiling_m = True must be no truth value"),
         ({"height": "firm"}, 'height = "firm" must be "stock" or "feedforward" or "pid"'),
         ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "acceleration"'),
     ],
@@ -122,6 +127,10 @@ def test_what_does_not_fit_together_is_refused() -> None:
     """An age with a 1-norm, a height without a drone, x and y where x, y, z are needed."""
     with pytest.raises(ArgumentError, match=r'age_s = 0\.0 has no use with cost\.norm = "1-norm"'):
         Controller.from_preset("mambo-1norm", age_s=0.0)
+    limits: dict[str, Any] = {"floor_m": 1.0, "ceiling_m": 1.0, "climb_m_s": 1.0, "descent_m_s": 1.0}
+    for name, value in limits.items():
+        with pytest.raises(ArgumentError, match=rf"{name} = 1\.0 has no use without \[height\]"):
+            Controller.from_preset("crazyflie", **{name: value})
     with pytest.raises(ArgumentError, match="height = 'pid' must have a vehicle beside it"):
         Controller.from_preset("crazyflie", height="pid")
     with pytest.raises(ArgumentError, match=r"vehicle = 3 must be the path of a vehicle\.toml, or one of cr"):

@@ -1,13 +1,16 @@
 """Controllers with the height as a third axis, from a program."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.controller_toml import to_toml
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import curve
+from mambo_sil.api.options import ControllerOptions
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import CurveName
@@ -64,6 +67,22 @@ def thrust_of(pilot: Controller, target: TargetState, state: DroneState | None =
     thrust = pilot.step(state or STATE, target).thrust_m_s2
     assert thrust is not None
     return float(thrust)
+
+
+def test_limits_of_the_height_are_arguments(tmp_path: Path) -> None:
+    """Floor, ceiling, climb and descent are those keys of the settings, from drone and file; 3 m become 2."""
+    (tmp_path / "c.toml").write_text(to_toml(height_settings()), "utf-8")
+    options: ControllerOptions = {"floor_m": 0.5, "ceiling_m": 2.0, "climb_m_s": 1.0, "descent_m_s": 0.5}
+    pilot = Controller.from_file(tmp_path / "c.toml", **options)
+    for made in (pilot, Controller.from_vehicle("crazyflie", **options)):
+        fence, height = made.settings.limits.fence, made.settings.height
+        assert (fence.floor_m, fence.ceiling_m, fence.x_max_m) == (0.5, 2.0, 0.0)
+        assert height is not None
+        assert (height.climb_m_s, height.descent_m_s) == (1.0, 0.5)
+    below = DroneState([0.0, 0.0, -1.99], np.zeros(3), np.zeros(3))
+    at, over = (TargetState([0.0, 0.0, -height_m], np.zeros(3)) for height_m in (2.0, 3.0))
+    pilots = (pilot, Controller.from_file(tmp_path / "c.toml", **options))
+    assert thrust_of(pilots[0], at, below) == thrust_of(pilots[1], over, below)
 
 
 @pytest.mark.first_is_quick

@@ -252,6 +252,31 @@ def test_the_heading_turns_from_the_measured_one(version: str, tmp_path: Path) -
     unit.close()
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_delivered_thrust_is_told_once_in_a_communication_step(version: str, tmp_path: Path) -> None:
+    """As by nmpc_set_thrust before its first period; 0 means as commanded, out of range changes nothing."""
+    settings = SUBJECTS["height"]
+    unit = Unit(unpacked(built(settings, tmp_path) / f"nmpc_fmi{version}.fmu", tmp_path), version, settings)
+    alone, untold = CompiledController(settings), CompiledController(settings)
+    period_s = settings.horizon.update_period_s
+    state, target = np.zeros((1, 10)), np.zeros((1, 9))
+    assert unit.read("thrust_delivered") == [0.0]
+    assert max(unit.reference.values()) == unit.reference["thrust_delivered"]
+    unit.write(target_height=0.05)
+    target[0, 6] = 0.05
+    for thrust_m_s2, periods in ((0.0, 1), (12.0, 1), (12.0, 2), (1e6, 1), (0.0, 3)):
+        unit.write(thrust_delivered=thrust_m_s2)
+        unit.advance(periods * period_s)
+        if thrust_m_s2:
+            alone.set_thrust([thrust_m_s2])
+        for _ in range(periods):
+            commanded = alone.step(state, target).thrust_m_s2.tolist()
+            otherwise = untold.step(state, target).thrust_m_s2.tolist()
+        assert unit.read("thrust_command") == commanded
+    assert commanded != otherwise
+    unit.close()
+
+
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", [*SUBJECTS, "fixed", "fixed height"])
 def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp_path: Path) -> None:

@@ -38,7 +38,8 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
 
     A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place
     are 6 parameters. A height has 5 inputs and an output in place of the thrust, an input for a given
-    acceleration, and 4 limits. The heading has an input, a parameter and an output.
+    acceleration, and 4 limits. The heading has an input, a parameter and an output. The last one of a height
+    is the delivered thrust.
     """
     ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
 
@@ -109,6 +110,7 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
             *("yaw_command", "output", "rad", -YAW_LIMIT_RAD, YAW_LIMIT_RAD, 0.0),
             "set-point of the heading, on the shortest way from the measured one",
         ),
+        *_thrust_delivered(settings),
     ]
     return tuple(variables)
 
@@ -157,6 +159,15 @@ def _thrust_command(settings: Settings) -> list[FmuVariable]:
         return []
     range_m_s2 = (height.thrust_min_m_s2, height.thrust_max_m_s2)
     return [FmuVariable("thrust_command", "output", "m/s2", *range_m_s2, GRAVITY_M_S2, "thrust over mass")]
+
+
+def _thrust_delivered(settings: Settings) -> list[FmuVariable]:
+    """Return the input that tells what a mixer made of the last thrust; none without a height."""
+    if settings.height is None:
+        return []
+    most_m_s2 = settings.ranges.thrust_acceleration_max_m_s2
+    words = "thrust over mass that the motors were given since the last step; 0: as commanded"
+    return [FmuVariable("thrust_delivered", "input", "m/s2", 0.0, most_m_s2, 0.0, words)]
 
 
 def _height_limits(settings: Settings, values: list[float]) -> list[FmuVariable]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.adapters import packages
+from mambo_nmpc.adapters.contact import touches_floor
 from mambo_nmpc.curves import Trajectory, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion
@@ -50,8 +51,8 @@ class CrazyflowPilot:
         now = sample(self._trajectory, step / self._freq_hz, "NWU", height_m=self._height_m)
         position_m, velocity_m_s, acceleration_m_s2 = (np.broadcast_to(part, (*batch, 3)) for part in now)
         goal = TargetState.in_frame("NWU", position_m, velocity_m_s, acceleration_m_s2, self._yaw_rad)
-        attitude = attitude_of_quaternion(np.asarray(quaternion))
-        state = DroneState.in_frame("NWU", np.asarray(position), np.asarray(velocity), attitude)
+        seen = np.asarray(position), np.asarray(velocity), attitude_of_quaternion(np.asarray(quaternion))
+        state = DroneState.in_frame("NWU", *seen, touches_floor(*seen[:2]))
         outcome = self._controller.step(state, goal)
         return outcome.attitude_thrust("NWU", mass_kg=self._mass_kg).astype(np.float32)
 

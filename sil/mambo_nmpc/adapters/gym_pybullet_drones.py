@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mambo_nmpc.adapters import packages
+from mambo_nmpc.adapters.contact import touches_floor
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.api.states import DroneState, TargetState
@@ -50,7 +51,9 @@ def pybullet_control(drone_model: Any, controller: Controller) -> Any:
             if abs(control_timestep - controller.update_period_s) > 1e-6:
                 rule = f"be {controller.update_period_s:g}, the update period of the controller"
                 raise ArgumentError(f"control_timestep = {control_timestep!r} must {rule}")
-            state = DroneState.in_frame("NWU", cur_pos, cur_vel, attitude_of_quaternion(cur_quat))
+            length_m, offset_m = map(self._getURDFParameter, ("length", "collision_z_offset"))
+            contact = touches_floor(cur_pos, cur_vel, length_m / 2.0 - offset_m)
+            state = DroneState.in_frame("NWU", cur_pos, cur_vel, attitude_of_quaternion(cur_quat), contact)
             target = TargetState.in_frame("NWU", target_pos, target_vel, yaw_rad=float(target_rpy[2]))
             mass_kg = float(self._getURDFParameter("m"))
             command = controller.step(state, target).attitude_thrust("NWU", mass_kg=mass_kg)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mambo_nmpc.adapters.contact import touches_floor
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.api.states import DroneState, TargetState
@@ -17,15 +18,16 @@ class RotorpyController:
     """What `rotorpy.environments.Environment` and `simulate` call at every step, instead of `SE3Control`.
 
     The rate of the simulation is that of the controller: `sim_rate=100` for one with steps of 10 ms.
+    With `enable_ground` the vehicle has the ground of that argument of `Multirotor`, at height 0.
     Raises ArgumentError for a controller of several drones, or another mass than a number.
     """
 
-    def __init__(self, controller: Controller, mass_kg: float) -> None:
+    def __init__(self, controller: Controller, mass_kg: float, *, enable_ground: bool = False) -> None:
         require_kind("controller", controller, Controller, "a Controller")
         require_number("mass_kg", mass_kg, 0.001, 1000.0)
         if controller.n != 1:
             raise ArgumentError(f"controller: was made for {controller.n} drones; RotorPy simulates one")
-        self._controller, self._mass_kg = controller, mass_kg
+        self._controller, self._mass_kg, self._enable_ground = controller, mass_kg, enable_ground
 
     def update(self, t: float, state: Mapping[str, Any], flat_output: Mapping[str, Any]) -> dict[str, Any]:
         """Return the commands for the vehicle: `cmd_thrust` in N and the attitude `cmd_q` [x, y, z, w].
@@ -37,7 +39,9 @@ class RotorpyController:
         """
         if t == 0.0:
             self._controller.reset()
-        seen = DroneState.in_frame("NWU", state["x"], state["v"], attitude_of_quaternion(state["q"]))
+        contact = self._enable_ground & touches_floor(state["x"], state["v"])
+        attitude = attitude_of_quaternion(state["q"])
+        seen = DroneState.in_frame("NWU", state["x"], state["v"], attitude, contact)
         goal = TargetState.in_frame(
             "NWU",
             flat_output["x"],

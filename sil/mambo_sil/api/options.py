@@ -4,7 +4,6 @@ from typing import Any, Final, Literal, TypedDict
 
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.arguments import of_shape, require, require_choice
 from mambo_sil.errors import ArgumentError
@@ -26,6 +25,14 @@ class ControllerOptions(TypedDict, total=False):
     """Deceleration with which the drone approaches a target or a wall (`limits.braking_m_s2`)."""
     fence_m: tuple[float, float, float, float]
     """Least and largest x, least and largest y (`[limits.fence]`), north and east."""
+    floor_m: float
+    """Least height (`limits.fence.floor_m`), with `[height]`; a ceiling belongs to it."""
+    ceiling_m: float
+    """Largest height (`limits.fence.ceiling_m`), with `[height]`; alone with a floor at 0."""
+    climb_m_s: float
+    """Largest speed upwards (`height.climb_m_s`), with `[height]`."""
+    descent_m_s: float
+    """Largest speed downwards (`height.descent_m_s`), with `[height]`."""
     height: AltitudeName
     """The altitude loop that commands the thrust where the settings have no `[height]`: "stock",
     "feedforward" or "pid"."""
@@ -37,6 +44,10 @@ KEYS: Final = {
     "tilt_rad": "limits.tilt_rad",
     "speed_m_s": "limits.speed_m_s",
     "braking_m_s2": "limits.braking_m_s2",
+    "floor_m": "limits.fence.floor_m",
+    "ceiling_m": "limits.fence.ceiling_m",
+    "climb_m_s": "height.climb_m_s",
+    "descent_m_s": "height.descent_m_s",
 }
 """Keys of a controller.toml by the name of the argument."""
 WALLS: Final = tuple(f"limits.fence.{wall}" for wall in ("x_min_m", "x_max_m", "y_min_m", "y_max_m"))
@@ -45,7 +56,7 @@ WALLS: Final = tuple(f"limits.fence.{wall}" for wall in ("x_min_m", "x_max_m", "
 def with_options(settings: Settings, options: ControllerOptions) -> Settings:
     """Return `settings` with the options, but for `height`.
 
-    Raises ArgumentError for an unknown option, one that the cost has no use for, and all broken rules.
+    Raises ArgumentError for an unknown option, one that these settings do not use, and all broken rules.
     """
     values: dict[str, object] = {}
     for name, value in options.items():
@@ -54,9 +65,8 @@ def with_options(settings: Settings, options: ControllerOptions) -> Settings:
             walls = of_shape("fence_m", value, (len(WALLS),)).tolist()
             values |= dict(zip(WALLS, walls, strict=True))
         elif name in KEYS:
-            if not settings.uses(KEYS[name]):
-                norm = spell(settings.cost.norm)
-                raise ArgumentError(f"{name} = {value!r} has no use with cost.norm = {norm}")
+            if (unmet := settings.unmet(KEYS[name])) is not None:
+                raise ArgumentError(f"{name} = {value!r} has no use {unmet}")
             require(not isinstance(value, bool), name, value, "be no truth value")
             values[KEYS[name]] = value
     if not values:

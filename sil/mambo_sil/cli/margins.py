@@ -83,10 +83,9 @@ def _corners(subject: "MarginSubject") -> "Many":
     from mambo_sil.experiment.margins.many_drones import corner_drones
     from mambo_sil.experiment.margins.margins_run import Many
 
-    period_s = subject.settings.horizon.update_period_s
     return Many(
         "at the ends of the intervals in [uncertainty]",
-        lambda controller: corner_drones(controller, subject.drone, subject.sensors, period_s),
+        lambda: corner_drones(subject.settings, subject.drone, subject.sensors),
     )
 
 
@@ -100,11 +99,10 @@ def _measure_drawn(
     from mambo_sil.experiment.margins.margins_run import Many, measure
 
     demand_flyable(subject.settings, drawing.flight, drawing.draw(0), echo(subject.source))
-    period_s = subject.settings.horizon.update_period_s
     with counting_bar("measuring", "drones", drones) as bar:
         many = Many(
             f"the first that campaign {echo(named)} draws",
-            lambda controller: campaign_drones(controller, drawing, drones, period_s, bar),
+            lambda: campaign_drones(subject.settings, drawing, drones, bar),
         )
         return measure(subject, many, output)
 

@@ -10,7 +10,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.presets import names, preset
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.experiment.margins.controller_jacobian import linear_controller
+from mambo_sil.experiment.margins.controller_jacobian import has_linear_law, linear_controller
 from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians, repeating_ticks
 from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, BY_PUSH, PLACE, SENT
 from mambo_sil.experiment.margins.hover_margins import hover_loops
@@ -19,7 +19,6 @@ from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover
-from tests.support.hover import linear
 
 SEEN: list[tuple[str, SensorsName]] = [
     ("mambo", "none"),
@@ -33,7 +32,7 @@ LINEAR = ["mambo", "crazyflie"]
 def test_linear_controller_commands_what_the_c_commands(name: str) -> None:
     """From the start at hover, 100 steps of small random states give the same commands to 1e-9 rad."""
     settings = with_option(preset(name), "code.scalar", "float64")
-    system, controller = linear(settings), CompiledController(settings)
+    system, controller = linear_controller(settings), CompiledController(settings)
     memory = np.zeros(len(system.a))
     states = 1e-4 * np.random.default_rng(5).standard_normal((100, 7))
     states[:100, 6] = 0.0
@@ -46,7 +45,7 @@ def test_linear_controller_commands_what_the_c_commands(name: str) -> None:
 
 def test_a_1_norm_is_no_linear_system() -> None:
     """Presets with a 1-norm have none; there are both kinds."""
-    found = {name: linear_controller(preset(name)) is not None for name in names()}
+    found = {name: has_linear_law(preset(name)) for name in names()}
     assert found == {name: preset(name).cost.norm == "quadratic" for name in names()}
     assert {True, False} == set(found.values())
 
@@ -73,7 +72,7 @@ def test_response_to_a_push_is_that_of_a_flight(
         disturbances=Disturbances(push_m_s2=(push_m_s2, 0.0)),
     )
     trace = fly(flight, CompiledController(settings))
-    (loops,) = hover_loops(linear(settings), dataclasses.replace(flight, disturbances=Disturbances()))
+    (loops,) = hover_loops(settings, dataclasses.replace(flight, disturbances=Disturbances()))
     loop, ticks = loops[1], flight.ticks_per_update
     state, moved = np.zeros(loop.transition.shape[1]), []
     for tick in range(ticks * (len(trace.time_s) - 1) + 1):
@@ -102,7 +101,7 @@ def test_axes_are_separate_and_small() -> None:
     flight = Flight(Hover(), vehicle=vehicle, sensors=choose_sensors("mambo-derotated", vehicle.drone))
     found = drone_jacobians(flight)
     assert found.outputs.shape == (1, 10, 11, 108)
-    (loops,) = hover_loops(linear(preset("mambo")), flight)
+    (loops,) = hover_loops(preset("mambo"), flight)
     for loop in loops:
         assert loop.transition.shape[1] <= 35
         assert loop.response(np.array([1.0]))[0, SENT, AT_COMMAND] != 0.0

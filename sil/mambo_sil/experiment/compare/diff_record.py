@@ -10,7 +10,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, StepAnswer
 from mambo_sil.experiment.compare.control_terms import AxisLaw, ObserverGains, axis_laws, observer_gains
-from mambo_sil.experiment.margins.axis_margins import AxisMargins
+from mambo_sil.experiment.margins.axis_margins import Margins
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.results.summary import Summary
 
@@ -29,14 +29,17 @@ class SettingDifference(BaseModel):
 
 
 class ControllerFigures(BaseModel):
-    """One controller; what is by axis has roll and pitch. A 1-norm has no law, no observer, no margins."""
+    """One controller; what is by axis has roll and pitch, margins also the height.
+
+    A 1-norm has no law, no observer, no margins.
+    """
 
     model_config = ConfigDict(frozen=True)
 
     instance_bytes: int
     law: tuple[AxisLaw, AxisLaw] | None
     observer: ObserverGains | None
-    margins: list[AxisMargins] | None
+    margins: list[Margins] | None
     """With the true state; None if no linear margin applies."""
     step: tuple[StepAnswer, StepAnswer]
     eight: EightAnswer

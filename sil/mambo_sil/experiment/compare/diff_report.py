@@ -8,7 +8,7 @@ from mambo_codegen.settings.key import spell
 from mambo_sil.experiment.compare.compared_flights import EIGHT_S, SETTLED_SHARE, STEP_M
 from mambo_sil.experiment.compare.control_terms import AXES
 from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
-from mambo_sil.experiment.margins.axis_margins import AxisMargins
+from mambo_sil.experiment.margins.axis_margins import Margins
 from mambo_sil.results.number_format import distance, three_digits_or_dash
 from mambo_sil.results.terminal import sentence, table
 
@@ -46,7 +46,8 @@ def _answer(figures: ControllerFigures | None) -> str:
     if eight.crashed:
         return "; CRASHED on the eight"
     answer = f"; {distance(eight.iae_m_s / EIGHT_S)} in the mean"
-    delays_s = [axis.loops["command"].delay_s for axis in figures.margins or ()]
+    commands = [axis.command for axis in figures.margins or ()]
+    delays_s = [0.0 if command is None else command.delay_s for command in commands]
     return f"{answer}, tolerates {1e3 * min(delays_s):.0f} ms more delay" if delays_s else answer
 
 
@@ -92,7 +93,7 @@ def figure_rows(one: ControllerFigures) -> Iterator[Row]:
     yield "size of nmpc_t", one.instance_bytes, "bytes"
 
 
-def _margin_rows(axis: AxisMargins) -> Iterator[Row]:
+def _margin_rows(axis: Margins) -> Iterator[Row]:
     """Yield the margins of an axis, broken at the command and, if it has motors, at their torque."""
     for place, loop in axis.loops.items():
         where = "" if place == "command" else " at the motors"

@@ -1,6 +1,7 @@
 """One axis of a controller on a drone: margins, poles, gains from gust and noise."""
 
 import math
+from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -11,10 +12,10 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.margins.hover_loop import (
     AT_COMMAND,
     AT_MOTORS,
-    BY_NOISE,
     BY_PUSH,
     BY_SEEN,
     PLACE,
+    SEEN_OF,
     SENT,
     TURNING,
     PeriodicLoop,
@@ -23,8 +24,11 @@ from mambo_sil.experiment.margins.hover_loop import (
 from mambo_sil.experiment.margins.loop_margins import LoopMargins, measure_loop
 from mambo_sil.results.summary import Number
 
-AxisName = Literal["roll", "pitch"]
-AXES: Final[tuple[AxisName, AxisName]] = ("roll", "pitch")
+TiltName = Literal["roll", "pitch"]
+TILT_AXES: Final[tuple[TiltName, TiltName]] = ("roll", "pitch")
+HeightName = Literal["height"]
+AxisName = TiltName | HeightName
+AXES: Final[tuple[AxisName, ...]] = (*TILT_AXES, "height")
 PlaceName = Literal["command", "motors"]
 PLACES: Final[dict[PlaceName, str]] = {"command": "the command", "motors": "the motors' torque"}
 """Where a loop is broken, in words."""
@@ -61,11 +65,11 @@ class NoiseGain(BaseModel):
 
 
 class AxisMargins(BaseModel):
-    """One axis; without margins if its loop is unstable, and without `motors` on a drone that has none."""
+    """Roll or pitch; without margins if the loop is unstable, without `motors` on a drone that has none."""
 
     model_config = ConfigDict(frozen=True)
 
-    axis: AxisName
+    axis: TiltName
     stable: bool
     command: LoopMargins | None
     """Broken at the command of the position controller."""
@@ -87,6 +91,50 @@ class AxisMargins(BaseModel):
         return {name: one for name, one in found.items() if one is not None}
 
 
+class HeightMargins(BaseModel):
+    """The height; without margins if its loop is unstable.
+
+    It is broken at the command only: no loop of the drone lies between it and the motors.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    axis: HeightName = "height"
+    stable: bool
+    command: LoopMargins | None
+    """Broken at the commanded thrust."""
+    motors: None = None
+    poles: Poles
+    gust_to_place_s2: Number
+    """As of `AxisMargins`; the acceleration is a vertical one."""
+    gust_to_thrust: Number
+    """Largest commanded thrust over mass over the amplitude of that acceleration."""
+    noise: dict[Literal["position", "velocity"], NoiseGain]
+    sensed_variation_m_s2: Number | None
+    """As of `AxisMargins`, of the commanded thrust over mass."""
+
+    @property
+    def loops(self) -> dict[str, LoopMargins]:
+        """The margins by the place where the loop is broken."""
+        return {} if self.command is None else {"command": self.command}
+
+
+Margins = AxisMargins | HeightMargins
+
+
+@dataclass(frozen=True)
+class _Figures:
+    """What all axes have in common; infinity where a figure has no bound in an unstable loop."""
+
+    stable: bool
+    command: LoopMargins | None
+    poles: Poles
+    gust_to_place: float
+    gust_to_command: float
+    noise: list[NoiseGain]
+    sensed_variation: float | None
+
+
 def frequencies(loop: PeriodicLoop, update_period_s: float, count: int) -> tuple[FloatArray, FloatArray]:
     """Return frequencies up to those of half an update's rate, and of half a tick's."""
     limits = math.pi / update_period_s, math.pi / loop.step_s
@@ -95,39 +143,69 @@ def frequencies(loop: PeriodicLoop, update_period_s: float, count: int) -> tuple
 
 
 def measure_axis(
-    loop: PeriodicLoop, axis: int, update_period_s: float, *, motors: bool, count: int = 400
+    loop: PeriodicLoop, axis: TiltName, update_period_s: float, *, motors: bool, count: int = 400
 ) -> AxisMargins:
-    """Return the figures of a loop of `axis_loop`; `count` is the number of frequencies."""
+    """Return the figures of the loop of roll or pitch; `count` is the number of frequencies."""
+    found = _measure(loop, TILT_AXES.index(axis), update_period_s, count)
+    at_motors = None
+    if found.stable and motors:
+        _, ticks = frequencies(loop, update_period_s, count)
+        at_motors = measure_loop(choose(loop, [AT_MOTORS], [TURNING]), ticks, update_period_s)
+    return AxisMargins(
+        axis=axis,
+        stable=found.stable,
+        command=found.command,
+        motors=at_motors,
+        poles=found.poles,
+        gust_to_place_s2=found.gust_to_place,
+        gust_to_command_rad_s2_m=found.gust_to_command,
+        noise=dict(zip(("position", "velocity", "angle"), found.noise, strict=True)),
+        sensed_variation_rad=found.sensed_variation,
+    )
+
+
+def measure_height(loop: PeriodicLoop, update_period_s: float, *, count: int = 400) -> HeightMargins:
+    """Return the figures of the loop of the height; `count` is the number of frequencies."""
+    found = _measure(loop, len(TILT_AXES), update_period_s, count)
+    return HeightMargins(
+        stable=found.stable,
+        command=found.command,
+        poles=found.poles,
+        gust_to_place_s2=found.gust_to_place,
+        gust_to_thrust=found.gust_to_command,
+        noise=dict(zip(("position", "velocity"), found.noise, strict=True)),
+        sensed_variation_m_s2=found.sensed_variation,
+    )
+
+
+def _measure(loop: PeriodicLoop, axis: int, update_period_s: float, count: int) -> _Figures:
+    """Return the figures of a loop of `axis_loop`."""
     updates, ticks = frequencies(loop, update_period_s, count)
+    noise = BY_SEEN + len(SEEN_OF[axis])
     poles = measure_poles(choose(loop, [AT_COMMAND, AT_MOTORS], [SENT, TURNING]))
     stable = poles.growth_1_s < GROWTH_1_S
     answer = loop.response(ticks)
     magnitude = np.abs(answer)
     slow = ticks <= updates[-1]
-    at_update = loop.response(updates)[:, [PLACE, SENT], BY_SEEN]
+    at_update = loop.response(updates)[:, [PLACE, SENT], BY_SEEN:noise]
     rms = _rms(at_update, updates * update_period_s)
-    variation_rad = None
-    if answer.shape[2] > BY_NOISE:
+    variation = None
+    if answer.shape[2] > noise:
         change = 1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s)
-        by_noise_rad = _rms(answer[:, SENT, BY_NOISE:] * change, ticks * loop.step_s)
-        variation_rad = float(np.linalg.norm(by_noise_rad)) if stable else math.inf
-    at_command, at_motors = choose(loop, [AT_COMMAND], [SENT]), choose(loop, [AT_MOTORS], [TURNING])
-    return AxisMargins(
-        axis=AXES[axis],
-        stable=stable,
-        command=measure_loop(at_command, updates, update_period_s) if stable else None,
-        motors=measure_loop(at_motors, ticks, update_period_s) if stable and motors else None,
-        poles=poles,
-        gust_to_place_s2=float(magnitude[slow, PLACE, BY_PUSH].max()) if stable else math.inf,
-        gust_to_command_rad_s2_m=float(magnitude[slow, SENT, BY_PUSH].max()) if stable else math.inf,
-        noise={
-            name: NoiseGain(
-                to_place=rms[0, column] if stable else math.inf,
-                to_command=rms[1, column] if stable else math.inf,
-            )
-            for column, name in enumerate(("position", "velocity", "angle"))
-        },
-        sensed_variation_rad=variation_rad,
+        by_noise = _rms(answer[:, SENT, noise:] * change, ticks * loop.step_s)
+        variation = float(np.linalg.norm(by_noise)) if stable else math.inf
+    at_command = choose(loop, [AT_COMMAND], [SENT])
+    return _Figures(
+        stable,
+        measure_loop(at_command, updates, update_period_s) if stable else None,
+        poles,
+        float(magnitude[slow, PLACE, BY_PUSH].max()) if stable else math.inf,
+        float(magnitude[slow, SENT, BY_PUSH].max()) if stable else math.inf,
+        [
+            NoiseGain(to_place=place, to_command=command)
+            for place, command in (rms.T if stable else np.full_like(rms.T, math.inf)).tolist()
+        ],
+        variation,
     )
 
 

@@ -11,18 +11,22 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import flown, numbers_of
 
 _SETTLING_STEPS: Final = 100
+_LEARNING_S: Final = 10.0
+"""Time in which a controller of the height learns the thrust of hover of a drone."""
 _CHANGE: Final = 1e-6
 """Change of one number of memory or input; the law is linear there, so only rounding depends on it."""
-_STATE_NUMBERS: Final = 7
 
 
 @dataclass(frozen=True, eq=False)
 class LinearController:
     """A controller at hover, at its target: memory' = a memory + b state, command = c memory + d state.
 
-    a (k, k), b (k, 7), c (2, k), d (2, 7); the state is [x, y, vx, vy, roll, pitch, yaw], as it is seen.
+    a (k, k), b (k, 7), c (2, k), d (2, 7); the state is [x, y, vx, vy, roll, pitch, yaw], as it is seen, and
+    the command roll and pitch. With a height b (k, 9), c (3, k), d (3, 9): the state ends with height and
+    climb, the command with the thrust over mass.
     """
 
     a: FloatArray
@@ -31,38 +35,73 @@ class LinearController:
     d: FloatArray
 
 
-def linear_controller(settings: Settings) -> LinearController | None:
-    """Return the C of `settings` with scalar type float64 as a linear system; None if its law is not smooth.
+def has_linear_law(settings: Settings) -> bool:
+    """Return whether the command is a smooth function of the state."""
+    return method_of(settings).linear_law is not None
 
+
+def linear_controller(settings: Settings, load: float = 1.0) -> LinearController:
+    """Return the C of `settings`, whose law must be linear, with scalar type float64 as a linear system.
+
+    `load` is the thrust over mass that a drone needs to hover, over g; only controllers of the height see it.
     Raises BuildError, CacheError.
     """
-    if method_of(settings).linear_law is None:
-        return None
     settings = with_option(settings, "code.scalar", "float64")
     settled = CompiledController(settings)
-    stored = 0
-    for _ in range(_SETTLING_STEPS):
-        stored = _step(settled, np.zeros((1, _STATE_NUMBERS))).stored.shape[1]
-    changed = stored + _STATE_NUMBERS
+    state, target = _hover(settings)
+    if settings.height is None:
+        stored = 0
+        for _ in range(_SETTLING_STEPS):
+            stored = _step(settled, state, target).stored.shape[1]
+    else:
+        state, stored = _learn(settled, state, target, load)
+    seen = state.shape[1] - (settings.height is not None)  # contact with the floor is yes or no
+    changed = stored + seen
     many = CompiledController(settings, 2 * changed)
     many.instances[:] = settled.instances
     changes = np.repeat(np.eye(changed), 2, axis=0) * np.tile([[_CHANGE], [-_CHANGE]], (changed, 1))
     _numbers(many, stored)[:] += changes[:, :stored]
-    outcome = _step(many, changes[:, stored:])
+    states = np.repeat(state, len(changes), axis=0)
+    states[:, :seen] += changes[:, stored:]
+    outcome = _step(many, states, target)
     memory, command = (
         ((after[0::2] - after[1::2]) / (2.0 * _CHANGE)).T
-        for after in (_numbers(many, stored), outcome.command_rad)
+        for after in (_numbers(many, stored), numbers_of(outcome))
     )
     return LinearController(memory[:, :stored], memory[:, stored:], command[:, :stored], command[:, stored:])
 
 
-def _step(controller: CompiledController, state: FloatArray) -> Any:
-    """Step controllers whose target is the origin, at hover thrust; with a height it is 0, too."""
-    if controller.settings.height is not None:
-        heights = np.zeros((controller.n, 3))
-        return controller.step(np.concatenate([state, heights], axis=1), np.zeros((controller.n, 9)))
-    target, thrust = np.zeros((controller.n, 6)), np.full(controller.n, GRAVITY_M_S2)
-    return controller.step(state, target, thrust)
+def _hover(settings: Settings) -> tuple[FloatArray, FloatArray]:
+    """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), in a fence midway."""
+    if settings.height is None:
+        return np.zeros((1, 7)), np.zeros((1, 6))
+    state, target, fence = np.zeros((1, 10)), np.zeros((1, 9)), settings.limits.fence
+    state[:, 7] = target[:, 6] = (fence.floor_m + fence.ceiling_m) / 2.0
+    return state, target
+
+
+def _learn(
+    controller: CompiledController, state: FloatArray, target: FloatArray, load: float
+) -> tuple[FloatArray, int]:
+    """Let a controller hold the height of a point mass that needs a load; return its state and all it stores.
+
+    The point mass is at its target then, but for a controller that learns nothing.
+    """
+    state, period_s, stored = state.copy(), controller.settings.horizon.update_period_s, 0
+    for _ in range(round(_LEARNING_S / period_s)):
+        outcome = _step(controller, state, target)
+        stored = outcome.stored.shape[1]
+        lift_m_s2 = outcome.thrust_m_s2[0] / load - GRAVITY_M_S2
+        state[:, 7] += period_s * (state[:, 8] + 0.5 * period_s * lift_m_s2)
+        state[:, 8] += period_s * lift_m_s2
+    return state, stored
+
+
+def _step(controller: CompiledController, state: FloatArray, target: FloatArray) -> Any:
+    """Step controllers with one target, at hover thrust; with a height at the thrust that they commanded."""
+    n = controller.n
+    thrust_m_s2 = np.full(n, GRAVITY_M_S2 if controller.settings.height is None else np.nan)
+    return flown(controller).step(state, np.repeat(target, n, axis=0), thrust_m_s2)
 
 
 def _numbers(controller: CompiledController, stored: int) -> FloatArray:

@@ -11,8 +11,13 @@ Ends = Mapping[str, int]
 """Of each property with an interval: -1 for its lower end, 1 for its upper end, 0 for the value itself."""
 
 _KEYS: Final = {
-    "gain": ("attitude.roll.gain", "attitude.pitch.gain", "attitude.acceleration_per_tilt_g"),
-    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s"),
+    "gain": (
+        "attitude.roll.gain",
+        "attitude.pitch.gain",
+        "attitude.acceleration_per_tilt_g",
+        "thrust.gain",
+    ),
+    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s", "thrust.lag_s"),
     "dead_time_s": ("attitude.roll.dead_time_s", "attitude.pitch.dead_time_s"),
     "drag_1_s": ("body.drag_1_s",),
 }
@@ -22,6 +27,14 @@ Keys of one property go to the same end: those of one axis multiply, and the axe
 """
 _RANGES: Final = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}
 _RANGE: Final = (0.1, 3.0)
+
+
+def uncertain(drone: VehicleFile, *, height: bool) -> VehicleFile:
+    """Return a drone with the intervals on which margins depend: those of the thrust only with a height."""
+    if drone.uncertainty is None or height:
+        return drone
+    known = drone.uncertainty.model_copy(update={"thrust_gain": None, "thrust_lag_s": None})
+    return drone.model_copy(update={"uncertainty": known})
 
 
 def intervals(drone: VehicleFile) -> dict[str, list[tuple[str, float]]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.airframe import Airframe, airframe_of
-from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.loops import Demand, altitude_thrust
 from mambo_sil.drone.plant.rotors import WRENCH_SIGNS
@@ -31,27 +31,74 @@ _CHANGE: Final = 1e-5
 _ROUNDING: Final = 1e-8
 """Slopes below it, between numbers scaled as above, are 0: they are differences of rounding errors."""
 
-COMMAND, MOTOR, PUSH, NOISE = slice(0, 2), slice(2, 4), slice(4, 6), 6
-"""Columns of the inputs: command of roll and pitch; additions to the motor commands that turn about x and y,
-per command of hover; acceleration along y and x of the world; standard normal noise from column 6 on."""
-SEEN, DEMAND, TRUE = slice(0, 7), slice(7, 9), slice(9, 11)
-"""Rows of the outputs: the seen state; the share of the motor commands that turns about x and y, per command
-of hover; true y and x."""
-_TURNING: Final = WRENCH_SIGNS[1:3]
+_WRENCH: Final = WRENCH_SIGNS[[1, 2, 0]]
 _ROTORS: Final = 4
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Where inputs and outputs of a drone are, for its axes: roll and pitch, 2; with the height 3."""
+
+    axes: int
+
+    @property
+    def command(self) -> slice:
+        """Inputs: command of roll and pitch, and the thrust over the nominal mass beyond that of hover."""
+        return slice(0, self.axes)
+
+    @property
+    def motor(self) -> slice:
+        """Inputs: additions to the motor commands that turn about x and y and lift, per that of hover."""
+        return slice(self.axes, 2 * self.axes)
+
+    @property
+    def push(self) -> slice:
+        """Inputs: acceleration along y and x of the world, and upwards."""
+        return slice(2 * self.axes, 3 * self.axes)
+
+    @property
+    def noise(self) -> int:
+        """First input of standard normal noise."""
+        return 3 * self.axes
+
+    @property
+    def seen(self) -> slice:
+        """Outputs: the seen state [x, y, vx, vy, roll, pitch, yaw], then height and climb."""
+        return slice(0, 7 if self.axes == LEVEL_AXES else 9)
+
+    @property
+    def demand(self) -> slice:
+        """Outputs: shares of the motor commands that turn about x and y and lift, per that of hover."""
+        return slice(self.seen.stop, self.seen.stop + self.axes)
+
+    @property
+    def true(self) -> slice:
+        """Outputs: true y and x, and height."""
+        return slice(self.demand.stop, self.demand.stop + self.axes)
+
+
+LEVEL_AXES: Final = 2
+"""Axes of a controller without a height, and of a drone whose own loop holds its height."""
 
 
 @dataclass(frozen=True, eq=False)
 class DroneJacobians:
     """D drones over the ticks after which their sensors repeat, each array (D, ticks, rows, columns).
 
-    state' = transition state + inputs input, output = outputs state + feed input.
+    state' = transition state + inputs input, output = outputs state + feed input, with the inputs and outputs
+    of `signals`.
     """
 
+    signals: Signals
     transition: FloatArray
     inputs: FloatArray
     outputs: FloatArray
     feed: FloatArray
+
+    def drone(self, number: int) -> "DroneJacobians":
+        """Return one of the drones, each array (ticks, rows, columns)."""
+        arrays = (self.transition, self.inputs, self.outputs, self.feed)
+        return DroneJacobians(self.signals, *(array[number] for array in arrays))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,30 +121,40 @@ def repeating_ticks(flight: Flight) -> int:
     return math.lcm(flight.ticks_per_update, period)
 
 
-def drone_jacobians(flight: Flight) -> DroneJacobians:
-    """Return the drones of a flight at hover, linearised in each of `repeating_ticks`."""
-    n, vehicle, ticks = flight.flights, flight.vehicle, repeating_ticks(flight)
-    state = _hovering(vehicle, n)
+def drone_jacobians(flight: Flight, axes: int = LEVEL_AXES) -> DroneJacobians:
+    """Return the drones of a flight at hover, linearised in each of `repeating_ticks`.
+
+    With 3 axes the command of the thrust takes the place of their altitude loop.
+    """
+    n, vehicle, ticks, signals = flight.flights, flight.vehicle, repeating_ticks(flight), Signals(axes)
+    state = _hovering(vehicle, n, signals)
     moving = _Moving(state, _still_sensors(flight, state))
-    inputs = np.zeros((NOISE + _noises(flight), n))
+    inputs = np.zeros((signals.noise + _noises(flight), n))
     settling = -(-round(SETTLE_S / vehicle.drone.step_s) // ticks) * ticks
     for _ in range(settling):
-        moving, _ = _tick(vehicle, moving, inputs)
+        moving, _ = _tick(vehicle, moving, inputs, signals)
     found = []
     for _ in range(ticks):
-        found.append(_differentiate(vehicle, moving, inputs))
-        moving, _ = _tick(vehicle, moving, inputs)
-    return DroneJacobians(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
+        found.append(_differentiate(vehicle, moving, inputs, signals))
+        moving, _ = _tick(vehicle, moving, inputs, signals)
+    return DroneJacobians(signals, *(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _hovering(vehicle: Vehicle, n: int) -> VehicleState:
-    """Return n drones at rest where their altitude loop demands the thrust that carries their weight."""
-    drone, nominal = vehicle.drone, airframe_of(vehicle.drone)
-    share = vehicle.airframe.thrust_factor_n_s2 / nominal.thrust_factor_n_s2
-    demand_n = vehicle.airframe.mass_kg * GRAVITY_M_S2 / share
+def hover_thrust_n(vehicle: Vehicle) -> PerFlight:
+    """Return the demanded thrust that carries the weight of drones, one value or (n,)."""
+    gain = vehicle.drone.thrust.gain if vehicle.drone.thrust else 1.0
+    share = vehicle.airframe.thrust_factor_n_s2 / airframe_of(vehicle.drone).thrust_factor_n_s2
+    return vehicle.airframe.mass_kg * GRAVITY_M_S2 / (gain * share)
+
+
+def _hovering(vehicle: Vehicle, n: int, signals: Signals) -> VehicleState:
+    """Return n drones at rest, where their altitude loop demands the thrust that carries their weight."""
+    drone, demand_n = vehicle.drone, hover_thrust_n(vehicle)
     position_m = np.zeros((3, n))
-    position_m[2] = HEIGHT_REFERENCE_M - (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)
-    return vehicle.at_rest(position_m, 0.0, demand_n / (4.0 * nominal.thrust_per_command_n))
+    position_m[2] = HEIGHT_REFERENCE_M
+    if signals.axes == LEVEL_AXES:
+        position_m[2] -= (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)
+    return vehicle.at_rest(position_m, 0.0, demand_n / (4.0 * airframe_of(drone).thrust_per_command_n))
 
 
 def _still_sensors(flight: Flight, state: VehicleState) -> Any:
@@ -130,31 +187,41 @@ def _noises(flight: Flight) -> int:
             return 0
 
 
-def _tick(vehicle: Vehicle, moving: _Moving, inputs: FloatArray) -> tuple[_Moving, FloatArray]:
-    """Return n drones one tick later, and the outputs (11, n) at this tick, for inputs (6 + noises, n)."""
-    state, suite = moving.state, moving.suite
+def _tick(
+    vehicle: Vehicle, moving: _Moving, inputs: FloatArray, signals: Signals
+) -> tuple[_Moving, FloatArray]:
+    """Return n drones one tick later, and the outputs (rows, n) at this tick, for inputs (columns, n)."""
+    state, suite, lifts = moving.state, moving.suite, signals.axes > LEVEL_AXES
+    command, push = inputs[signals.command], inputs[signals.push]
     true = seen = truth(state)
     if suite is not None:
-        suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[NOISE:]))
+        suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[signals.noise :]))
         seen = suite.estimate(true)
-    thrust_n = altitude_thrust(vehicle.drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
-    moment = Moment(push_m_s2=(inputs[PUSH][1], inputs[PUSH][0]))
-    demand = np.zeros((2, inputs.shape[1]))
-    if isinstance(vehicle.loop, FirstOrderDrone):
-        state = vehicle.step(state, inputs[COMMAND], thrust_n, 0.0, seen=seen, moment=moment)
+    if lifts:
+        thrust_n = hover_thrust_n(vehicle) + vehicle.drone.body.mass_kg * command[2]
     else:
-        asked = Demand(inputs[COMMAND], 0.0, thrust_n, seen.euler_rad, seen.rates_rad_s)
+        thrust_n = altitude_thrust(
+            vehicle.drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
+        )
+    moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if lifts else 0.0)
+    demand = np.zeros((signals.axes, inputs.shape[1]))
+    if isinstance(vehicle.loop, FirstOrderDrone):
+        state = vehicle.step(state, command[:2], thrust_n, 0.0, seen=seen, moment=moment)
+    else:
+        asked = Demand(command[:2], 0.0, thrust_n, seen.euler_rad, seen.rates_rad_s)
         motor_command, memory = vehicle.loop.command_motors(asked, state.memory)
-        hover = airframe_of(vehicle.drone).hover_command
-        demand = _TURNING @ motor_command / (_ROTORS * hover)
-        motor_command = motor_command + hover * (_TURNING.T @ inputs[MOTOR])
+        hover, signs = airframe_of(vehicle.drone).hover_command, _WRENCH[: signals.axes]
+        demand = signs @ motor_command / (_ROTORS * hover)
+        motor_command = motor_command + hover * (signs.T @ inputs[signals.motor])
         state = VehicleState(*vehicle.integrate(state, motor_command, moment), memory)
-    outputs = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad, demand, true.position_m[1::-1]]
+    outputs = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
+    outputs += [-seen.position_m[2:], -seen.velocity_m_s[2:]] if lifts else []
+    outputs += [demand, true.position_m[1::-1], *([-true.position_m[2:]] if lifts else [])]
     return _Moving(state, suite), np.concatenate(outputs)
 
 
 def _differentiate(
-    vehicle: Vehicle, moving: _Moving, inputs: FloatArray
+    vehicle: Vehicle, moving: _Moving, inputs: FloatArray, signals: Signals
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return transition, inputs, outputs and feed of D drones in one tick, each (D, rows, columns)."""
     base = _numbers(moving)
@@ -164,7 +231,8 @@ def _differentiate(
     signs = np.array([1.0, -1.0])
     changes = np.einsum("rn,rc,s->rncs", change, np.eye(changed), signs).reshape(changed, -1)
     many = np.repeat(np.concatenate([base, inputs]), 2 * changed, axis=1) + changes
-    after, outputs = _tick(_repeat(vehicle, 2 * changed), _with_numbers(moving, many[:rows]), many[rows:])
+    copies, moved = _repeat(vehicle, 2 * changed), _with_numbers(moving, many[:rows])
+    after, outputs = _tick(copies, moved, many[rows:], signals)
     both = np.concatenate([_numbers(after), outputs]).reshape(-1, n, changed, 2)
     slopes = (both[..., 0] - both[..., 1]) / (2.0 * change.T)
     scale = np.ones((len(slopes), n))

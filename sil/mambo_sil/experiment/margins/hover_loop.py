@@ -8,20 +8,18 @@ from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.margins.controller_jacobian import LinearController
-from mambo_sil.experiment.margins.drone_jacobians import COMMAND, DEMAND, MOTOR, NOISE, PUSH, SEEN, TRUE
+from mambo_sil.experiment.margins.drone_jacobians import DroneJacobians, Signals
 
 ComplexArray = NDArray[np.complex128]
 
-AT_COMMAND, AT_MOTORS, BY_PUSH, BY_SEEN, BY_NOISE = 0, 1, 2, slice(3, 6), 6
-"""Inputs of a loop: addition to the command; to the turning share of the motor commands; acceleration of the
-drone; errors of the seen position, velocity and angle; standard normal noise of the sensors from column 6."""
+AT_COMMAND, AT_MOTORS, BY_PUSH, BY_SEEN = 0, 1, 2, 3
+"""Inputs of a loop: addition to the command; to its share of the motor commands; acceleration of the drone;
+errors of what is seen of the axis from column 3 on, those of `SEEN_OF`; then the noise of the sensors."""
 SENT, TURNING, PLACE = 0, 1, 2
 """Outputs of a loop: command of the controller; share of the motor commands; true position."""
 
-_ERRORS, _NOISE = slice(6, 13), 13
-"""Columns of the inputs of both axes: errors of what the controller sees; noise of the sensors."""
-_SEEN_OF: Final = ((1, 3, 4), (0, 2, 5))
-"""Position, velocity and angle of roll and of pitch in the seen state."""
+SEEN_OF: Final = ((1, 3, 4), (0, 2, 5), (7, 8))
+"""Position, velocity and angle of roll and of pitch in the seen state; height and climb."""
 _NEGLIGIBLE: Final = 1e-9
 
 
@@ -77,75 +75,90 @@ class PeriodicLoop:
 
 def close_loop(
     controller: LinearController,
-    drone: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    drone: DroneJacobians,
     delay_ticks: int,
     ticks_per_update: int,
     step_s: float,
 ) -> PeriodicLoop:
-    """Return both axes of a controller on one drone, whose matrices are those of `DroneJacobians`.
+    """Return all axes of a controller on one drone, as `DroneJacobians.drone` returns it.
 
-    Inputs and outputs are pairs, roll first, in the order of `AT_COMMAND` and `SENT`.
+    Inputs and outputs have one place for each axis, roll first, in the order of `AT_COMMAND` and `SENT`. The
+    errors of all that is seen follow the inputs, then noise.
     """
-    transition, inputs, outputs, feed = drone
+    signals, transition, inputs, outputs, feed = (
+        drone.signals,
+        drone.transition,
+        drone.inputs,
+        drone.outputs,
+        drone.feed,
+    )
     ticks, rows = transition.shape[:2]
-    noises, memory = inputs.shape[2] - NOISE, len(controller.a)
-    line = 2 * max(delay_ticks, 1)
+    axes, memory = signals.axes, len(controller.a)
+    line = axes * max(delay_ticks, 1)
     size = rows + memory + line
     of_drone, of_memory = slice(0, rows), slice(rows, rows + memory)
-    newest, oldest = slice(size - line, size - line + 2), slice(size - 2, size)
-    wide = _NOISE + noises
+    newest, oldest = slice(size - line, size - line + axes), slice(size - axes, size)
+    errors = _errors(signals)
+    noise, wide = errors.stop, errors.stop + inputs.shape[2] - signals.noise
+    at_command, at_motors, by_push = (slice(first, first + axes) for first in (0, axes, 2 * axes))
     found = PeriodicLoop(
         step_s,
         np.zeros((ticks, size, size)),
         np.zeros((ticks, size, wide)),
-        np.zeros((ticks, 6, size)),
-        np.zeros((ticks, 6, wide)),
-        np.ones((ticks, 6), np.bool_),
+        np.zeros((ticks, 3 * axes, size)),
+        np.zeros((ticks, 3 * axes, wide)),
+        np.ones((ticks, 3 * axes), np.bool_),
     )
     for tick in range(ticks):
         a, b, c, d = (one[tick] for one in (found.transition, found.inputs, found.outputs, found.feed))
-        sent, fed = np.zeros((2, size)), np.zeros((2, wide))
+        sent, fed = np.zeros((axes, size)), np.zeros((axes, wide))
         called = tick % ticks_per_update == 0
         if called:
-            sent[:, of_drone], sent[:, of_memory] = controller.d @ outputs[tick, SEEN], controller.c
-            fed[:, _ERRORS], fed[:, _NOISE:] = controller.d, controller.d @ feed[tick, SEEN, NOISE:]
-            c[0:2], d[0:2] = sent, fed
+            seen, noisy = outputs[tick, signals.seen], feed[tick, signals.seen, signals.noise :]
+            sent[:, of_drone], sent[:, of_memory] = controller.d @ seen, controller.c
+            fed[:, errors], fed[:, noise:] = controller.d, controller.d @ noisy
+            c[at_command], d[at_command] = sent, fed
             a[of_memory, of_memory] = controller.a
-            a[of_memory, of_drone] = controller.b @ outputs[tick, SEEN]
-            b[of_memory, _ERRORS] = controller.b
-            b[of_memory, _NOISE:] = controller.b @ feed[tick, SEEN, NOISE:]
-            fed[:, 0:2] = np.eye(2)
-            d[0:2, 0:2] = 0.0
+            a[of_memory, of_drone] = controller.b @ seen
+            b[of_memory, errors] = controller.b
+            b[of_memory, noise:] = controller.b @ noisy
+            fed[:, at_command] = np.eye(axes)
+            d[at_command, at_command] = 0.0
         else:
-            sent[:, newest] = np.eye(2)
+            sent[:, newest] = np.eye(axes)
             a[of_memory, of_memory] = np.eye(memory)
-        found.sampled[tick, [0, 1, 4, 5]] = called
+        found.sampled[tick, at_command] = found.sampled[tick, by_push] = called
         arriving, arrived = sent, fed
         if delay_ticks:
-            arriving, arrived = np.zeros((2, size)), np.zeros((2, wide))
-            arriving[:, oldest] = np.eye(2)
-        acting, wanted = inputs[tick][:, COMMAND], feed[tick][DEMAND, COMMAND]
+            arriving, arrived = np.zeros((axes, size)), np.zeros((axes, wide))
+            arriving[:, oldest] = np.eye(axes)
+        acting, wanted = inputs[tick][:, signals.command], feed[tick][signals.demand, signals.command]
         a[of_drone, of_drone] = transition[tick]
         a[of_drone] += acting @ arriving
         b[of_drone] = acting @ arrived
-        b[of_drone, 2:4] += inputs[tick][:, MOTOR]
-        b[of_drone, 4:6] += inputs[tick][:, PUSH]
-        b[of_drone, _NOISE:] += inputs[tick][:, NOISE:]
+        b[of_drone, at_motors] += inputs[tick][:, signals.motor]
+        b[of_drone, by_push] += inputs[tick][:, signals.push]
+        b[of_drone, noise:] += inputs[tick][:, signals.noise :]
         a[newest], b[newest] = sent, fed
-        a[newest.stop :, newest.start : size - 2] = np.eye(line - 2)
-        c[2:4, of_drone] = outputs[tick, DEMAND]
-        c[2:4] += wanted @ arriving
-        d[2:4] = wanted @ arrived
-        d[2:4, _NOISE:] += feed[tick, DEMAND, NOISE:]
-        c[4:6, of_drone] = outputs[tick, TRUE]
+        a[newest.stop :, newest.start : size - axes] = np.eye(line - axes)
+        c[at_motors, of_drone] = outputs[tick, signals.demand]
+        c[at_motors] += wanted @ arriving
+        d[at_motors] = wanted @ arrived
+        d[at_motors, noise:] += feed[tick, signals.demand, signals.noise :]
+        c[by_push, of_drone] = outputs[tick, signals.true]
     return found
 
 
-def axis_loop(both: PeriodicLoop, axis: int) -> PeriodicLoop:
-    """Return roll (0) or pitch (1) of both axes: the states that its inputs move and its outputs show."""
-    errors = [_ERRORS.start + column for column in _SEEN_OF[axis]]
-    inputs = [axis, 2 + axis, 4 + axis, *errors, *range(_NOISE, both.inputs.shape[2])]
-    return choose(both, inputs, [axis, 2 + axis, 4 + axis])
+def _errors(signals: Signals) -> slice:
+    """Return the inputs of all axes that are errors of what the controller sees."""
+    return slice(3 * signals.axes, 3 * signals.axes + signals.seen.stop)
+
+
+def axis_loop(whole: PeriodicLoop, signals: Signals, axis: int) -> PeriodicLoop:
+    """Return roll (0), pitch (1) or height (2): the states that its inputs move and its outputs show."""
+    three = [axis, signals.axes + axis, 2 * signals.axes + axis]
+    errors = [_errors(signals).start + column for column in SEEN_OF[axis]]
+    return choose(whole, [*three, *errors, *range(_errors(signals).stop, whole.inputs.shape[2])], three)
 
 
 def choose(loop: PeriodicLoop, inputs: list[int], outputs: list[int]) -> PeriodicLoop:

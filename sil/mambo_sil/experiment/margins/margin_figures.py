@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from mambo_sil.experiment.margins.axis_margins import PLACES, AxisMargins
+from mambo_sil.experiment.margins.axis_margins import PLACES, HeightMargins, Margins
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.results.number_format import three_digits, three_digits_or_dash
 
@@ -24,17 +24,18 @@ def number(value: float) -> str:
     return three_digits(value) if math.isfinite(value) else _INFINITE
 
 
-def figure_table(axes: Sequence[AxisMargins]) -> list[tuple[str, list[str], str]]:
+def figure_table(axes: Sequence[Margins]) -> list[tuple[str, list[str], str]]:
     """Return name, formatted value of each axis, and unit of every figure that one of the axes has."""
-    columns = [list(figure_rows(axis)) for axis in axes]
-    known = [{(name, unit): value for name, value, unit in rows} for rows in columns]
+    known = [{(name, unit): value for name, value, unit in figure_rows(axis)} for axis in axes]
+    keys = list(dict.fromkeys(key for one in sorted(known, key=len, reverse=True) for key in one))
+    names = [name for name, _ in keys]
     return [
         (name, [number(one.get((name, unit), math.nan)) for one in known], unit)
-        for name, _, unit in max(columns, key=len, default=[])
+        for name, unit in sorted(keys, key=lambda key: names.index(key[0]))
     ]
 
 
-def verdict(axis: AxisMargins) -> str:
+def verdict(axis: Margins) -> str:
     """Return in words how far an axis is from instability."""
     if not axis.stable:
         return f"{axis.axis}: UNSTABLE, grows e-fold in {three_digits_or_dash(1.0 / axis.poles.growth_1_s)} s"
@@ -47,7 +48,7 @@ def verdict(axis: AxisMargins) -> str:
     return f"{axis.axis}: tolerates {'; '.join(parts)}"
 
 
-def figure_rows(axis: AxisMargins) -> Iterator[Row]:
+def figure_rows(axis: Margins) -> Iterator[Row]:
     """Yield the figures of an axis."""
     for place, loop in axis.loops.items():
         where = "command" if place == "command" else "motors"
@@ -57,12 +58,16 @@ def figure_rows(axis: AxisMargins) -> Iterator[Row]:
     yield "least damped pole: frequency", poles.least_damped_rad_s, "rad/s"
     yield "slowest pole: time constant", poles.slowest_s, "s"
     yield "gust to position", axis.gust_to_place_s2, "m per m/s^2"
-    yield "gust to command", axis.gust_to_command_rad_s2_m, "rad per m/s^2"
+    if isinstance(axis, HeightMargins):
+        unit, gust, variation = "m/s^2", axis.gust_to_thrust, axis.sensed_variation_m_s2
+    else:
+        unit, gust, variation = "rad", axis.gust_to_command_rad_s2_m, axis.sensed_variation_rad
+    yield "gust to command", gust, f"{unit} per m/s^2"
     for name, noise in axis.noise.items():
         yield f"noise of {name} to position", noise.to_place, f"m per {_UNITS[name]}"
-        yield f"noise of {name} to command", noise.to_command, f"rad per {_UNITS[name]}"
-    if axis.sensed_variation_rad is not None:
-        yield "sensors' noise to change of command", axis.sensed_variation_rad, "rad"
+        yield f"noise of {name} to command", noise.to_command, f"{unit} per {_UNITS[name]}"
+    if variation is not None:
+        yield "sensors' noise to change of command", variation, unit
 
 
 def _loop_rows(loop: LoopMargins) -> Iterator[Row]:

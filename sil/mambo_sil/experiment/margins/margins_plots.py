@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mambo_sil.experiment.margins.axis_margins import AXES, PLACES, PlaceName
+from mambo_sil.experiment.margins.axis_margins import AXES, PLACES, AxisName, PlaceName
 from mambo_sil.experiment.margins.loop_margins import open_loop
 from mambo_sil.experiment.margins.response_file import Curve
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
@@ -24,7 +24,7 @@ _LOOKS: Final[dict[PlaceName, dict[str, Any]]] = {
 
 
 def draw_margins(curves: list[Curve], folder: Path) -> None:
-    """Write bode, nyquist and sensitivity as PNG and SVG: roll on the left, pitch on the right."""
+    """Write bode, nyquist and sensitivity as PNG and SVG: roll, pitch and, if there is one, the height."""
     with style():
         for name in _PANELS:
             save(_figure(curves, name), folder / name)
@@ -33,14 +33,21 @@ def draw_margins(curves: list[Curve], folder: Path) -> None:
 def margin_panels(curves: list[Curve]) -> list[Markup]:
     """Return the same pictures for a page."""
     with style():
-        return [inline(_figure(curves, name), f"{name} of roll and pitch") for name in _PANELS]
+        words = " and ".join(_axes_of(curves)).replace(" and ", ", ", len(_axes_of(curves)) - 2)
+        return [inline(_figure(curves, name), f"{name} of {words}") for name in _PANELS]
+
+
+def _axes_of(curves: list[Curve]) -> list[AxisName]:
+    """Return the axes that have a curve, in their order."""
+    return [axis for axis in AXES if any(curve.axis == axis for curve in curves)]
 
 
 def _figure(curves: list[Curve], name: str) -> Figure:
     draw, rows, height = _PANELS[name]
-    figure = Figure(figsize=(2.2 * COLUMN_INCHES, height), layout="constrained")
-    panels = figure.subplots(rows, 2, sharex=True, sharey="row", squeeze=False)
-    for axis, column in zip(AXES, panels.T, strict=True):
+    axes = _axes_of(curves)
+    figure = Figure(figsize=(1.1 * len(axes) * COLUMN_INCHES, height), layout="constrained")
+    panels = figure.subplots(rows, len(axes), sharex=True, sharey="row", squeeze=False)
+    for axis, column in zip(axes, panels.T, strict=True):
         column[0].set_title(axis, loc="left")
         for curve in curves:
             if curve.axis == axis:

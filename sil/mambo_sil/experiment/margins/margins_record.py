@@ -5,7 +5,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
-from mambo_sil.experiment.margins.axis_margins import PLACES, AxisMargins, AxisName, PlaceName
+from mambo_sil.experiment.margins.axis_margins import PLACES, AxisName, Margins, PlaceName
 from mambo_sil.experiment.margins.margin_figures import figure_table, number, verdict
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.results.summary import Number, ReportedSummary, Section
@@ -71,7 +71,7 @@ class MarginsSummary(ReportedSummary):
     sensors: SensorsName
     update_period_s: float
     reason: str | None = None
-    axes: list[AxisMargins] | None = None
+    axes: list[Margins] | None = None
     many: ManyDrones | None = None
 
     @property

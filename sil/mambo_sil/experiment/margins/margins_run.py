@@ -8,8 +8,8 @@ from pathlib import Path
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.margins.axis_margins import AxisMargins
-from mambo_sil.experiment.margins.controller_jacobian import LinearController, linear_controller
+from mambo_sil.experiment.margins.axis_margins import Margins
+from mambo_sil.experiment.margins.controller_jacobian import has_linear_law
 from mambo_sil.experiment.margins.hover_margins import NOT_SMOOTH, hover_loops, measure_loops
 from mambo_sil.experiment.margins.many_drones import (
     MeasuredDrone,
@@ -38,20 +38,19 @@ class Many:
     """Many drones to measure, and where they come from, in words."""
 
     origin: str
-    measure: Callable[[LinearController], Iterable[MeasuredDrone]]
+    measure: Callable[[], Iterable[MeasuredDrone]]
 
 
-def axes_on(subject: MarginSubject) -> list[AxisMargins] | None:
-    """Return the margins of roll and pitch; None if no linear margin applies.
+def axes_on(subject: MarginSubject) -> list[Margins] | None:
+    """Return the margins of all axes; None if no linear margin applies.
 
     Raises FlightError, and the errors of building the C.
     """
     period_s = subject.settings.horizon.update_period_s
     flight = hovering_flight(subject.drone, subject.sensors, period_s)
-    controller = linear_controller(subject.settings)
-    if controller is None:
+    if not has_linear_law(subject.settings):
         return None
-    (loops,) = hover_loops(controller, flight)
+    (loops,) = hover_loops(subject.settings, flight)
     return list(measure_loops(loops, flight))
 
 
@@ -74,10 +73,9 @@ def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> M
         place = folder and stack.enter_context(
             new_results(folder, MarginsSummary.command, (*PICTURES, RESPONSES, DRONES))
         )
-        controller = linear_controller(subject.settings)
-        if controller is not None:
-            (loops,) = hover_loops(controller, flight)
-            found: Sequence[MeasuredDrone] = list(many.measure(controller)) if many else []
+        if has_linear_law(subject.settings):
+            (loops,) = hover_loops(subject.settings, flight)
+            found: Sequence[MeasuredDrone] = list(many.measure()) if many else []
             summary = summary.model_copy(
                 update={
                     "axes": list(measure_loops(loops, flight)),

@@ -10,16 +10,16 @@ import numpy as np
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
-from mambo_sil.experiment.margins.axis_margins import AXES, AxisName, PlaceName, frequencies
+from mambo_sil.experiment.margins.axis_margins import AXES, TILT_AXES, AxisName, PlaceName, frequencies
 from mambo_sil.experiment.margins.hover_loop import (
     AT_COMMAND,
     AT_MOTORS,
     SENT,
     TURNING,
     ComplexArray,
-    PeriodicLoop,
     choose,
 )
+from mambo_sil.experiment.margins.hover_margins import Loops
 from mambo_sil.experiment.margins.loop_margins import sensitivity
 
 _FIRST_RAD_S: Final = 0.1
@@ -37,16 +37,14 @@ class Curve:
     sensitivity: ComplexArray
 
 
-def responses(
-    loops: tuple[PeriodicLoop, PeriodicLoop], update_period_s: float, *, motors: bool
-) -> list[Curve]:
-    """Return the curves of roll and pitch, broken at the command and, if there are any, at the motors."""
+def responses(loops: Loops, update_period_s: float, *, motors: bool) -> list[Curve]:
+    """Return the curves of all axes, broken at the command, and of roll and pitch at the motors, if any."""
     found = []
-    for name, loop in zip(AXES, loops, strict=True):
+    for name, loop in zip(AXES, loops, strict=False):
         updates, ticks = (one[one > _FIRST_RAD_S] for one in frequencies(loop, update_period_s, _COUNT))
         at_command, at_motors = choose(loop, [AT_COMMAND], [SENT]), choose(loop, [AT_MOTORS], [TURNING])
         found.append(Curve(name, "command", updates, sensitivity(at_command, updates)))
-        if motors:
+        if motors and name in TILT_AXES:
             found.append(Curve(name, "motors", ticks, sensitivity(at_motors, ticks)))
     return found
 

@@ -10,9 +10,8 @@ from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
-from mambo_sil.experiment.margins.axis_margins import AxisMargins
-from mambo_sil.experiment.margins.controller_jacobian import linear_controller
-from mambo_sil.experiment.margins.corners import Ends, at_ends, corners, intervals
+from mambo_sil.experiment.margins.axis_margins import Margins
+from mambo_sil.experiment.margins.corners import Ends, at_ends, corners, intervals, uncertain
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.experiment.margins.margin_figures import verdict
 from mambo_sil.flight.names import SENSORS_OF, SensorsName
@@ -23,7 +22,7 @@ LEAST_GAIN: Final = 1.5
 LEAST_DELAY_S: Final = 0.03
 """The same for the delay at the command."""
 
-Axes = Sequence[AxisMargins]
+Axes = Sequence[Margins]
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,10 @@ def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
     where = "true state" if sensors == "none" else f"through sensors {sensors}"
     if drone.uncertainty is not None:
         where = f"{where}, at the worst of the intervals in [uncertainty]"
+    drone = uncertain(drone, height=settings.height is not None)
     given = list(corners(drone)) if drone.uncertainty else [{}]
-    found = [(ends, _measure(settings, _at(drone, ends), sensors)) for ends in given]
-    axes = [min((pair[axis] for _, pair in found), key=_reserve) for axis in (0, 1)]
+    found = [(ends, measure_drone(settings, _at(drone, ends), sensors)) for ends in given]
+    axes = [min(of_one, key=_reserve) for of_one in zip(*(measured for _, measured in found), strict=True)]
     if min(map(_reserve, axes)) >= 1.0:
         return JudgedMargins(where, axes, None)
     worst, _ = min(found, key=lambda one: _reserve_of(one[1]))
@@ -66,14 +66,7 @@ def _at(drone: VehicleFile, ends: Ends) -> VehicleFile:
     return at_ends(drone, ends) if ends else drone
 
 
-def _measure(settings: Settings, drone: VehicleFile, sensors: SensorsName) -> Axes:
-    controller = linear_controller(settings)
-    if controller is None:
-        raise ValueError("derived settings have a linear law")
-    return measure_drone(controller, drone, sensors, settings.horizon.update_period_s)
-
-
-def _reserve(axis: AxisMargins) -> float:
+def _reserve(axis: Margins) -> float:
     """Return the least margin of an axis over the least that is not warned of; 0 if it is unstable."""
     gains = [loop.gain_up / LEAST_GAIN for loop in axis.loops.values()]
     delay = math.inf if axis.command is None else axis.command.delay_s / LEAST_DELAY_S
@@ -93,11 +86,11 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
     for name, keys in (intervals(drone) if worst else {}).items():
         words = ", ".join(f"{key} +- {spell(width)}" for key, width in keys if width)
         certain = _at(drone, {**worst, name: 0})
-        found.append((_reserve_of(_measure(settings, certain, sensors)), f"the interval of {words}"))
-    for words, other in _without(drone):
+        found.append((_reserve_of(measure_drone(settings, certain, sensors)), f"the interval of {words}"))
+    for words, other in _without(drone, height=settings.height is not None):
         seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"
         derived = controller_toml.parse(controller_text(other, drone.name), drone.name)
-        found.append((_reserve_of(_measure(derived, _at(other, worst), seen)), words))
+        found.append((_reserve_of(measure_drone(derived, _at(other, worst), seen)), words))
     if not found:
         return "no single property is the cause"
     reserve, words = max(found)
@@ -105,8 +98,8 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
     return f"the main cause is {words}: without it the margins are {enough}"
 
 
-def _without(drone: VehicleFile) -> Iterator[tuple[str, VehicleFile]]:
-    """Yield properties in words, and the drone without each."""
+def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, VehicleFile]]:
+    """Yield properties in words, and the drone without each; those of the thrust only with a height."""
     document: dict[str, Any] = drone.model_dump(exclude_none=True)
     if isinstance(drone.attitude, FirstOrderAttitude):
         attitude = document["attitude"]
@@ -115,6 +108,10 @@ def _without(drone: VehicleFile) -> Iterator[tuple[str, VehicleFile]]:
             times = " and ".join(spell(attitude[axis]["dead_time_s"]) for axis in ("roll", "pitch"))
             other = VehicleFile.model_validate(document | {"attitude": attitude | quick})
             yield f"dead_time_s of roll and pitch, {times}", other
+    if height and drone.thrust is not None and drone.thrust.dead_time_s:
+        thrust = document["thrust"] | {"dead_time_s": 0.0}
+        other = VehicleFile.model_validate(document | {"thrust": thrust})
+        yield f"thrust.dead_time_s = {spell(drone.thrust.dead_time_s)}", other
     if drone.rotors is not None and drone.rotors.lag_s:
         rotors = document["rotors"] | {"lag_s": 0.0}
         other = VehicleFile.model_validate(document | {"rotors": rotors})
