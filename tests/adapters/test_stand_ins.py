@@ -106,6 +106,7 @@ def test_drones_on_the_floor_of_crazyflow_idle_until_they_shall_climb() -> None:
         assert (thrust_m_s2 < 3.0).tolist() == idle
 
 
+@pytest.mark.long
 def test_a_crazyflow_simulation_that_does_not_fit_is_refused() -> None:
     """By number of drones, or by frequency."""
     controller = Controller.from_vehicle("crazyflie", 2)

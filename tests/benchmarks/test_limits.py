@@ -47,6 +47,7 @@ def test_steps_of_any_length_stop(preset: str, length_m: float) -> None:
     assert np.all(horizontal_error_m(trace)[-1] < 0.02)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("preset", "bound_m"), [("mambo", 0.002), ("crazyflie", 0.002), ("mambo-1norm", 0.06), ("table1", 0.30)]
 )
@@ -79,6 +80,7 @@ def test_a_circle_beyond_the_tilt_limit_is_no_orbit(preset: str) -> None:
     assert np.all(horizontal_error_m(trace)[trace.time_s > TRANSIENT_S] < 0.18)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("preset", QUADRATIC)
 @pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
 def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str, acceleration: str) -> None:

@@ -80,6 +80,7 @@ def test_over_budget_is_exit_1_with_names_and_excess(tmp_path: Path) -> None:
     assert not any("RAM" in line or "stack" in line for line in lines[2:] if "budget" in line)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_crazyflie")
 def test_the_name_of_a_board_is_no_formula(tmp_path: Path) -> None:
     """Nor is it markup: a board's file may have any name."""

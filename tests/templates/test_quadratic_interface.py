@@ -110,6 +110,7 @@ def test_the_estimate_is_in_si_units() -> None:
     assert np.all(disturbances != 0)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", CORNERS)
 def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index: int, scalar: str) -> None:

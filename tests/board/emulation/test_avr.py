@@ -59,6 +59,7 @@ def one(mega: Builder, tmp_path: Path) -> Path:
     return mega.guest({}, "long run(void); long run(void) { return 1; }", ("run",), tmp_path)
 
 
+@pytest.mark.long
 def test_the_self_test_detects_a_wrong_controller_on_eight_bits(mega: Builder, tmp_path: Path) -> None:
     """The self-test returns 0; an error of a millimetre in the cost is found in the first step."""
     files = render(presets.load("table1"), with_digest=False)
@@ -207,6 +208,7 @@ def bound_assembly(assembly: str, folder: Path) -> StackReport:
     return bound_stack(load(link("mega", text, folder)), "run")
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("assembly", "held"),
     [
@@ -238,6 +240,7 @@ def test_changes_of_the_stack_pointer_are_followed(assembly: str, held: int, tmp
     assert bound_assembly(assembly, tmp_path).bytes == held
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("assembly", "message"),
     [

@@ -138,6 +138,7 @@ REFUSALS = {
 """Functions of UNBOUNDED, and what the error says: function, instruction and remedy."""
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("board", CORES)
 def test_the_bound_of_a_small_program_follows_its_call_graph(board: str, tmp_path: Path) -> None:
     """Paths and frames are those of the source, and frames equal gcc's."""

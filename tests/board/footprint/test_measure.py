@@ -124,6 +124,7 @@ def test_the_mega_is_measured_whole() -> None:
     assert footprint.counts.by_function["__addsf3x"] > footprint.counts.mean / 5
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("here", "missing"),
     [

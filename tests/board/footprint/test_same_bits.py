@@ -94,6 +94,7 @@ def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: 
     assert digests[0] == self_test_digest(OneNorm(MAMBO), 2) != digests[1]
 
 
+@pytest.mark.long
 def test_other_settings_and_other_steps_have_other_digests() -> None:
     """A change of one bit of a weight, of the optimizer or of the scalar type changes the digest."""
     heavier = float(np.nextafter(np.float32(MAMBO.cost.tracking_weight), np.float32(np.inf)))
@@ -169,6 +170,7 @@ def test_clang_needs_the_compiler_of_the_board_to_link(
         clang_builder(boards.load("crazyflie"), "-O2")
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("preset", "scalar"), [("mambo", "float32"), ("mambo", "float64"), ("table1", "float32")]
 )

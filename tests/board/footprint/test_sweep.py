@@ -121,6 +121,7 @@ def test_the_budget_of_time_is_left_out_where_it_varies() -> None:
     assert "time_ms" not in budgets(board, ONE_NORM, (Axis("horizon.update_period_s", (0.01, 0.02)),))
 
 
+@pytest.mark.long
 def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
     """Dollar signs in a board's title are drawn literally."""
     draw_sweep([POINT], AXES, {}, r"$\frac{$ <b>", tmp_path / "sweep")

@@ -244,6 +244,7 @@ def test_a_finished_campaign_may_be_extended(source: Path, whole: Path, tmp_path
         fly_on_threads(source, tmp_path, 4)
 
 
+@pytest.mark.long
 def test_a_finished_campaign_needs_no_worker_and_keeps_its_records(
     source: Path, whole: Path, tmp_path: Path
 ) -> None:

@@ -57,6 +57,7 @@ def assert_same_bits(
     return answered.answers
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("kind", SETTINGS)
 def test_every_fault_has_the_bits_of_python(kind: str) -> None:
     """Every effect, missing updates, late commands, weights and callers of some patience."""

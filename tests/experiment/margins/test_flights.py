@@ -42,6 +42,7 @@ def test_gain_margin_decides_about_a_flight(name: str, drone: str, axis: int) ->
     assert grows_with_gains(settings, vehicle, axis, [0.95 * gain, 1.1 * gain]) == [False, True]
 
 
+@pytest.mark.long
 def test_gain_margin_at_the_motors_is_one_of_the_inertia() -> None:
     """A drone that is harder to turn than the margin at the torque allows oscillates."""
     settings, drone = in_float64("mambo"), Vehicle.from_preset("mambo")

@@ -146,12 +146,14 @@ def test_another_shape_is_refused(tmp_path: Path) -> None:
                 controller.step(np.zeros(state), np.zeros(target), np.zeros(thrust))
 
 
+@pytest.mark.first_is_quick
 def test_arguments_beyond_the_registers_arrive(bad_guest: Machine) -> None:
     """Ten words, of which an ARM core takes four in registers, a RISC-V core eight, an AVR nine."""
     words = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3]
     assert bad_guest.call("weigh", *words) == sum(place * word for place, word in enumerate(words, 1))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("function", ["die", "stray"])
 def test_a_guest_that_dies_is_named(function: str, bad_guest: Machine) -> None:
     """A fault is reported with function, address and cause; the machine stays usable."""
