@@ -27,6 +27,7 @@ def number(value: float) -> str:
 def figure_table(axes: Sequence[Margins]) -> list[tuple[str, list[str], str]]:
     """Return name, formatted value of each axis, and unit of every figure that one of the axes has."""
     known = [{(name, unit): value for name, value, unit in figure_rows(axis)} for axis in axes]
+    # In the order of the longest column; figures of one name, which differ in their unit, stand together.
     keys = list(dict.fromkeys(key for one in sorted(known, key=len, reverse=True) for key in one))
     names = [name for name, _ in keys]
     return [

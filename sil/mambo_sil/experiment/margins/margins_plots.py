@@ -32,8 +32,9 @@ def draw_margins(curves: list[Curve], folder: Path) -> None:
 
 def margin_panels(curves: list[Curve]) -> list[Markup]:
     """Return the same pictures for a page."""
+    *first, last = _axes_of(curves)
+    words = f"{', '.join(first)} and {last}"
     with style():
-        words = " and ".join(_axes_of(curves)).replace(" and ", ", ", len(_axes_of(curves)) - 2)
         return [inline(_figure(curves, name), f"{name} of {words}") for name in _PANELS]
 
 
