@@ -28,8 +28,10 @@ VEHICLE: Final = """\
 # Drones: vehicle.toml
 
 `mambo-nmpc vehicles generic` prints such a file, with the source of every value; [Vehicles](vehicles.md)
-explains what the sections do, and has a short example. The unit is in the name of a key, in SI. `mambo-nmpc
-vehicles --schema` prints the JSON schema, with which editors check and complete the file.
+explains what the sections do, [your own drone](../tutorials/own-drone.md) has a short example. The unit is in
+the name of a key, in SI. `mambo-nmpc vehicles --schema` prints the JSON schema, with which editors check and
+complete the file.
+
 """
 
 

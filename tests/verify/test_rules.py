@@ -86,18 +86,12 @@ def test_an_unlisted_finding_fails(scalar: str, harms: list[str], tmp_path: Path
 
 @pytest.mark.long
 @pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
-def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Path) -> None:
-    """By rule, file and scalar type of preset mambo-1norm without its tracker, as cppcheck finds them."""
-    text = (Path(__file__).parents[2] / "docs" / "reference" / "c-api.md").read_text("utf-8")
-    rows = re.findall(r"^\| (\d+\.\d+) \| `(\S+)` \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
-    column = {"float32": 2, "fixed": 3}[scalar]
-    documented = {row[:2]: int(row[column]) for row in rows if row[column] != "0"}
+def test_each_listed_deviation_occurs(scalar: str, tmp_path: Path) -> None:
+    """Of preset mambo-1norm without its tracker, as cppcheck finds them."""
     its = subject(with_option(ONE_NORM, "code.scalar", scalar, "test"), tmp_path)
     result = check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert_each_occurs(its, result)
-    deviations_found = result.figures["deviations"].items()
-    assert documented == {(rule, file): n for rule, files in deviations_found for file, n in files.items()}
 
 
 def test_every_deviation_is_in_the_manual() -> None:

@@ -1,22 +1,24 @@
-"""docs/reference/vehicles.md: its example flies, and it names every key."""
+"""The manual on drones: its example flies, and it names every key and shipped drone."""
 
 import re
 from pathlib import Path
 
 import pytest
 
+from docs.pages.settings_page import vehicle_page
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import form
 from tests.support.command import run
 
-DOCUMENT = (Path(__file__).parents[3] / "docs" / "reference" / "vehicles.md").read_text("utf-8")
+DOCS = Path(__file__).parents[3] / "docs"
 MOST_LINES = 25
 
 
 @pytest.fixture
 def example(tmp_path: Path) -> Path:
-    """Return the file that the document has a reader save."""
-    blocks = re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)
+    """Return the file that a tutorial has its reader save."""
+    text = (DOCS / "tutorials" / "own-drone.md").read_text("utf-8")
+    blocks = re.findall(r'```toml title="my-drone.toml"\n(.*?)```', text, re.DOTALL)
     assert len(blocks) == 1
     path = tmp_path / "my-drone.toml"
     path.write_text(blocks[0])
@@ -34,14 +36,16 @@ def test_the_example_is_short_and_flies(example: Path, sensors: str, tmp_path: P
 
 
 def test_every_key_is_documented() -> None:
-    """Of every kind of attitude loop and of sensors."""
+    """Of every kind of attitude loop and of sensors, on the page that the code writes."""
+    page = vehicle_page()
     for attitude in ("mambo", "cascade", "first_order"):
         for sensors in ("none", "mambo", "mocap"):
             for path in form(attitude, sensors).keys:
-                assert path.rpartition(".")[2] in DOCUMENT, path
+                assert f"`{path.rpartition('.')[2]}`" in page, path
 
 
 def test_every_shipped_drone_is_documented() -> None:
-    """In the first table."""
+    """In the first table of docs/reference/vehicles.md."""
+    text = (DOCS / "reference" / "vehicles.md").read_text("utf-8")
     for name in vehicle_toml.names():
-        assert f"\n| `{name}` | " in DOCUMENT
+        assert f"\n| `{name}` | " in text
