@@ -54,6 +54,7 @@ class LaboratoryConditions:
     camera_period_ms: int = 10
     camera_delay_ms: int = 10
     camera_noise_m: float = 0.001
+    camera_sees_attitude: bool = False
     camera_offset_ms: int = 0
     app_offset_ms: int = 0
     lost_ticks: float = 0.0
@@ -82,7 +83,7 @@ class Laboratory:
         flight.controller = int(controller)
         for name in ("mass_kg", "rotor_lag_s", "drag_1_s", "camera_period_ms", "camera_offset_ms"):
             setattr(flight, name, getattr(conditions, name))
-        for name in ("camera_delay_ms", "camera_noise_m", "lost_ticks"):
+        for name in ("camera_delay_ms", "camera_noise_m", "camera_sees_attitude", "lost_ticks"):
             setattr(flight, name, getattr(conditions, name))
         flight.wind_m_s = list(conditions.wind_m_s)
         flight.place_m = [place.x_m, place.y_m]

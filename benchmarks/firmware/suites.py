@@ -46,6 +46,7 @@ SET_POINTS: Final = {
 
 CONDITIONS: Final = {
     "10 % of the ticks lost": replace(STANDARD, lost_ticks=0.1),
+    "camera that measures attitudes": replace(STANDARD, camera_sees_attitude=True),
     "camera at 30 Hz": replace(STANDARD, camera_period_ms=33),
     "20 % heavier": replace(STANDARD, mass_kg=0.036),
     "rotor lag 0.1 s": replace(STANDARD, rotor_lag_s=0.1),

@@ -17,13 +17,16 @@
 #define GRAVITY_M_S2 9.81
 #define GYROSCOPE_NOISE_RAD_S 0.003
 #define ACCELEROMETER_NOISE_G 0.02
-#define CAMERA_DEVIATION_M 0.01f /* that the firmware assumes */
+#define CAMERA_DEVIATION_M 0.01f    /* that the firmware assumes */
+#define CAMERA_DEVIATION_RAD 0.0045f /* likewise, of an attitude */
+#define ATTITUDE_NOISE_RAD 0.002
 #define HISTORY_MS 64
 
 static laboratory_flight_t flight;
 static drone_parameters_t parameters;
 static drone_t drone;
 static double history[HISTORY_MS][3]; /* of positions */
+static double attitudes[HISTORY_MS][4];
 static uint64_t elapsed_ms;
 static bool is_camera_on = true;
 static uint64_t random_state;
@@ -40,6 +43,12 @@ static double uniform(void)
 /* Box and Muller. */
 static double normal(void) { return sqrt(-2.0 * log(1.0 - uniform())) * cos(2.0 * M_PI * uniform()); }
 
+static void remember(int k)
+{
+    memcpy(history[k], drone.position_m, sizeof history[k]);
+    memcpy(attitudes[k], drone.attitude, sizeof attitudes[k]);
+}
+
 bool laboratory_start(const laboratory_flight_t *wanted)
 {
     bool is_good;
@@ -49,7 +58,7 @@ bool laboratory_start(const laboratory_flight_t *wanted)
     random_state = 0x9E3779B97F4A7C15ULL * (flight.seed + 1ULL);
     drone_place(&drone, flight.place_m, flight.heading_rad);
     for (int k = 0; k < HISTORY_MS; k++) {
-        memcpy(history[k], drone.position_m, sizeof history[k]);
+        remember(k);
     }
 
     tasks_advance_clock(START_MS);
@@ -76,15 +85,31 @@ static void measure(void)
     board_measure(rates_deg_s, force_g);
 }
 
+/* A camera that sees one marker measures positions; one that sees several measures attitudes, too. */
 static void look(void)
 {
-    const double *const seen = history[(elapsed_ms - (uint64_t)flight.camera_delay_ms) % HISTORY_MS];
-    positionMeasurement_t measured = { .stdDev = CAMERA_DEVIATION_M };
+    const size_t k = (size_t)((elapsed_ms - (uint64_t)flight.camera_delay_ms) % HISTORY_MS);
+    float seen_m[3];
 
-    for (int k = 0; k < 3; k++) {
-        measured.pos[k] = (float)(seen[k] + (flight.camera_noise_m * normal()));
+    for (int i = 0; i < 3; i++) {
+        seen_m[i] = (float)(history[k][i] + (flight.camera_noise_m * normal()));
     }
-    estimatorEnqueuePosition(&measured);
+    if (flight.camera_sees_attitude) {
+        const double *const q = attitudes[k];
+        poseMeasurement_t pose = { .stdDevPos = CAMERA_DEVIATION_M, .stdDevQuat = CAMERA_DEVIATION_RAD };
+
+        memcpy(pose.pos, seen_m, sizeof seen_m);
+        pose.quat.w = (float)q[0];
+        pose.quat.x = (float)(q[1] + (0.5 * ATTITUDE_NOISE_RAD * normal()));
+        pose.quat.y = (float)(q[2] + (0.5 * ATTITUDE_NOISE_RAD * normal()));
+        pose.quat.z = (float)(q[3] + (0.5 * ATTITUDE_NOISE_RAD * normal()));
+        estimatorEnqueuePose(&pose);
+    } else {
+        positionMeasurement_t position = { .stdDev = CAMERA_DEVIATION_M };
+
+        memcpy(position.pos, seen_m, sizeof seen_m);
+        estimatorEnqueuePosition(&position);
+    }
 }
 
 void laboratory_run(int milliseconds)
@@ -96,7 +121,7 @@ void laboratory_run(int milliseconds)
         drone_advance(&drone, &parameters, thrusts);
         tasks_advance_clock(1);
         elapsed_ms++;
-        memcpy(history[elapsed_ms % HISTORY_MS], drone.position_m, sizeof history[0]);
+        remember((int)(elapsed_ms % HISTORY_MS));
 
         measure();
         if (is_camera_on && (flight.camera_period_ms > 0) &&

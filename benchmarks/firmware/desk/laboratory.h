@@ -18,6 +18,7 @@ typedef struct {
     int camera_offset_ms; /* of its clock against that of the firmware */
     int camera_delay_ms;
     double camera_noise_m;
+    bool camera_sees_attitude; /* else positions only */
     double lost_ticks; /* share of the milliseconds in which the stabilizer does not run */
 } laboratory_flight_t;
 
