@@ -115,14 +115,14 @@ def test_a_stack_overflow_is_reported(mega: Builder, tmp_path: Path) -> None:
 long run(void);
 long run(void)
 {
-    volatile char room[2100];
+    volatile char room[3200];
     int i;
-    for (i = 0; i < 2100; i++) { room[i] = 1; }
+    for (i = 0; i < 3200; i++) { room[i] = 1; }
     return room[7];
 }
 """
     machine = start(mega.guest({}, text, ("run",), tmp_path), "avr")
-    with pytest.raises(EmulationError, match="run overflowed its stack of 2048 B"):
+    with pytest.raises(EmulationError, match="run overflowed its stack of 3072 B"):
         machine.call("run")
 
 
@@ -174,14 +174,14 @@ def test_a_controller_too_large_for_the_ram_is_refused(mega: Builder, tmp_path: 
     """The message has the size of the data and of the RAM."""
     settings = settings_case(4, "float32")
     assert (settings.horizon.prediction, settings.horizon.control) == (50, 50)
-    with pytest.raises(EmulatorError, match=r"^\d{5} B of data and 2048 B of stack do not fit the 8192 B of"):
+    with pytest.raises(EmulatorError, match=r"^\d{5} B of data and 3072 B of stack do not fit the 8192 B of"):
         EmulatedController(settings, build_guest(settings, mega, tmp_path), "avr")
 
 
 def test_a_guest_that_leaves_no_room_is_refused(mega: Builder, tmp_path: Path) -> None:
     """A controller with inputs and outputs must fit between data and stack."""
     settings = ONE_NORM
-    glue = batch_source() + "char nmpc_ballast[5750] = {1};"
+    glue = batch_source() + "char nmpc_ballast[4726] = {1};"
     elf = mega.guest(render(settings, with_digest=False), glue, (*GUEST, "nmpc_ballast"), tmp_path)
     with pytest.raises(EmulatorError, match=r"^a controller .* takes \d{3} B, but .* has only \d+ B free$"):
         EmulatedController(settings, elf, "avr")

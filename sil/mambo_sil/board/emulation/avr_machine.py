@@ -32,7 +32,7 @@ _RETURN_ADDRESS: Final = _FLASH_BYTES - 0x1000
 _DATA_SPACE: Final = 0x800000
 """Offset of data addresses in ELF files and in GDB's protocol."""
 _RAM: Final = range(0x200, 0x2200)
-_STACK_BYTES: Final = 2048
+_STACK_BYTES: Final = 3072
 _GUARD: Final = b"\x5a" * 32
 """Pattern between data and stack; it is overwritten if the stack overflows."""
 _ALIGNMENT: Final = 2
