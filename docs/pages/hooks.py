@@ -27,6 +27,11 @@ _TABLE: Final = re.compile(r"^\[(Table: [^\]]+)\]\(([^)]+\.md)\)$", re.MULTILINE
 _NOT_SEARCHED: Final = ("explanation/decisions/", "archive/")
 """Folders for developers, and of figures that are no more those of today's C."""
 
+_WIDE: Final = "evidence/"
+"""The folder whose tables need the width of the table of contents."""
+_WIDEST: Final = ("evidence/margins.md", "evidence/simulators.md")
+"""Pages whose tables need the whole width."""
+
 _LONG_TABLE: Final = 15
 """A table of more rows than that is folded."""
 
@@ -50,6 +55,8 @@ def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
     """Put each linked table and drawing in place of its link; raises OSError for one that is not there."""
     if page.file.src_uri.startswith(_NOT_SEARCHED):
         page.meta["search"] = {"exclude": True}
+    if page.file.src_uri.startswith(_WIDE):
+        page.meta["hide"] = ["toc", "navigation"] if page.file.src_uri in _WIDEST else ["toc"]
     if page.file.abs_src_path is None:
         return markdown
     folder = Path(page.file.abs_src_path).parent
