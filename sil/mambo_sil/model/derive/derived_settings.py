@@ -25,7 +25,7 @@ UPDATE_PERIOD_S: Final = 0.01
 RAMP_S: Final = 0.4
 
 SPEED_LIMIT_M_S: Final = 5.0
-BRAKING_SHARE: Final = 0.7
+BRAKING_SHARE: Final = 0.65
 """Braking limit over what the tilt limit gives: the rest is left for wind and lag."""
 LEAST_BRAKING_M_S2: Final = 0.1
 
