@@ -145,7 +145,7 @@ class LimitsLaw:
         )
 
     def _turn_speed(self, memory: LimitsMemory, velocity: Real) -> tuple[LimitsMemory, Real]:
-        """Return what turns of targets with velocities (n, 2) leave, and the largest speed (n,) they allow."""
+        """Return the memory after targets with velocities (n, 2), and the speed that turns allow (n,)."""
         speed = memory.bounds.speed_m_s
         if self._turn is None:
             return memory, speed
@@ -169,12 +169,13 @@ class LimitsLaw:
     ) -> tuple[Real, NDArray[np.int64]]:
         """Return the desired velocities (n, 2) within the limits, and which limits act (n,).
 
-        fastest (n,) is the speed limit, or the speed that the target's turn allows. position (n, 2) is that of the drone, target (n, 4 or more). Where no limit acts the velocity is
-        not used: the target stays as it is.
+        fastest (n,) is the speed limit, or the speed that the target's turn allows; position (n, 2) is that
+        of the drone, target (n, 4 or more). Where no limit acts the velocity is not used: the target stays
+        as it is.
         """
         products, place = self._products, position - bounds.centre_m
         knee = products.knee(bounds.braking)
-        is_free = self._is_free(bounds, fastest, knee, place, position, target)
+        is_free = self._is_free(bounds, fastest, knee, position, target)
         half_width = bounds.clear_m + bounds.margin_m[:, None]
         error, velocity, outside = _walled(half_width, place, target, bounds.centre_m)
         square = products.square_sum(error)
@@ -194,15 +195,13 @@ class LimitsLaw:
         )
         return limited, np.where(is_free, 0, active)
 
-    def _is_free(
-        self, bounds: Bounds, fastest: Real, knee: Real, place: Real, position: Real, target: Real
-    ) -> Rows:
+    def _is_free(self, bounds: Bounds, fastest: Real, knee: Real, position: Real, target: Real) -> Rows:
         """Return whether drone, target and desired velocity are so far from every limit that none can act."""
         products = self._products
         error = target[:, 0:2] - position
         desired = target[:, 2:4] + products.approach_speed(products.approach, error)
         free: Rows = (
-            np.all(np.abs(place) <= bounds.clear_m, axis=1)
+            np.all(np.abs(position - bounds.centre_m) <= bounds.clear_m, axis=1)
             & (products.square_sum(error) <= products.square(knee))
             & (products.square_sum(desired) <= products.square(fastest))
         )
