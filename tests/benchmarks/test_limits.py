@@ -81,6 +81,17 @@ def test_a_circle_beyond_the_tilt_limit_is_no_orbit(preset: str) -> None:
 
 
 @pytest.mark.first_is_quick
+@pytest.mark.parametrize(("preset", "bound_m"), [("mambo-1norm", 0.6), ("table1", 0.9)])
+@pytest.mark.parametrize("speed_m_s", [2.0, 5.0])
+def test_with_the_1norm_a_circle_beyond_the_tilt_limit_is_no_orbit(
+    preset: str, bound_m: float, speed_m_s: float
+) -> None:
+    """1 m at 2.2 rad/s with braking 2: the drone flies a smaller circle at every heading."""
+    trace = flown(limited(preset, speed_m_s, 2.0), "mambo", Circle(1.0, 2.2), 30.0, LimitsCase())
+    assert np.all(horizontal_error_m(trace)[trace.time_s > TRANSIENT_S] < bound_m)
+
+
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("preset", QUADRATIC)
 @pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
 def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str, acceleration: str) -> None:

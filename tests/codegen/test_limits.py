@@ -48,7 +48,7 @@ def desired(settings: Settings, position: Any, target: Any) -> tuple[Any, Any]:
         method.numbers.quantize(values, names).astype(method.numbers.computed)
         for values, names in ((position, ("position",) * 2), (target, ("position",) * 2 + ("velocity",) * 2))
     )
-    velocity, active = limits._desire(many, *inputs)
+    velocity, active = limits._desire(many, many.speed_m_s, *inputs)
     return method.numbers.to_si(velocity, "velocity"), active
 
 
@@ -158,6 +158,55 @@ def test_flights_within_the_limits_keep_every_bit(base: str, scalar: str) -> Non
         steps = [one.step(state, target, np.full(20, 9.8)) for one in (ours, theirs)]
         assert not ours.memory.limits.active.any()
         assert steps[0].command_rad.tobytes() == steps[1].command_rad.tobytes()
+
+
+def turning(rate_rad_s: float, step: int, n: int = 1) -> Any:
+    """Return a target (n, 4) on a circle of 1 m, in control step `step`."""
+    phase = 0.01 * rate_rad_s * step
+    x, y = np.cos(phase), np.sin(phase)
+    return np.tile([x, y, -rate_rad_s * y, rate_rad_s * x], (n, 1))
+
+
+def turning_controller(scalar: str) -> Any:
+    """Return a controller with the 1-norm and a speed limit of 5 m/s, whose search is short."""
+    settings = with_option(limited("mambo-1norm", scalar, speed_m_s=5.0), "optimizer.iterations", 1)
+    return method_of(settings).reference_controller(1)
+
+
+def allowed_m_s(controller: Any, target: Any) -> float:
+    """Return the largest speed with which the next step would follow a target (1, 4), m/s."""
+    method, law_of = method_of(controller.settings), controller._limits
+    numbers = method.numbers.quantize(target[:, 2:4], ("velocity",) * 2).astype(method.numbers.computed)
+    fastest = law_of._turn_speed(controller.memory.limits, numbers)[1]
+    return float(method.numbers.to_si(fastest, "velocity")[0])
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize(("rate_rad_s", "expected_m_s"), [(1.7, 5.0), (2.2, 1.405), (-3.0, 1.030)])
+def test_with_the_1norm_a_hard_turn_lowers_the_speed(
+    scalar: str, rate_rad_s: float, expected_m_s: float
+) -> None:
+    """To A_T over the rate, A_T = 0.9 g 0.35 rad; a target that the tilt can turn changes nothing."""
+    controller: Any = turning_controller(scalar)
+    for step in range(120):
+        controller.step(np.zeros((1, 7)), turning(rate_rad_s, step), [9.81])
+    assert allowed_m_s(controller, turning(rate_rad_s, 120)) == pytest.approx(expected_m_s, rel=2e-3)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_the_turn_ends_with_the_target_s_motion(scalar: str) -> None:
+    """A target that stops, one that flies on straight ahead, and a reset: the speed limit is whole again."""
+    for after in ("stop", "straight", "reset"):
+        controller: Any = turning_controller(scalar)
+        for step in range(120):
+            controller.step(np.zeros((1, 7)), turning(3.0, step), [9.81])
+        last = turning(3.0, 119)
+        if after == "reset":
+            assert controller.reset([[0.0, 0.0]]).tolist() == [Status.OK]
+        for _ in range({"stop": 1, "straight": 20, "reset": 0}[after]):
+            last[:, 2:4] *= after != "stop"
+            controller.step(np.zeros((1, 7)), last, [9.81])
+        assert allowed_m_s(controller, last) == pytest.approx(5.0, rel=1e-6)
 
 
 def test_active_limits_are_named() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.limits_arithmetic import limits_arithmetic
-from mambo_codegen.methods.limits_constants import SPELLING, LimitsConstants
+from mambo_codegen.methods.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.math import Real, clamp, larger, smaller
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -59,18 +59,33 @@ class LimitsMemory:
     velocity_m_s:  (n, 2) what stood for the target's velocity in the last step; zeros unless the target's
                    acceleration is given.
     active:        (n,) the limits that acted in the last step, but TILT.
+    target_m_s:    (n, 2) the target's velocity in the last step; zeros unless its turns limit the speed.
+    turn_m2_s2:    (n,) mean product of successive ones, |v|^2 times the angle of an update period; likewise.
     """
 
     bounds: Bounds
     command_limit: Real
     velocity_m_s: Real
     active: NDArray[np.int64]
+    target_m_s: Real
+    turn_m2_s2: Real
+
+
+def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
+    """Return the memory of controllers whose limits do not act and that have seen no target."""
+    return replace(
+        memory,
+        active=np.zeros_like(memory.active),
+        target_m_s=np.zeros_like(memory.target_m_s),
+        turn_m2_s2=np.zeros_like(memory.turn_m2_s2),
+    )
 
 
 def no_limits(like: Real) -> LimitsMemory:
     """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
     pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
-    return LimitsMemory(Bounds(pair, pair, one, one, one, one), pair, pair, np.zeros(len(like), np.int64))
+    bounds, active = Bounds(pair, pair, one, one, one, one), np.zeros(len(like), np.int64)
+    return LimitsMemory(bounds, pair, pair, active, pair, one)
 
 
 class LimitsLaw:
@@ -88,6 +103,10 @@ class LimitsLaw:
         tracker = constants.tracker
         self.is_given = tracker is not None and tracker.is_given
         self._jump = constant(tracker.input_limit, "thrust") if tracker and self.is_given else None
+        self._turn = None
+        if limits.turn_m_s_rad is not None:
+            self._turn = constant(limits.turn_m_s_rad, "slope")
+            self._least_turn = constant(LEAST_TURN_M2_S2, "velocity")
         self.defaults: Real = self.quantize([limits.limits])
 
     def quantize(self, limits: ArrayLike) -> Real:
@@ -125,15 +144,38 @@ class LimitsLaw:
             tilt_rad=limits[:, 6],
         )
 
-    def _desire(self, bounds: Bounds, position: Real, target: Real) -> tuple[Real, NDArray[np.int64]]:
+    def _turn_speed(self, memory: LimitsMemory, velocity: Real) -> tuple[LimitsMemory, Real]:
+        """Return the memory after targets with velocities (n, 2), and the speed that turns allow (n,)."""
+        speed = memory.bounds.speed_m_s
+        if self._turn is None:
+            return memory, speed
+        products, zero = self._products, np.zeros_like(speed)
+        square = products.square_sum(velocity)
+        moves = square > products.square(self._smallest_speed)
+        turn = products.mean_turn(memory.turn_m2_s2, memory.target_m_s, velocity)
+        turn = np.where(moves, clamp(turn, self._ranges.velocity), zero)
+        target_speed = products.speed(np.where(moves, square, products.square(self._smallest_speed)))
+        change = products.turn_product(self._turn, memory.bounds.tilt_rad)
+        most, size = products.turn_most(change, target_speed), np.abs(turn)
+        hard = moves & (size > most) & (size > self._least_turn)
+        root = products.inverse_root(products.square(np.where(hard, size, self._least_turn)))
+        share = products.share(np.where(hard, most, zero), root)
+        turned = larger(products.share_product(target_speed, share), self._smallest_speed)
+        memory = replace(memory, target_m_s=velocity, turn_m2_s2=turn)
+        return memory, np.where(hard, smaller(speed, turned), speed)
+
+    def _desire(
+        self, bounds: Bounds, fastest: Real, position: Real, target: Real
+    ) -> tuple[Real, NDArray[np.int64]]:
         """Return the desired velocities (n, 2) within the limits, and which limits act (n,).
 
-        position (n, 2) is that of the drone, target (n, 4 or more). Where no limit acts the velocity is
-        not used: the target stays as it is.
+        fastest (n,) is the speed limit, or the speed that the target's turn allows; position (n, 2) is that
+        of the drone, target (n, 4 or more). Where no limit acts the velocity is not used: the target stays
+        as it is.
         """
         products, place = self._products, position - bounds.centre_m
         knee = products.knee(bounds.braking)
-        is_free = self._is_free(bounds, knee, place, position, target)
+        is_free = self._is_free(bounds, fastest, knee, position, target)
         half_width = bounds.clear_m + bounds.margin_m[:, None]
         error, velocity, outside = _walled(half_width, place, target, bounds.centre_m)
         square = products.square_sum(error)
@@ -144,8 +186,8 @@ class LimitsLaw:
         limited = -self._below(bounds, knee, -limited, half_width + place)
         walled = outside | np.any(limited != desired, axis=1)
         square = products.square_sum(limited)
-        fast = square > products.square(bounds.speed_m_s)
-        share = products.share(bounds.speed_m_s, products.inverse_root(square))
+        fast = square > products.square(fastest)
+        share = products.share(fastest, products.inverse_root(square))
         limited = np.where(fast[:, None], products.share_product(limited, share[:, None]), limited)
         limited = clamp(limited, self._ranges.velocity)
         active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
@@ -153,15 +195,15 @@ class LimitsLaw:
         )
         return limited, np.where(is_free, 0, active)
 
-    def _is_free(self, bounds: Bounds, knee: Real, place: Real, position: Real, target: Real) -> Rows:
+    def _is_free(self, bounds: Bounds, fastest: Real, knee: Real, position: Real, target: Real) -> Rows:
         """Return whether drone, target and desired velocity are so far from every limit that none can act."""
         products = self._products
         error = target[:, 0:2] - position
         desired = target[:, 2:4] + products.approach_speed(products.approach, error)
         free: Rows = (
-            np.all(np.abs(place) <= bounds.clear_m, axis=1)
+            np.all(np.abs(position - bounds.centre_m) <= bounds.clear_m, axis=1)
             & (products.square_sum(error) <= products.square(knee))
-            & (products.square_sum(desired) <= products.square(bounds.speed_m_s))
+            & (products.square_sum(desired) <= products.square(fastest))
         )
         return free
 
@@ -195,7 +237,8 @@ class LimitsLaw:
 
     def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
-        desired, active = self._desire(memory.bounds, position, target)
+        memory, fastest = self._turn_speed(memory, target[:, 2:4])
+        desired, active = self._desire(memory.bounds, fastest, position, target)
         acts = (active != 0)[:, None]
         velocity = np.where(acts, desired, target[:, 2:4])
         columns = [np.where(acts, position, target[:, 0:2]), velocity]
@@ -212,7 +255,8 @@ class LimitsLaw:
             one[:, None] for one in (bounds.margin_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
         ]
         columns += [memory.command_limit] if has_command else []
-        return columns + ([memory.velocity_m_s] if self.is_given else [])
+        columns += [memory.velocity_m_s] if self.is_given else []
+        return columns + ([] if self._turn is None else [memory.target_m_s, memory.turn_m2_s2[:, None]])
 
     def _rate(self, velocity: Real, previous: Real) -> Real:
         """Return the acceleration (n, 2) of a desired velocity, m/s^2; 0 where it has jumped."""

@@ -32,6 +32,10 @@ FIXED_START: Final = (2289921229, 1308545065)
 """The line 2.1327 - 1.2187 m, with SHARE_BITS: within 0.086 of 1/sqrt(m) for m in 1/4..1."""
 
 
+TURN_BITS: Final = 4
+"""A target's turn is a mean in which each step has the share 1/2^4."""
+
+
 @dataclass(frozen=True)
 class FixedRoot:
     """Inverse square roots in fixed point: mantissa / 2^(SHARE_BITS + half), the mantissa in 2^30..2^31.
@@ -101,6 +105,18 @@ class LimitsArithmetic(Protocol):
 
     def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
         """Return slope * tilt, the acceleration of a tilt, m/s^2."""
+
+    def mean_turn(self, turn_m2_s2: Real, before_m_s: Real, velocity_m_s: Real) -> Real:
+        """Return a mean (n,) with the vector product of two velocities (n, 2) taken in."""
+
+    def speed(self, square: Real) -> Real:
+        """Return the root of a positive sum of squares of speeds, m/s."""
+
+    def turn_product(self, turn: Any, tilt_rad: Real) -> Real:
+        """Return turn * tilt, the change of velocity that a tilt gives in an update period, m/s."""
+
+    def turn_most(self, change_m_s: Real, speed_m_s: Real) -> Real:
+        """Return change * speed, m^2/s^2."""
 
 
 class LimitsFloatArithmetic:
@@ -172,6 +188,20 @@ class LimitsFloatArithmetic:
 
     def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
         return slope * tilt_rad
+
+    def mean_turn(self, turn_m2_s2: Real, before_m_s: Real, velocity_m_s: Real) -> Real:
+        cross = (before_m_s[:, 0] * velocity_m_s[:, 1]) - (before_m_s[:, 1] * velocity_m_s[:, 0])
+        gain = self._scalar(1 / 2**TURN_BITS)
+        return ((self._scalar(1) - gain) * turn_m2_s2) + (gain * cross)
+
+    def speed(self, square: Real) -> Real:
+        return square * self.inverse_root(square)
+
+    def turn_product(self, turn: Any, tilt_rad: Real) -> Real:
+        return turn * tilt_rad
+
+    def turn_most(self, change_m_s: Real, speed_m_s: Real) -> Real:
+        return change_m_s * speed_m_s
 
 
 class LimitsFixedArithmetic:
@@ -271,6 +301,21 @@ class LimitsFixedArithmetic:
 
     def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
         return rounded(slope * tilt_rad, self._slope + self._angle - self._braking)
+
+    def mean_turn(self, turn_m2_s2: Real, before_m_s: Real, velocity_m_s: Real) -> Real:
+        cross = (before_m_s[:, 0] * velocity_m_s[:, 1]) - (before_m_s[:, 1] * velocity_m_s[:, 0])
+        rest = 2**TURN_BITS - 1
+        return rounded((rest * turn_m2_s2) + rounded(cross, self._velocity), TURN_BITS)
+
+    def speed(self, square: Real) -> Real:
+        return np.minimum(self._root(square), 2 * self._fastest)
+
+    def turn_product(self, turn: Any, tilt_rad: Real) -> Real:
+        change = rounded(turn * tilt_rad, self._slope + self._angle - self._velocity)
+        return np.minimum(change, 2 * self._fastest)
+
+    def turn_most(self, change_m_s: Real, speed_m_s: Real) -> Real:
+        return (change_m_s * speed_m_s) >> self._velocity
 
     def _root(self, square: Real) -> Real:
         root = self.inverse_root(square)

@@ -29,6 +29,12 @@ BRAKING_SHARE: Final = 0.8
 SPELLING: Final = 1.0005
 """A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
 
+TURN_SHARE: Final = 0.9
+"""With the 1-norm a target's turns may take this share of what the tilt limit gives; see `limits.c.j2`."""
+
+LEAST_TURN_M2_S2: Final = 4e-5
+"""The smallest turn that limits a speed: its square has a root in float32."""
+
 LIMITS: Final = ("velocity", "braking", *["position"] * 4, "angle")
 """The quantity of each number in nmpc_limits_t, in their order."""
 
@@ -66,12 +72,15 @@ class LimitsConstants:
     limits:       (7,) the limits of the settings, of the quantities LIMITS: a missing one is the widest that
                   may be set. With a height (11,), HEIGHT_LIMITS too.
     steps_per_s:  the update rate.
+    turn_m_s_rad: change of velocity in an update period that a turn may take, per tilt; None if turns do not
+                  limit the speed.
     """
 
     approach_1_s: float
     tilted: TiltAcceleration
     limits: NDArray[np.float64]
     steps_per_s: float
+    turn_m_s_rad: float | None = None
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -12,8 +12,16 @@ from mambo_codegen.methods.limits_arithmetic import (
     ITERATIONS,
     ROOT_ERROR,
     STARTS,
+    TURN_BITS,
 )
-from mambo_codegen.methods.limits_constants import ROOT_BITS, SHARE_BITS, SPELLING, stored_quantities
+from mambo_codegen.methods.limits_constants import (
+    LEAST_TURN_M2_S2,
+    ROOT_BITS,
+    SHARE_BITS,
+    SPELLING,
+    TURN_SHARE,
+    stored_quantities,
+)
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -43,12 +51,24 @@ def limits_context(method: Method) -> dict[str, object]:
         "root_iterations": FIXED_ITERATIONS if fixed else ITERATIONS[numbers.scalar],
         "limits_shifts": limits_shifts(numbers.bits) if numbers.bits is not None else None,
         "default_bounds": bounds,
-        "default_target_bounds": others[-6:-4] if method.has_height else others[-2:],
+        "default_target_bounds": _target_bounds(method, others),
+        "turning": limiting.turn_m_s_rad is not None,
+        "turn_zeros": others[-3:],
+        "turn_share": TURN_SHARE,
+        "turn_bits": TURN_BITS,
+        "least_turn": LEAST_TURN_M2_S2,
         "default_height_bounds": others[-4:],
         "outage_steps": method.outage_steps,
         "least_square": LEAST_SQUARE,
         "root_limit": 2 / math.sqrt(LEAST_SQUARE),
     }
+
+
+def _target_bounds(method: Method, others: list[str]) -> list[str]:
+    """Return what stands for the target's velocity before the first step, of the last bounds `others`."""
+    if method.limiting is not None and method.limiting.turn_m_s_rad is not None:
+        return others[:2]
+    return others[-6:-4] if method.has_height else others[-2:]
 
 
 def limits_shifts(bits: Mapping[str, int]) -> dict[str, int]:
@@ -72,4 +92,5 @@ def limits_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "stopping": (2 * ROOT_BITS) - position,
         "tilt": bits["slope"] + bits["angle"] - braking,
         "rate": bits["rate"] + velocity - bits["thrust"],
+        "turn": bits["slope"] + bits["angle"] - velocity,
     }

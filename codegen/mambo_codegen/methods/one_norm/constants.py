@@ -1,6 +1,7 @@
 """The constants of a controller with the 1-norm."""
 
 import math
+from dataclasses import replace
 from functools import cached_property
 
 from mambo_codegen.methods.constants import Constants
@@ -8,6 +9,7 @@ from mambo_codegen.methods.limits_constants import (
     ONE_NORM_APPROACH_1_S,
     ONE_NORM_OUTAGE_S,
     ONE_NORM_TILT,
+    TURN_SHARE,
     LimitsConstants,
     limits_constants,
     stored_quantities,
@@ -33,13 +35,15 @@ class OneNormConstants(Constants):
     @cached_property
     def limiting(self) -> LimitsConstants | None:
         """The constants of the limits of speed, braking and place, in float64; None without any."""
-        return limits_constants(self.settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
+        found = limits_constants(self.settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
+        turn = TURN_SHARE * ONE_NORM_TILT.slope_m_s2_rad * self.settings.horizon.update_period_s
+        return found and replace(found, turn_m_s_rad=turn)
 
     @property
     def limits_stored(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_bounds_t, in their order."""
         given = self.tracker is not None and self.tracker.is_given
-        return stored_quantities(*["velocity"] * (2 if given else 0))
+        return stored_quantities(*["velocity"] * (5 if given else 3))
 
     @property
     def outage_steps(self) -> int | None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Status, choose
-from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, no_limits
+from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
@@ -267,7 +267,7 @@ class OneNormController:
             command_rad=command,
             plan_rad=np.broadcast_to(command[:, None], self.memory.plan_rad.shape),
             target=unknown_motion(command),
-            limits=replace(limits, active=np.zeros_like(limits.active)),
+            limits=forgotten_target(limits),
             missed=np.zeros(n, np.int64),
             sent_rad=command,
             has_tilt=np.zeros(n, np.bool_),
