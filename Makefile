@@ -3,6 +3,7 @@
 # make test       set up everything, check style and types, run the tests; with CI=true also the long ones
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
 # make thorough   the same with every case of the tests of which CI runs a sample
+# make proofs     make all proofs with Frama-C anew; CI makes only those that are not in tests/verify/proven.txt
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
 # make docs       build the manual; its first page is build/docs/index.html
@@ -40,7 +41,7 @@ CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/r
     $(filter-out %/test_generations.py %/test_quadratic_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/drone/plant tests/drone/sensors
 
-.PHONY: fly check test thorough tools generated docs evidence bench bench-peers clean
+.PHONY: fly check test thorough proofs tools generated docs evidence bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -55,9 +56,16 @@ test: tools $(SETUP_TEST)
 	$(STYLE_AND_TYPES)
 	$(BIN)/python -m pytest -n auto --dist worksteal $(MARKED)
 
-# All cases of the tests that CI samples too.
+# All cases of the tests that CI samples too, and all proofs.
 thorough: MARKED = -m "thorough or not thorough"
+thorough: export PROOFS = anew
 thorough: test
+
+# The record of proofs is written anew, so that it has no line that no test wants.
+proofs: export PROOFS = anew
+proofs: $(SETUP_TEST)
+	rm -f tests/verify/proven.txt
+	$(BIN)/python -m pytest -n auto -m "thorough or not thorough" -k "proven" tests/verify
 
 # As root on a system with apt, install all packages if a command is missing; elsewhere name them.
 tools:

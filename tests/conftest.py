@@ -1,5 +1,6 @@
 """Fixtures for all tests, and the skip of those that want a compiler where there is none."""
 
+import gc
 import os
 import sys
 from collections import Counter
@@ -20,6 +21,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Hundreds of tests start Python: each would compile all modules again, a second of processor time.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# Tests are thousands of objects that stay: looking for garbage as often as usual takes a tenth of the time.
+gc.set_threshold(50_000)
 
 settings.register_profile(
     "house", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]

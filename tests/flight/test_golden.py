@@ -45,7 +45,7 @@ CASES = [
 def test_flights_have_the_committed_digests(processor: str, arguments: tuple[str, ...], part: str) -> None:
     """In every bit of their traces; `python -m tests.support.golden_flights --write` writes them anew.
 
-    In NumPy the first 400 ticks are flown: what differs between processors there is sine, cosine and such,
+    In NumPy the first 200 ticks are flown: what differs between processors there is sine, cosine and such,
     which every tick calls. That the engine has the bits of NumPy is tested in `tests/flight/engine`.
     """
     flown = json.loads(run("-m", "tests.support.golden_flights", *arguments, processor=processor))

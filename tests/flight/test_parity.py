@@ -85,7 +85,7 @@ def test_a_flight_in_numpy_with_the_reference_is_the_flight_with_the_c(condition
 def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) -> None:
     """Over Table II's 100 s, compilers and optimization levels give the same bits.
 
-    The reference flies along: with preset mambo all the way, with the others two figures of the eight.
+    The reference answers along: with preset mambo all the way, with the others two figures of the eight.
     """
     settings = presets.load(preset)
     flight = Flight(CASE)
@@ -94,11 +94,8 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
         for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2"))
     )
     assert all(first.same_bits(other) for other in others)
-    if preset == "mambo":
-        assert first.same_bits(fly(flight, method_of(settings).reference_controller()))
-    else:
-        followed = replace(flight, duration_s=25.2)
-        demand_reference(followed, first, method_of(settings).reference_controller())
+    followed = flight if preset == "mambo" else replace(flight, duration_s=25.2)
+    demand_reference(followed, first, method_of(settings).reference_controller())
 
 
 def indices(preset: str, scalar: str, flight: Flight) -> np.ndarray:

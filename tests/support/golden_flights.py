@@ -58,7 +58,7 @@ SCENARIOS: Final = {
 }
 
 
-SHORT_S: Final = 2.0
+SHORT_S: Final = 1.0
 SHORT: Final = {name: flown.model_copy(update={"duration_s": SHORT_S}) for name, flown in SCENARIOS.items()}
 """The same flights, ended early."""
 

@@ -40,9 +40,7 @@ def check(its: Subject) -> Result:
 
 def reached(its: Subject) -> str:
     """Return all definitions and contracts that `turn_everywhere` reaches, after the preprocessor."""
-    texts = {path: _open_contracts((its.bundle / path).read_text("utf-8")) for path in (_DRIVER, "nmpc.c")}
-    joined = texts[_DRIVER].replace('#include "nmpc.c"\n', texts["nmpc.c"])
-    (its.folder / "joined.c").write_text(joined, "utf-8")
+    join(its)
     include = [f"-I{its.bundle.resolve()}"]
     Toolchain((require("gcc", "gcc"),)).run(
         ["-E", "-P", *PROOF_PREPROCESSING, *include, "joined.c", "-o", "joined.i"], its.folder
@@ -55,6 +53,13 @@ def reached(its: Subject) -> str:
                 found.add(item)
                 names += _WORD.findall(item)
     return "\n".join(sorted(found))
+
+
+def join(its: Subject) -> None:
+    """Write driver and controller as one file, `joined.c`, whose contracts the preprocessor keeps."""
+    texts = {path: _open_contracts((its.bundle / path).read_text("utf-8")) for path in (_DRIVER, "nmpc.c")}
+    joined = texts[_DRIVER].replace('#include "nmpc.c"\n', texts["nmpc.c"])
+    (its.folder / "joined.c").write_text(joined, "utf-8")
 
 
 def _headings(its: Subject, flags: tuple[str, ...]) -> Report | Result:

@@ -13,7 +13,7 @@ from mambo_sil.verify import fuzzing, rules, sanitizers
 from mambo_sil.verify.calls import NULL_SELF, ApiFunction, Outcomes, Tape, answers, calls
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
-from tests.support import headings
+from tests.support import proven
 from tests.support.alarms import Alarm, Fault, unnoticed
 from tests.support.height import height_case
 from tests.support.subjects import Harm, played_fault, subject
@@ -123,7 +123,7 @@ def test_no_rule_is_broken(scalar: str, tmp_path: Path) -> None:
 def test_it_is_proven(scalar: str, tmp_path: Path) -> None:
     """No run-time error, and no command beyond the limits of tilt and thrust."""
     require("frama-c", "frama-c-base")
-    result = headings.check(subject(height_case(LIMITED, scalar), tmp_path))
+    result = proven.check(subject(height_case(LIMITED, scalar), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 

@@ -11,7 +11,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.proof import check, read_properties
-from tests.support import headings
+from tests.support import proven
 from tests.support.alarms import (
     INFINITY_PASSES,
     NAN_PASSES,
@@ -157,15 +157,15 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
 
     With float64, whose C is that of float32 with another type, one preset of a 1-norm (`test_quadratic` has
     settings of a quadratic cost); in fixed point not that which differs from another by two signs. One is
-    checked as a user does it; of the others all but `tests.support.headings` leaves out.
+    checked as a user does it; of the others what `tests.support.proven` leaves to be proven.
     """
     its = subject(of_scalar(name, scalar), tmp_path)
-    whole = (name, scalar) == ("mambo", "float32")
-    result = check(its) if whole else headings.check(its)
+    whole = (name, scalar) == ("table1", "float32")
+    result = check(its) if whole else proven.check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     promises = 5 if scalar == "fixed" else 10 if its.settings.cost.norm == "quadratic" else 7
     assert result.figures["promises"] == result.figures["promises_proven"] == promises
-    for proof in {*method_of(its.settings).proofs} - (set() if whole else {headings.HEADINGS}):
+    for proof in method_of(its.settings).proofs if whole else ():
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
 
@@ -199,7 +199,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
     settings = settings_case(index, scalar)
     if settings.horizon.control * settings.optimizer.iterations > MOST_WORK:
         settings = with_option(settings, "optimizer.iterations", 3)
-    result = headings.check(subject(settings, tmp_path))
+    result = proven.check(subject(settings, tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 

@@ -14,7 +14,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
 from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import CheckOutcome, Result, Subject
-from tests.support import headings
+from tests.support import proven
 from tests.support.alarms import (
     INFINITY_PASSES,
     NAN_PASSES,
@@ -245,7 +245,7 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
         document["damping"]["roll_rate_feedback_s"] = 0.0
     document["limits"]["speed_m_s"] = chosen.speed_m_s
     settings = Settings.model_validate(document)
-    result = headings.check(subject(settings if chosen.speed_m_s else without_limits(settings), tmp_path))
+    result = proven.check(subject(settings if chosen.speed_m_s else without_limits(settings), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 

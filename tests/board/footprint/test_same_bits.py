@@ -54,16 +54,21 @@ FAULTS = {
 """Faults by name: file, the line, what it becomes."""
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
-@pytest.mark.parametrize("scalar", EMULATED)
-def test_every_build_has_the_digest_of_the_reference(scalar: str) -> None:
-    """Host and boards, with all compilers and optimisations, with and without an FPU."""
+@pytest.mark.parametrize(
+    ("scalar", "name"), [(scalar, name) for scalar, names in EMULATED.items() for name in names]
+)
+def test_every_build_has_the_digest_of_the_reference(scalar: str, name: str) -> None:
+    """Host and boards, with all compilers and optimisations, with and without an FPU.
+
+    The sample has every scalar type, and four of the five boards.
+    """
     for compiler in HOST_COMPILERS:
         require(compiler, compiler)
-    for name in EMULATED[scalar]:
-        board_builder(name)
+    board_builder(name)
     settings = with_option(MAMBO, "code.scalar", scalar)
-    chosen = [boards.load(name) for name in EMULATED[scalar]]
+    chosen = [boards.load(name)]
     found = list(run_everywhere(settings, chosen, 3))
     builds = [("host", compiler) for compiler in HOST_COMPILERS]
     for board in chosen:

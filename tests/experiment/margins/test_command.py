@@ -10,6 +10,8 @@ import pytest
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.experiment.campaign.campaign_file import default
+from mambo_sil.experiment.margins.many_drones import campaign_drones
 from mambo_sil.experiment.margins.margins_record import PICTURES, RESPONSES
 from tests.support.command import run
 
@@ -86,12 +88,12 @@ def test_results_are_pictures_and_files_that_report_shows() -> None:
 @pytest.mark.long
 def test_draws_do_not_depend_on_how_many_there_are() -> None:
     """Drone 2 of three is drone 2 of eleven; its sensors are those of the campaign, or given."""
-    run("margins", "--campaign", "default", "--drones", "3", "-o", "few")
-    run("margins", "--campaign", "default", "--drones", "11", "-o", "many")
-    few, many = (Path(name, "drones.csv").read_text("utf-8").splitlines() for name in ("few", "many"))
-    assert few == many[:4]
-    run("margins", "--campaign", "default", "--drones", "3", "--sensors", "none", "-o", "true")
-    assert Path("true/drones.csv").read_text("utf-8").splitlines()[1] != few[1]
+    few, many = (list(campaign_drones(preset("mambo"), default(), drones)) for drones in (3, 11))
+    assert len(many) == 11
+    assert list(map(repr, few)) == list(map(repr, many[:3]))
+    first = ("--campaign", "default", "--drones", "1")
+    drawn, true = measured(*first), measured(*first, "--sensors", "none")
+    assert drawn["many"]["spreads"] != true["many"]["spreads"]
 
 
 def test_uncertainty_takes_the_ends_of_the_intervals() -> None:

@@ -232,7 +232,7 @@ def demand_cover(estimates: list[Interval], truths: list[float], least: float) -
     assert np.mean([one.within for one in estimates]) < 12.0 * np.mean(errors)
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(5)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("truth", "flown"),

@@ -15,10 +15,6 @@ class Cycles(NamedTuple):
         """Return the sum."""
         return Cycles(self.fewest + other.fewest, self.usual + other.usual, self.most + other.most)
 
-    def times(self, number: int) -> "Cycles":
-        """Return the product."""
-        return Cycles(self.fewest * number, self.usual * number, self.most * number)
-
 
 def exactly(cycles: int) -> Cycles:
     """Return the cycles of what the manual gives one number for."""
