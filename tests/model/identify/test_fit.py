@@ -136,6 +136,30 @@ def test_a_response_of_second_order_has_no_integrator(frequency_rad_s: float, da
 
 
 @pytest.mark.first_is_quick
+@pytest.mark.parametrize(("frequency_rad_s", "damping"), [(22.0, 0.75), (15.0, 0.6)])
+@pytest.mark.parametrize("sines_rad", [0.05, 0.0175])
+def test_slow_motion_decides_on_lag_and_gain(
+    frequency_rad_s: float, damping: float, sines_rad: float
+) -> None:
+    """Of a drone of second order, whatever its sines; else the sum is up to 25 ms too large."""
+    step_s = 0.01
+    log = dict(fly(TRUTH, Flown(duration_s=44.0, sines_rad=sines_rad), 1)[0])
+    drone = ([frequency_rad_s**2], [1.0, 2.0 * damping * frequency_rad_s, frequency_rad_s**2])
+    ((top,), bottom, _) = cont2discrete(drone, step_s)
+    random = np.random.default_rng(1)
+    for name in ("roll", "pitch"):
+        noise = 0.002 * random.normal(size=len(log["time_s"]))
+        log[f"{name}_rad"] = 0.92 * lfilter(top, bottom, log[f"{name}_command_rad"]) + noise
+    summary = found({name: log[name] for name in ("time_s", *NAMES[:5])})
+    for axis in summary.axes.values():
+        assert axis.verdict == "good"
+        assert axis.first_order is not None
+        gain, sum_s = axis.first_order.gain, axis.first_order.sum_s
+        assert abs(gain.value - 0.92) < 0.01
+        assert abs(sum_s.value - 2.0 * damping / frequency_rad_s) < min(sum_s.within, 0.006)
+
+
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("drag_1_s", "rate_rad_s"), [(0.15, 1.2), (0.456, 1.5)])
 def test_a_filtered_velocity_does_not_hide_the_drag(drag_1_s: float, rate_rad_s: float) -> None:
     """A lag of 30 ms is found, and the drag lies in its interval; without the lag it is 0.06 to 0.1 low."""

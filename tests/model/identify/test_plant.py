@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.drone.sensors.mocap import MotionCapture
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.loop import Flight, Outcome, fly
 from mambo_sil.flight.traces import write_csv
@@ -15,7 +19,7 @@ from mambo_sil.flight.trajectories import Waypoints
 from mambo_sil.model.identify.columns import KNOWN, Column
 from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.identify.identify_record import IdentifySummary
-from mambo_sil.model.identify.manoeuvre import SINES_HZ, waypoints_csv
+from mambo_sil.model.identify.manoeuvre import DURATION_S, SINES_HZ, waypoints_csv
 from mambo_sil.model.identify.response import FittedResponse
 from mambo_sil.model.identify.segments import PERIOD_S, HeldCommand, Segment
 from mambo_sil.model.identify.signals import COMMANDS, THRUST_COMMAND, FlightLog, Signal
@@ -117,3 +121,106 @@ def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
     assert motion is not None
     assert abs(motion.acceleration_per_tilt.value - 1.0) < 0.001
     assert abs(motion.drag_1_s.value - 0.067) < 0.002
+
+
+DRONE = """
+[body]
+mass_kg = 0.0328
+drag_1_s = {drag_1_s}
+
+[attitude]
+kind = "first_order"
+acceleration_per_tilt_g = {share_g}
+roll = {{ gain = 0.922, lag_s = 0.048, dead_time_s = 0.027 }}
+pitch = {{ gain = 0.922, lag_s = 0.048, dead_time_s = 0.027 }}
+roll_trim_rad = {trim_rad}
+pitch_trim_rad = {trim_rad}
+
+[altitude]
+p_n_m = 0.492
+d_n_s_m = 0.23
+thrust_max_n = 0.48
+{thrust}
+[sensors]
+kind = "mocap"
+position_noise_m = {noise_m}
+position_delay_s = {delay_s}
+velocity_filter_s = {filter_s}
+attitude_noise_rad = {noise_rad}
+"""
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A drone, its heading, and the motion capture that sees it."""
+
+    drag_1_s: float = 0.456
+    yaw_rad: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+    noise_m: float = 0.001
+    noise_rad: float = 0.003
+    delay_s: float = 0.01
+    filter_s: float = 0.03
+    share_g: float = 1.0
+    trim_rad: float = 0.0
+    thrust: str = ""
+    size: float = 1.0
+    """Factor on the manoeuvre, and so on its speeds."""
+
+
+def capture(flown: Captured, seeds: int, folder: Path) -> list[Path]:
+    """Fly the manoeuvre with PD and sines, and write the trace of each flight."""
+    drone = vehicle_toml.parse(DRONE.format(**vars(flown)), "drone", "drone")
+    assert isinstance(drone.sensors, MocapSensors)
+    (folder / "eight.csv").write_text(waypoints_csv(), "utf-8")
+    points = np.array(Waypoints.read(folder / "eight.csv").points) * [1.0, flown.size, flown.size]
+    flight = Flight(
+        Waypoints(tuple(map(tuple, points.tolist()))),
+        duration_s=DURATION_S,
+        flights=seeds,
+        yaw_rad=flown.yaw_rad,
+        yaw_rate_rad_s=flown.yaw_rate_rad_s,
+        vehicle=Vehicle.of(drone),
+        seeds=tuple(range(seeds)),
+        sensors=MotionCapture(drone.sensors),
+    )
+    trace = fly(flight, WithSines())
+    paths = [folder / f"trace{number}.csv" for number in range(seeds)]
+    for number, path in enumerate(paths):
+        write_csv(trace, path, number)
+    return paths
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "flown",
+    [
+        pytest.param(Captured(), id="as the Crazyflie"),
+        pytest.param(Captured(yaw_rad=2.5), id="turned"),
+        pytest.param(Captured(yaw_rate_rad_s=0.3), id="turning"),
+        pytest.param(Captured(drag_1_s=0.15, size=1.5), id="little drag"),
+        pytest.param(Captured(drag_1_s=1.0), id="much drag"),
+        pytest.param(Captured(noise_m=0.003, noise_rad=0.01), id="noise"),
+        pytest.param(Captured(filter_s=0.06), id="slow filter"),
+        pytest.param(Captured(filter_s=0.0), id="no filter"),
+        pytest.param(Captured(delay_s=0.04), id="late"),
+        pytest.param(Captured(share_g=0.9, trim_rad=0.03), id="trims"),
+        pytest.param(Captured(thrust="[thrust]\nlag_s = 0.149"), id="slow rotors"),
+    ],
+)
+def test_drag_and_acceleration_are_found_through_motion_capture(flown: Captured, tmp_path: Path) -> None:
+    """Within 1.5 % and 0.5 %, whatever noise, filter and heading; so are trims and lag of the velocity.
+
+    The lag is that of the filter, which is one of samples, the delay, and half a period of the quotient.
+    """
+    keep = np.exp(-PERIOD_S / flown.filter_s) if flown.filter_s else 0.0
+    lag_s = PERIOD_S * keep / (1.0 - keep) + flown.delay_s + 0.5 * PERIOD_S
+    for path in capture(flown, 2, tmp_path):
+        motion = identify(*read_logs([path], {}))[0].motion
+        assert motion is not None
+        drag, share = motion.drag_1_s, motion.acceleration_per_tilt
+        assert abs(drag.value - flown.drag_1_s) < 0.015 * flown.drag_1_s
+        assert abs(share.value - flown.share_g) < 0.005 * flown.share_g
+        assert abs(motion.velocity_lag_s.value - lag_s) < 0.003
+        for trim in motion.trim_rad:
+            assert abs(trim.value - flown.trim_rad) < 0.001

@@ -6,7 +6,8 @@
 A response of second order without an integrator is k / (lag s^2 + s + k).
 
 Output error: the model is driven by the commands alone. Gain and offsets are solved linearly inside the
-search for the other parameters, of which it takes the logarithms.
+search for the other parameters, of which it takes the logarithms. Model and tilt may be smoothed alike: then
+the model is that of slow motion, in which a drone of higher order has another lag than in quick motion.
 """
 
 import cmath
@@ -86,11 +87,13 @@ class FittedResponse:
         return np.log(values)
 
 
-def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> FittedResponse:
-    """Fit one axis of all segments at once, on the samples of `masks`."""
+def fit_response(
+    segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool, span: int = 1
+) -> FittedResponse:
+    """Fit one axis of all segments at once, on the samples of `masks`, smoothed over `span` samples twice."""
     if integrator:
-        return _fit(segments, axis, masks, _STARTS_INTEGRATOR, _HIGH, zero=1.0)
-    return _fit(segments, axis, masks, [start[:2] for start in _STARTS], _HIGH[:2], zero=1.0)
+        return _fit(segments, axis, masks, _STARTS_INTEGRATOR, _HIGH, zero=1.0, span=span)
+    return _fit(segments, axis, masks, [start[:2] for start in _STARTS], _HIGH[:2], zero=1.0, span=span)
 
 
 def fit_second_order(segments: Sequence[Segment], axis: int, masks: Masks) -> FittedResponse:
@@ -106,11 +109,12 @@ def _fit(
     high: FloatArray,
     *,
     zero: float,
+    span: int = 1,
 ) -> FittedResponse:
     """Fit lag, dead time and, if `starts` have three values, k."""
 
     def residual(logs: FloatArray) -> FloatArray:
-        gain, parts = _project(logs, segments, axis, masks, zero)
+        gain, parts = _project(logs, segments, axis, masks, zero=zero, span=span)
         return np.concatenate([tilt - gain * unit for unit, tilt, _, _ in parts])
 
     bounds = (_LOW[: len(high)], high)
@@ -119,18 +123,18 @@ def _fit(
         for start in starts
     ]
     logs = min(found, key=lambda one: float(one.cost)).x
-    gain, parts = _project(logs, segments, axis, masks, zero)
+    gain, parts = _project(logs, segments, axis, masks, zero=zero, span=span)
     offsets = tuple(tilt_mean - gain * unit_mean for _, _, unit_mean, tilt_mean in parts)
     lag_s, delay_s, *rest = np.exp(logs).tolist()
     return FittedResponse(gain, lag_s, delay_s, rest[0] if rest else 0.0, offsets, zero)
 
 
 def residuals(
-    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks, span: int = 1
 ) -> list[FloatArray]:
     """Return measured less modelled tilt of each segment on the samples of `masks`, offsets as fitted."""
     return [
-        (segment.tilt_rad[axis] - response.predict(segment, axis, offset))[mask]
+        _smooth((segment.tilt_rad[axis] - response.predict(segment, axis, offset))[mask], span)
         for segment, offset, mask in zip(segments, response.offset_rad, masks, strict=True)
     ]
 
@@ -152,12 +156,15 @@ class AxisParameters:
 
 
 def intervals(
-    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks, span: int = 1
 ) -> AxisParameters:
     """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
     logs = response.logs
-    slopes = _slopes(response, logs, segments, axis, masks)
-    errors = residuals(response, segments, axis, masks)
+    slopes = [
+        np.column_stack([_smooth(column, span) for column in each.T])
+        for each in _slopes(response, logs, segments, axis, masks)
+    ]
+    errors = residuals(response, segments, axis, masks, span)
     covariance = newey_west(slopes, errors, round(CORRELATION_S / PERIOD_S))
 
     def half_width(weights: Sequence[float], widening: float) -> float:
@@ -197,6 +204,14 @@ def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], windo
             meat += (1.0 - lag / (window + 1.0)) * (cross + cross.T)
     bread = np.linalg.inv(whole.T @ whole + variance * np.eye(parameters))
     return np.asarray(bread @ meat @ bread * (samples / max(samples - parameters, 1)))
+
+
+def _smooth(values: FloatArray, span: int) -> FloatArray:
+    """Return the means of `span` samples of the means of `span` samples (m,), where there are so many."""
+    for _ in range(2):
+        sums = np.concatenate([[0.0], np.cumsum(values)])
+        values = (sums[span:] - sums[:-span]) / span
+    return values
 
 
 def _unit_response(logs: FloatArray, segment: Segment, axis: int, zero: float) -> FloatArray:
@@ -247,12 +262,13 @@ def _second_order_filter(lag_s: float, integral_1_s: float, zero: float) -> tupl
 
 
 def _project(
-    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks, zero: float
+    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks, *, zero: float, span: int
 ) -> tuple[float, list[tuple[FloatArray, FloatArray, float, float]]]:
     """Return the best gain, and of each segment unit response and tilt without their means, and the means."""
     parts = []
     for segment, mask in zip(segments, masks, strict=True):
-        unit, tilt = _unit_response(logs, segment, axis, zero)[mask], segment.tilt_rad[axis][mask]
+        whole = _unit_response(logs, segment, axis, zero), segment.tilt_rad[axis]
+        unit, tilt = (_smooth(each[mask], span) for each in whole)
         unit_mean, tilt_mean = (float(each.mean()) for each in (unit, tilt))
         parts.append((unit - unit_mean, tilt - tilt_mean, unit_mean, tilt_mean))
     power = sum(float(unit @ unit) for unit, _, _, _ in parts)
