@@ -86,7 +86,7 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     )
     assert made.settings == controller_toml.validate(document, "wanted")
     careful = Controller.from_vehicle("crazyflie", tilt_rad=DERIVED.limits.tilt_rad / 2.0).settings
-    assert careful.limits.braking_m_s2 == DERIVED.limits.braking_m_s2 / 2.0
+    assert careful.limits.braking_m_s2 == pytest.approx(DERIVED.limits.braking_m_s2 / 2.0)
     (tmp_path / "mine.toml").write_text(to_toml(ONE_NORM), "utf-8")
     assert Controller.from_file(tmp_path / "mine.toml", tilt_rad=0.2).settings == with_option(
         ONE_NORM, "limits.tilt_rad", 0.2

@@ -309,10 +309,10 @@ def test_a_record_is_flown_again_with_its_inner_steps(
     monkeypatch.chdir(tmp_path)
     said, _ = run("fly", "--repeat", "good.json", "--no-pictures", "-o", "good")
     assert "the trace equals the recorded one, bit for bit" in said
-    inner = np.load(tmp_path / "good" / "inner-steps.npz")
     k, iterations = len(trace.time_s), MAMBO.optimizer.iterations
-    assert inner["cost"].shape == (k, iterations, 1)
-    assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
+    with np.load(tmp_path / "good" / "inner-steps.npz") as inner:
+        assert inner["cost"].shape == (k, iterations, 1)
+        assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
     header = (tmp_path / "good" / "trace.csv").read_text().splitlines()[0]
     assert header.endswith(",".join(SEEN_COLUMNS))
     run("fly", "--repeat", "other.json", "--no-pictures", code=1)

@@ -100,7 +100,7 @@ def test_a_set_point_is_carried_on_in_height_too(lifting: Built) -> None:
 
 
 def test_on_the_ground_it_is_level_with_least_thrust_until_the_set_point_climbs(lifting: Built) -> None:
-    """Then it aims 10 cm up at least, so that the motors gain speed before the plan leaves the ground."""
+    """Then it aims 12.5 cm up at least, so that the motors gain speed before the plan leaves the ground."""
     app = hovering(lifting, 0.4)
     app.host.host_is_flying = False
     take_overs = app.logged("takeOvers") + 1
@@ -113,7 +113,7 @@ def test_on_the_ground_it_is_level_with_least_thrust_until_the_set_point_climbs(
     app.host.host_is_flying = True
     app.setpoint.velocity.z = 0.01
     ticks(app, 100)
-    assert app.logged("targetZ") == pytest.approx(0.5)
+    assert app.logged("targetZ") == pytest.approx(0.525)
     assert app.logged("outThrust") > 9.81
     app.state.position.z = 0.46
     ticks(app, 20)

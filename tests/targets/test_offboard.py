@@ -146,7 +146,7 @@ def test_it_flies_the_circle_through_a_radio_with_losses(script: ModuleType) -> 
 @pytest.mark.long
 @pytest.mark.parametrize("row", RADIOS)
 def test_delays_and_losses_cost_what_the_page_says(row: tuple[str, str], script: ModuleType) -> None:
-    """The loop stands a delay of 144 ms; beyond it swings up."""
+    """The loop stands a delay of 142 ms; beyond it swings up."""
     cells = re.search(rf"\| {row[0]} \| {row[1]} \| (\S+) \| (\S+) \|", PAGE.read_text("utf-8"))
     assert cells is not None
     vars(script)["FLIGHT_S"] = 15.0
@@ -166,7 +166,7 @@ def test_nothing_is_sent_while_the_state_is_old(script: ModuleType) -> None:
     times_s = np.array([time_s for time_s, _ in found.sent])
     (gap,) = np.flatnonzero(np.diff(times_s) > 0.05)
     assert times_s[gap : gap + 2] == pytest.approx([4.1, 5.0], abs=0.03)
-    assert found.error_m[found.time_s < 5.0].max() < 0.11
+    assert found.error_m[found.time_s < 5.0].max() < 0.12
 
 
 @pytest.mark.long
