@@ -69,7 +69,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     *reasons(
         "nmpc.c",
         "if ((size_m2_s2 > most_m2_s2) && (size_m2_s2 > NMPC_LEAST_TURN_M2_S2)) {",
-        "a turn that is too hard for a drone is larger than the least one, whose square has a root in float32",
+        "a turn that is too hard for a drone is larger than the least one, whose square has a root",
         "branch 3 never taken",
     ),
     *reasons(
