@@ -15,6 +15,9 @@ from tests.support.subjects import subject
 from tests.support.tools import require
 
 MAMBO = ONE_NORM
+FIXED = with_option(MAMBO, "code.scalar", "fixed")
+LIMITED = with_option(with_option(FIXED, "limits.speed_m_s", 5.0), "limits.braking_m_s2", 3.0)
+"""With limits the instance has an odd count of numbers, and sums of twice their size behind them."""
 WRONG_COMMAND = (
     "nmpc.c",
     "self->command_rad[1] = self->plan_rad[1];",
@@ -40,8 +43,9 @@ def _compilers() -> None:
     [
         pytest.param(MAMBO, marks=pytest.mark.long),
         with_option(settings_case(6, "float64"), "code.prefix", "left_wing"),
+        LIMITED,
     ],
-    ids=["mambo", "left_wing"],
+    ids=["mambo", "left_wing", "limited in fixed point"],
 )
 def test_every_build_has_the_bits_of_the_reference(settings: Settings, tmp_path: Path) -> None:
     """All cases, at every optimisation of both compilers, under any prefix."""
