@@ -117,18 +117,22 @@ def test_positions_serve_where_velocities_are_missing() -> None:
     assert abs(motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.05
 
 
-@pytest.mark.parametrize(("frequency_rad_s", "damping"), [(15.0, 0.6), (12.0, 0.4)])
-def test_a_response_of_second_order_has_no_integrator(frequency_rad_s: float, damping: float) -> None:
-    """An integrator would fit it too, with a wrong gain; the interval of the gain holds the true one."""
-    step_s = 0.01
-    log = dict(fly(TRUTH, Flown(duration_s=44.0), 1)[0])
+def second_order_log(frequency_rad_s: float, damping: float, flown: Flown) -> dict[str, Array]:
+    """Return time, tilt, yaw and commands of a drone of second order with a gain of 0.92."""
+    log = dict(fly(TRUTH, flown, 1)[0])
     drone = ([frequency_rad_s**2], [1.0, 2.0 * damping * frequency_rad_s, frequency_rad_s**2])
-    ((top,), bottom, _) = cont2discrete(drone, step_s)
+    ((top,), bottom, _) = cont2discrete(drone, 0.01)
     random = np.random.default_rng(1)
     for name in ("roll", "pitch"):
         noise = 0.002 * random.normal(size=len(log["time_s"]))
         log[f"{name}_rad"] = 0.92 * lfilter(top, bottom, log[f"{name}_command_rad"]) + noise
-    summary = found({name: log[name] for name in ("time_s", *NAMES[:5])})
+    return {name: log[name] for name in ("time_s", *NAMES[:5])}
+
+
+@pytest.mark.parametrize(("frequency_rad_s", "damping"), [(15.0, 0.6), (12.0, 0.4)])
+def test_a_response_of_second_order_has_no_integrator(frequency_rad_s: float, damping: float) -> None:
+    """An integrator would fit it too, with a wrong gain; the interval of the gain holds the true one."""
+    summary = found(second_order_log(frequency_rad_s, damping, Flown(duration_s=44.0)))
     for fit in fits(summary):
         assert fit.integral_1_s is None
         assert abs(fit.gain.value - 0.92) <= fit.gain.within < 0.06
@@ -142,15 +146,8 @@ def test_slow_motion_decides_on_lag_and_gain(
     frequency_rad_s: float, damping: float, sines_rad: float
 ) -> None:
     """Of a drone of second order, whatever its sines; else the sum is up to 25 ms too large."""
-    step_s = 0.01
-    log = dict(fly(TRUTH, Flown(duration_s=44.0, sines_rad=sines_rad), 1)[0])
-    drone = ([frequency_rad_s**2], [1.0, 2.0 * damping * frequency_rad_s, frequency_rad_s**2])
-    ((top,), bottom, _) = cont2discrete(drone, step_s)
-    random = np.random.default_rng(1)
-    for name in ("roll", "pitch"):
-        noise = 0.002 * random.normal(size=len(log["time_s"]))
-        log[f"{name}_rad"] = 0.92 * lfilter(top, bottom, log[f"{name}_command_rad"]) + noise
-    summary = found({name: log[name] for name in ("time_s", *NAMES[:5])})
+    flown = Flown(duration_s=44.0, sines_rad=sines_rad)
+    summary = found(second_order_log(frequency_rad_s, damping, flown))
     for axis in summary.axes.values():
         assert axis.verdict == "good"
         assert axis.first_order is not None
