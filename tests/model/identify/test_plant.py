@@ -196,16 +196,12 @@ def capture(flown: Captured, seeds: int, folder: Path) -> list[Path]:
     "flown",
     [
         pytest.param(Captured(), id="as the Crazyflie"),
-        pytest.param(Captured(yaw_rad=2.5), id="turned"),
-        pytest.param(Captured(yaw_rate_rad_s=0.3), id="turning"),
-        pytest.param(Captured(drag_1_s=0.15, size=1.5), id="little drag"),
-        pytest.param(Captured(drag_1_s=1.0), id="much drag"),
+        pytest.param(Captured(yaw_rad=2.5, share_g=0.9, trim_rad=0.03), id="turned, with trims"),
+        pytest.param(Captured(yaw_rate_rad_s=0.3, thrust="[thrust]\nlag_s = 0.149"), id="turning, slow rotors"),
+        pytest.param(Captured(drag_1_s=0.15, size=1.5, filter_s=0.06), id="little drag, slow filter"),
         pytest.param(Captured(noise_m=0.003, noise_rad=0.01), id="noise"),
-        pytest.param(Captured(filter_s=0.06), id="slow filter"),
-        pytest.param(Captured(filter_s=0.0), id="no filter"),
-        pytest.param(Captured(delay_s=0.04), id="late"),
-        pytest.param(Captured(share_g=0.9, trim_rad=0.03), id="trims"),
-        pytest.param(Captured(thrust="[thrust]\nlag_s = 0.149"), id="slow rotors"),
+        pytest.param(Captured(drag_1_s=1.0), id="much drag"),
+        pytest.param(Captured(filter_s=0.0, delay_s=0.04), id="no filter, late"),
     ],
 )
 def test_drag_and_acceleration_are_found_through_motion_capture(flown: Captured, tmp_path: Path) -> None:
