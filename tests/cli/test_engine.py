@@ -75,7 +75,7 @@ ODD_COMPILER = '#!/bin/sh\ncase "$*" in *loop.c*) exit 1 ;; esac\nexec {} "$@"\n
 SAID = "the simulation runs in NumPy"
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("line", COMMANDS)
 def test_numpy_needs_no_engine(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,7 +73,7 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
     return list(np.stack(columns, axis=1))
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "name",

@@ -76,7 +76,7 @@ def fly(
     return outcomes
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.long
 @pytest.mark.parametrize(
     "index", [0, *(pytest.param(index, marks=pytest.mark.long) for index in range(1, 5))]

@@ -80,6 +80,7 @@ def test_a_flight_in_numpy_with_the_reference_is_the_flight_with_the_c(condition
     assert fly(flight, CompiledController(settings)).same_bits(ours)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("preset", presets.names())
 def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) -> None:

@@ -42,7 +42,7 @@ def assert_same(ours: Trace, theirs: Trace) -> None:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("acceleration", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", ["float32", *SLOW])
 @pytest.mark.parametrize("batch", FLOWN)

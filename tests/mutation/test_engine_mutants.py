@@ -55,7 +55,7 @@ from tests.support.scenarios import BATCHES
 from tests.support.tools import toolchain
 
 PERIOD_S: Final = 0.01
-STRIDE: Final = 36
+STRIDE: Final = 72
 """The test tries one fault in so many; all of them take ten minutes."""
 LIMIT_S: Final = 2
 """Processor time of a mutant; the flights take a tenth of a second."""

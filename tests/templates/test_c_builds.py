@@ -96,7 +96,7 @@ def dialects_by_turns() -> list[tuple[str, str]]:
     return sorted(pairs, key=lambda pair: pair[0] != "mambo")
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(("name", "dialect"), dialects_by_turns())
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:

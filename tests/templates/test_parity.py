@@ -165,7 +165,7 @@ def quantize_acceleration(blocks: SubBlocks, rng: np.random.Generator) -> NDArra
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("kind", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)

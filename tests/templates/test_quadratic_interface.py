@@ -32,7 +32,7 @@ DIALECTS = {
 }
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("dialect", "scalar"),

@@ -44,6 +44,7 @@ MANY_SETTINGS = [
 ]
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(("method", "index", "scalar"), FEW_SETTINGS)
 def test_steps_equal_the_reference(method: str, index: int, scalar: str) -> None:
@@ -71,7 +72,7 @@ def test_the_inputs_reach_what_is_to_be_compared() -> None:
     assert 0.05 < share < 0.95
 
 
-@pytest.mark.sampled(4)
+@pytest.mark.sampled(8)
 @pytest.mark.long
 @pytest.mark.parametrize(("method", "index", "scalar"), MANY_SETTINGS)
 def test_steps_by_the_thousand_equal_the_reference_in_every_build(

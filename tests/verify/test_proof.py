@@ -203,6 +203,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "names",
     [

@@ -249,6 +249,7 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "names",
     [
@@ -269,6 +270,7 @@ def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None
     assert unnoticed(settings, tmp_path, faults) == []
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_check_finds_a_fault(fault: str, tmp_path: Path) -> None:

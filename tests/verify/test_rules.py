@@ -54,7 +54,7 @@ def assert_each_occurs(its: Subject, result: Result) -> None:
     assert {(rule, file) for rule, files in result.figures["deviations"].items() for file in files} == listed
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.long
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> None:
@@ -112,12 +112,13 @@ def test_every_deviation_is_in_the_manual() -> None:
     assert documented == listed
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("scalar", "rule", "harm"),
     [
-        ("float32", "", None),
         ("float32", "15.1", HARMS["15.1 goto"]),
+        ("float32", "", None),
         ("fixed", "", None),
         ("fixed", "10.7", FIXED_HARMS["10.7 beside a deviation from 10.1"]),
     ],

@@ -41,7 +41,7 @@ def test_nothing_undefined_happens(tmp_path: Path) -> None:
     assert len(result.figures["builds"]) == len(sanitizers.BUILDS)
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.long
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Path) -> None:

@@ -272,7 +272,7 @@ def test_a_missing_compiler_is_named(name: str, tmp_path: Path, monkeypatch: pyt
         assert word in str(caught.value)
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "scalar", "optimisation"),

@@ -54,7 +54,7 @@ FAULTS = {
 """Faults by name: file, the line, what it becomes."""
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("scalar", "name"), [(scalar, name) for scalar, names in EMULATED.items() for name in names]

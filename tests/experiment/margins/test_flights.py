@@ -31,7 +31,7 @@ def test_delay_margin_decides_about_a_flight(name: str, drone: str, axis: int) -
     assert grows(settings, vehicle, axis, delay_ticks=math.ceil(more))
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
 @pytest.mark.parametrize(("name", "drone"), PAIRS)

@@ -102,7 +102,7 @@ def reference_run(index: int, scalar: str) -> tuple[list[StepInputs], Run]:
     return inputs, Run([], [reference.step(case.state, case.target, case.thrust) for case in inputs])
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("name", "scalar", "index"),

@@ -65,7 +65,7 @@ def assert_same_bits(flight: Flight, kind: str) -> None:
             assert found.tobytes() == expected.tobytes(), (lanes, column.name)
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
 @pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
@@ -108,7 +108,7 @@ def known() -> list[str]:
     return digests(load(toolchain("gcc")))
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize(
     "build",
