@@ -37,6 +37,7 @@ class Bounds:
     clear_m:    (n, 2) distance from the centre within which no wall limits the speed; less than 0 if the
                 fence is too small for that.
     margin_m:   (n,) distance of that from the wall.
+    knee_m:     (n,) distance up to which the approach speed is linear.
     speed_m_s:  (n,) speed limit.
     braking:    (n,) twice the braking, m/s^2, at most what the approach rate asks for at the speed limit.
     tilt_rad:   (n,) tilt limit.
@@ -45,6 +46,7 @@ class Bounds:
     centre_m: Real
     clear_m: Real
     margin_m: Real
+    knee_m: Real
     speed_m_s: Real
     braking: Real
     tilt_rad: Real
@@ -84,7 +86,7 @@ def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
 def no_limits(like: Real) -> LimitsMemory:
     """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
     pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
-    bounds, active = Bounds(pair, pair, one, one, one, one), np.zeros(len(like), np.int64)
+    bounds, active = Bounds(pair, pair, one, one, one, one, one), np.zeros(len(like), np.int64)
     return LimitsMemory(bounds, pair, pair, active, pair, one)
 
 
@@ -139,6 +141,7 @@ class LimitsLaw:
             centre_m=products.half(low + high),
             clear_m=products.half(high - low) - margin[:, None],
             margin_m=margin,
+            knee_m=products.knee(braking),
             speed_m_s=speed,
             braking=braking,
             tilt_rad=limits[:, 6],
@@ -174,66 +177,68 @@ class LimitsLaw:
         as it is.
         """
         products, place = self._products, position - bounds.centre_m
-        knee = products.knee(bounds.braking)
-        is_free = self._is_free(bounds, fastest, knee, position, target)
+        clear = np.all(np.abs(place) <= bounds.clear_m, axis=1)
+        is_free = clear & self._is_free(bounds, fastest, position, target)
         half_width = bounds.clear_m + bounds.margin_m[:, None]
-        error, velocity, outside = _walled(half_width, place, target, bounds.centre_m)
+        error, velocity, outside = _walled(half_width, position, target, bounds.centre_m)
         square = products.square_sum(error)
-        far = square > products.square(knee)
-        ratio = np.where(far, self._braking_ratio(bounds, knee, square, far), products.approach)
-        desired = velocity + products.approach_speed(ratio[:, None], error)
-        limited = self._below(bounds, knee, desired, half_width - place)
-        limited = -self._below(bounds, knee, -limited, half_width + place)
-        walled = outside | np.any(limited != desired, axis=1)
-        square = products.square_sum(limited)
-        fast = square > products.square(fastest)
-        share = products.share(fastest, products.inverse_root(square))
-        limited = np.where(fast[:, None], products.share_product(limited, share[:, None]), limited)
-        limited = clamp(limited, self._ranges.velocity)
+        far = square > products.square(bounds.knee_m)
+        ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
+        desired, fast = self._slowed(fastest, velocity + products.approach_speed(ratio[:, None], error))
+        walled = self._within_walls(bounds, half_width, place, desired)
+        cut = ~clear & np.any(walled != desired, axis=1)
+        limited = np.where(cut[:, None], self._slowed(fastest, walled)[0], desired)
         active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
-            walled, ActiveLimit.FENCE, 0
+            outside | cut, ActiveLimit.FENCE, 0
         )
         return limited, np.where(is_free, 0, active)
 
-    def _is_free(self, bounds: Bounds, fastest: Real, knee: Real, position: Real, target: Real) -> Rows:
-        """Return whether drone, target and desired velocity are so far from every limit that none can act."""
+    def _is_free(self, bounds: Bounds, fastest: Real, position: Real, target: Real) -> Rows:
+        """Return whether targets are so near, and desired velocities so small, that neither is limited."""
         products = self._products
         error = target[:, 0:2] - position
         desired = target[:, 2:4] + products.approach_speed(products.approach, error)
-        free: Rows = (
-            np.all(np.abs(position - bounds.centre_m) <= bounds.clear_m, axis=1)
-            & (products.square_sum(error) <= products.square(knee))
-            & (products.square_sum(desired) <= products.square(fastest))
+        free: Rows = (products.square_sum(error) <= products.square(bounds.knee_m)) & (
+            products.square_sum(desired) <= products.square(fastest)
         )
         return free
 
-    def _braking_ratio(self, bounds: Bounds, knee: Real, square: Real, far: Rows) -> Real:
-        """Return the approach speed over the distance (n,), beyond the knee, from the distance's square."""
+    def _approach(self, bounds: Bounds, distance: Real) -> Real:
+        """Return the speeds from which the braking stops within `distance` (n,); negative beyond a wall."""
         products = self._products
-        root = products.inverse_root(square)
-        half = products.half(knee)
-        beyond = larger(np.where(far, products.length(square, root), knee) - half, half)
-        speed = products.braking_speed(products.braking_square(bounds.braking, beyond))
-        return products.ratio(speed, root)
+        excess = np.abs(distance) - bounds.knee_m
+        far = excess > 0
+        within = products.half(bounds.knee_m) + np.where(far, excess, np.zeros_like(excess))
+        speed = products.braking_speed(products.braking_square(bounds.braking, within))
+        slow = products.approach_speed(products.approach, distance)
+        return np.where(far, np.where(distance < 0, -speed, speed), slow)
 
-    def _below(self, bounds: Bounds, knee: Real, velocity: Real, room: Real) -> Real:
-        """Return velocities (n, 2) towards walls at the distances `room`, cut off at what brakes in time.
+    def _braking_ratio(self, bounds: Bounds, square: Real) -> Real:
+        """Return the approach speed over the distance (n,), beyond the knee, from the distance's square."""
+        root = self._products.inverse_root(square)
+        distance = self._products.length(square, root)
+        return self._products.ratio(self._approach(bounds, distance), root)
 
-        Outside, where `room` is negative, they lead back in.
-        """
-        products, knees = self._products, knee[:, None]
-        size = np.abs(room)
-        far = size > knees
-        half = products.half(knees)
-        beyond = larger(np.where(far, size, knees) - half, half)
-        square = products.braking_square(bounds.braking[:, None], beyond)
-        speed = products.braking_speed(square)
-        most = np.where(
-            far, np.where(room < 0, -speed, speed), products.approach_speed(products.approach, room)
-        )
-        zero = velocity.dtype.type(0)
-        slow = (velocity <= zero) | products.is_slower(velocity, square)
-        return np.where(far & (room > 0) & slow, velocity, smaller(velocity, most))
+    def _slowed(self, fastest: Real, velocity: Real) -> tuple[Real, Rows]:
+        """Return velocities (n, 2) of at most the speed limit (n,), and which were larger (n,)."""
+        products = self._products
+        square = products.square_sum(velocity)
+        fast = square > products.square(fastest)
+        share = products.share(fastest, products.inverse_root(square))
+        slowed = np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity)
+        return clamp(slowed, self._ranges.velocity), fast
+
+    def _within_walls(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> Real:
+        """Return velocities (n, 2) cut off towards each wall at what brakes in time; outside they lead in."""
+        columns = []
+        for axis in range(2):
+            within, here = velocity[:, axis], place[:, axis]
+            for _ in range(2):
+                room = half_width[:, axis] - here
+                cut = ((within > 0) | (room < 0)) & (within > (most := self._approach(bounds, room)))
+                within, here = -np.where(cut, most, within), -here
+            columns.append(within)
+        return np.stack(columns, axis=1)
 
     def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
@@ -252,7 +257,7 @@ class LimitsLaw:
         bounds = memory.bounds
         columns = [bounds.centre_m, bounds.clear_m]
         columns += [
-            one[:, None] for one in (bounds.margin_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
+            one[:, None] for one in (bounds.margin_m, bounds.knee_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
         ]
         columns += [memory.command_limit] if has_command else []
         columns += [memory.velocity_m_s] if self.is_given else []
@@ -264,11 +269,12 @@ class LimitsLaw:
         return np.where(np.abs(rate) <= self._jump, rate, np.zeros_like(rate))
 
 
-def _walled(half_width: Real, place: Real, target: Real, centre: Real) -> tuple[Real, Real, Rows]:
+def _walled(half_width: Real, position: Real, target: Real, centre: Real) -> tuple[Real, Real, Rows]:
     """Return error and velocity (n, 2) of targets held within the walls, and which were outside (n,)."""
     aim, velocity = target[:, 0:2] - centre, target[:, 2:4]
-    held = clamp(aim, half_width)
-    beyond = held != aim
-    zero = np.zeros_like(velocity)
-    leads_out = np.where(aim > 0, velocity > 0, velocity < 0)
-    return held - place, np.where(beyond & leads_out, zero, velocity), np.any(beyond, axis=1)
+    beyond = np.abs(aim) > half_width
+    held = clamp(aim, half_width) - (position - centre)
+    error = np.where(beyond, held, target[:, 0:2] - position)
+    leads_out = (aim > 0) == (velocity > 0)
+    velocity = np.where(beyond & leads_out, np.zeros_like(velocity), velocity)
+    return error, velocity, np.any(beyond, axis=1)

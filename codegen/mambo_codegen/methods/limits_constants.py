@@ -171,7 +171,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
 
 def stored_quantities(*command: str) -> tuple[str, ...]:
     """Return the quantity of each number in nmpc_bounds_t; `command` are those of the command limits."""
-    return (*["position"] * 5, "velocity", "braking", "angle", *command)
+    return (*["position"] * 6, "velocity", "braking", "angle", *command)
 
 
 def _height_limits(settings: Sections) -> tuple[float, ...]:

@@ -9,9 +9,9 @@ from mambo_codegen.methods.limits import ActiveLimit
 from mambo_codegen.methods.limits_arithmetic import (
     FIXED_ITERATIONS,
     FIXED_START,
-    ITERATIONS,
     ROOT_ERROR,
     STARTS,
+    TERMS,
     TURN_BITS,
 )
 from mambo_codegen.methods.limits_constants import (
@@ -48,7 +48,8 @@ def limits_context(method: Method) -> dict[str, object]:
         "braking_slope": SPELLING * limiting.tilted.slope_m_s2_rad,
         "root_error": f"{ROOT_ERROR[scalar]:g}",
         "root_start": start,
-        "root_iterations": FIXED_ITERATIONS if fixed else ITERATIONS[numbers.scalar],
+        "root_iterations": FIXED_ITERATIONS,
+        "root_terms": () if fixed else TERMS[numbers.scalar],
         "limits_shifts": limits_shifts(numbers.bits) if numbers.bits is not None else None,
         "default_bounds": bounds,
         "default_target_bounds": _target_bounds(method, others),
@@ -85,7 +86,6 @@ def limits_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "knee": bits["knee"] + braking - position,
         "odd": odd,
         "speed": ((square + odd) // 2) - velocity,
-        "finer": (2 * velocity) - (square + odd),
         "least": bits["approach"] + velocity - braking - 1,
         "braking_odd": braking_odd,
         "quotient": velocity + SHARE_BITS - ((braking + braking_odd) // 2) - ROOT_BITS,
