@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.inputs import choose
 from mambo_codegen.methods.limits_arithmetic import limits_arithmetic
 from mambo_codegen.methods.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.math import Real, clamp, larger, smaller
+from mambo_codegen.methods.tracker import TargetMotion, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]
@@ -38,6 +40,7 @@ class Bounds:
                 fence is too small for that.
     margin_m:   (n,) distance of that from the wall.
     knee_m:     (n,) distance up to which the approach speed is linear.
+    near_m:     (n,) distance from the target at which braking ends.
     speed_m_s:  (n,) speed limit.
     braking:    (n,) twice the braking, m/s^2, at most what the approach rate asks for at the speed limit.
     tilt_rad:   (n,) tilt limit.
@@ -47,6 +50,7 @@ class Bounds:
     clear_m: Real
     margin_m: Real
     knee_m: Real
+    near_m: Real
     speed_m_s: Real
     braking: Real
     tilt_rad: Real
@@ -83,10 +87,21 @@ def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
     )
 
 
+def handed_over(motion: TargetMotion, before: NDArray[np.int64], active: NDArray[np.int64]) -> TargetMotion:
+    """Return what is known of targets for which the limits that act (n,) let another velocity stand.
+
+    Its change is no acceleration. Where only braking acted before, the deceleration is forgotten too.
+    """
+    was = before & ~ActiveLimit.HEIGHT
+    switched = (was != 0) != (active != 0)
+    known = replace(motion, is_known=motion.is_known & ~switched)
+    return choose(switched & (was == ActiveLimit.BRAKING), unknown_motion(motion.velocity_m_s), known)
+
+
 def no_limits(like: Real) -> LimitsMemory:
     """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
     pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
-    bounds, active = Bounds(pair, pair, one, one, one, one, one), np.zeros(len(like), np.int64)
+    bounds, active = Bounds(pair, pair, one, one, one, one, one, one), np.zeros(len(like), np.int64)
     return LimitsMemory(bounds, pair, pair, active, pair, one)
 
 
@@ -142,6 +157,7 @@ class LimitsLaw:
             clear_m=products.half(high - low) - margin[:, None],
             margin_m=margin,
             knee_m=products.knee(braking),
+            near_m=products.near(braking),
             speed_m_s=speed,
             braking=braking,
             tilt_rad=limits[:, 6],
@@ -182,7 +198,7 @@ class LimitsLaw:
         half_width = bounds.clear_m + bounds.margin_m[:, None]
         error, velocity, outside = _walled(half_width, position, target, bounds.centre_m)
         square = products.square_sum(error)
-        far = square > products.square(bounds.knee_m)
+        far = square > products.square(bounds.near_m)
         ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
         desired, fast = self._slowed(fastest, velocity + products.approach_speed(ratio[:, None], error))
         walled = self._within_walls(bounds, half_width, place, desired)
@@ -198,7 +214,7 @@ class LimitsLaw:
         products = self._products
         error = target[:, 0:2] - position
         desired = target[:, 2:4] + products.approach_speed(products.approach, error)
-        free: Rows = (products.square_sum(error) <= products.square(bounds.knee_m)) & (
+        free: Rows = (products.square_sum(error) <= products.square(bounds.near_m)) & (
             products.square_sum(desired) <= products.square(fastest)
         )
         return free
@@ -214,9 +230,9 @@ class LimitsLaw:
         return np.where(far, np.where(distance < 0, -speed, speed), slow)
 
     def _braking_ratio(self, bounds: Bounds, square: Real) -> Real:
-        """Return the approach speed over the distance (n,), beyond the knee, from the distance's square."""
+        """Return the approach speed over the distance (n,), where it brakes, from the distance's square."""
         root = self._products.inverse_root(square)
-        distance = self._products.length(square, root)
+        distance = self._products.length(square, root) + (bounds.knee_m - bounds.near_m)
         return self._products.ratio(self._approach(bounds, distance), root)
 
     def _slowed(self, fastest: Real, velocity: Real) -> tuple[Real, Rows]:
@@ -257,7 +273,11 @@ class LimitsLaw:
         bounds = memory.bounds
         columns = [bounds.centre_m, bounds.clear_m]
         columns += [
-            one[:, None] for one in (bounds.margin_m, bounds.knee_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
+            one[:, None]
+            for one in (
+                *(bounds.margin_m, bounds.knee_m, bounds.near_m),
+                *(bounds.speed_m_s, bounds.braking, bounds.tilt_rad),
+            )
         ]
         columns += [memory.command_limit] if has_command else []
         columns += [memory.velocity_m_s] if self.is_given else []

@@ -72,7 +72,10 @@ class LimitsArithmetic(Protocol):
         """Return the roots of positive squares."""
 
     def knee(self, braking: Real) -> Real:
-        """Return the distance at which braking begins, m, for twice the braking."""
+        """Return the distance up to which the approach speed is linear, m, for twice the braking."""
+
+    def near(self, braking: Real) -> Real:
+        """Return the distance from the target at which braking ends, m."""
 
     def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
         """Return ratio * distance, m/s, with a ratio in 1/s."""
@@ -87,7 +90,7 @@ class LimitsArithmetic(Protocol):
         """Return the root of a sum of squares of distances, m, given its inverse; at most twice the range."""
 
     def ratio(self, speed_m_s: Real, root: Any) -> Real:
-        """Return speed over distance, 1/s, at most k, given the inverse of the distance."""
+        """Return speed over distance, 1/s, at most k / NEAR_SHARE, given the inverse of the distance."""
 
     def share(self, speed_m_s: Real, root: Any) -> Real:
         """Return speed over speed, given the inverse of the second."""
@@ -127,7 +130,7 @@ class LimitsFloatArithmetic:
         self.numbers = constants.numbers
         scalar = self._scalar = self.numbers.scalar
         self.approach = scalar(limits.approach_1_s)
-        self._knee_s2 = scalar(limits.knee_s2)
+        self._knee_s2, self._near_s2 = scalar(limits.knee_s2), scalar(limits.near_s2)
         self._twice_approach = scalar(2 * limits.approach_1_s)
         self._steps_per_s = scalar(limits.steps_per_s)
 
@@ -150,6 +153,9 @@ class LimitsFloatArithmetic:
 
     def knee(self, braking: Real) -> Real:
         return self._knee_s2 * braking
+
+    def near(self, braking: Real) -> Real:
+        return self._near_s2 * braking
 
     def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
         return ratio * distance_m
@@ -212,7 +218,9 @@ class LimitsFixedArithmetic:
         self._thrust, self._angle = bits["thrust"], bits["angle"]
         self._slope, self._rate = bits["slope"], bits["rate"]
         self.approach = numbers.constant(limits.approach_1_s, "approach")
+        self._steepest = numbers.constant(limits.steepest_1_s, "approach")
         self._knee_s2 = numbers.constant(limits.knee_s2, "knee")
+        self._near_s2 = numbers.constant(limits.near_s2, "knee")
         self._fastest = numbers.constant(constants.settings.ranges.velocity_m_s, "velocity")
         self._farthest = 2 * numbers.constant(constants.settings.ranges.position_m, "position")
         self._steps_per_s = numbers.constant(limits.steps_per_s, "rate")
@@ -243,7 +251,10 @@ class LimitsFixedArithmetic:
         return FixedRoot(mantissa, half, top)
 
     def knee(self, braking: Real) -> Real:
-        return _shifted(self._knee_s2 * braking, self._knee + self._braking - self._position)
+        return self._distance(self._knee_s2, braking)
+
+    def near(self, braking: Real) -> Real:
+        return self._distance(self._near_s2, braking)
 
     def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
         product = rounded(ratio * distance_m, self._approach + self._position - self._velocity)
@@ -263,7 +274,7 @@ class LimitsFixedArithmetic:
 
     def ratio(self, speed_m_s: Real, root: FixedRoot) -> Real:
         shift = SHARE_BITS + root.half + (self._velocity - self._position - self._approach)
-        return np.minimum((speed_m_s * root.mantissa) >> shift, self.approach)
+        return np.minimum((speed_m_s * root.mantissa) >> shift, self._steepest)
 
     def share(self, speed_m_s: Real, root: FixedRoot) -> Real:
         return np.minimum((speed_m_s * root.mantissa) >> root.half, 2**SHARE_BITS)
@@ -282,6 +293,9 @@ class LimitsFixedArithmetic:
         quotient = (speed_m_s * root.mantissa) >> shift
         stopping = (quotient * quotient) >> ((2 * ROOT_BITS) - self._position)
         return np.minimum(stopping + self.half(self.knee(braking)), self._farthest)
+
+    def _distance(self, knee_s2: Any, braking: Real) -> Real:
+        return _shifted(knee_s2 * braking, self._knee + self._braking - self._position)
 
     def rate_product(self, change_m_s: Real) -> Real:
         return rounded(self._steps_per_s * change_m_s, self._rate + self._velocity - self._thrust)

@@ -26,6 +26,9 @@ ONE_NORM_OUTAGE_S: Final = 0.5
 BRAKING_SHARE: Final = 0.8
 """Braking limit where none is given, over what the tilt limit gives: the rest is left for wind and lag."""
 
+NEAR_SHARE: Final = 0.7
+"""Braking ends at this share of the distance at which the approach speed becomes linear; see `limits.c.j2`."""
+
 SPELLING: Final = 1.0005
 """A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
 
@@ -89,8 +92,18 @@ class LimitsConstants:
 
     @property
     def knee_s2(self) -> float:
-        """The distance at which braking begins, over twice the braking limit."""
+        """The distance up to which the approach speed is linear, over twice the braking limit."""
         return 1 / (2 * self.approach_1_s * self.approach_1_s)
+
+    @property
+    def near_s2(self) -> float:
+        """The distance from the target at which braking ends, over twice the braking limit."""
+        return NEAR_SHARE * self.knee_s2
+
+    @property
+    def steepest_1_s(self) -> float:
+        """The largest speed over distance: where braking ends."""
+        return self.approach_1_s / NEAR_SHARE
 
 
 def has_limits(settings: Sections) -> bool:
@@ -154,7 +167,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
     """Return the fractional bits of the limits' own quantities in fixed point; 0 without limits.
 
     velocity and position are the formats of those inputs. braking: of twice the braking, with three bits to
-    spare for its product with a distance. approach: of k. knee: of `knee_s2`. slope: of `TiltAcceleration`.
+    spare for its product with a distance. approach: of k and what is steeper. knee: of `knee_s2`. slope: of `TiltAcceleration`.
     rate: of the update rate.
     """
     if found is None:
@@ -162,7 +175,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
     slope = found.tilted.slope_m_s2_rad
     return {
         "braking": fractional_bits(16 * slope * found.limits[LIMITS.index("angle")]),
-        "approach": min(fractional_bits(found.approach_1_s), 29 + velocity - position),
+        "approach": min(fractional_bits(found.steepest_1_s), 29 + velocity - position),
         "knee": fractional_bits(found.knee_s2),
         "slope": fractional_bits(SPELLING * slope),
         "rate": fractional_bits(found.steps_per_s),
@@ -171,7 +184,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
 
 def stored_quantities(*command: str) -> tuple[str, ...]:
     """Return the quantity of each number in nmpc_bounds_t; `command` are those of the command limits."""
-    return (*["position"] * 6, "velocity", "braking", "angle", *command)
+    return (*["position"] * 7, "velocity", "braking", "angle", *command)
 
 
 def _height_limits(settings: Sections) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Status, choose
-from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
+from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, handed_over, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
@@ -176,7 +176,7 @@ class OneNormController:
         if self.settings.model.thrust == "hover":
             thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
         limits, targets = self._limit(states, targets)
-        motion = self._track(targets)
+        motion = self._track(targets, limits)
         searched = self._search(states, targets, thrusts, motion.acceleration_m_step2)
         new = replace(
             self.memory,
@@ -283,10 +283,11 @@ class OneNormController:
         level = replace(self._held(np.zeros_like(memory.sent_rad)), missed=missed)
         return choose(bad & (missed == self._outage_steps), level, memory)
 
-    def _track(self, target: Real) -> TargetMotion:
+    def _track(self, target: Real, limits: LimitsMemory) -> TargetMotion:
         if self._tracker is None:
             return self.memory.target
-        return self._tracker.update(self.memory.target, target[:, self._tracker.columns])
+        motion = handed_over(self.memory.target, self.memory.limits.active, limits.active)
+        return self._tracker.update(motion, target[:, self._tracker.columns])
 
     def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory

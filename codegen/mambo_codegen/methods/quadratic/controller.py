@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Rows, Status, choose, within
-from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, no_limits
+from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, handed_over, no_limits
 from mambo_codegen.methods.limits_constants import LIMITS
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
@@ -313,14 +313,16 @@ class QuadraticController:
         missed = np.where(has_state, 0, waited)
         commands = allows_command & (missed < self._no_estimate)
         motion, limits = memory.target, memory.limits
+        seen = motion
         height, acts = self._aim_height(lift, target, state, commands)
         target = target[:, : len(self._constants.level_target)]
         if self._limits is not None:
             limited, within = self._limits.limit(limits, estimate.position_m, target)
+            seen = handed_over(motion, limits.active, limited.active)
             limits = choose(commands, limited, limits)
             target = np.where(commands[:, None], within, target)
         if self._tracker is not None:
-            motion = choose(commands, self._tracker.update(motion, target[:, self._tracker.columns]), motion)
+            motion = choose(commands, self._tracker.update(seen, target[:, self._tracker.columns]), motion)
         overdue = missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = (overdue & ~slow, overdue & slow) if self._limits else (overdue & False,) * 2
