@@ -11,7 +11,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw
 from mambo_codegen.methods.limits_arithmetic import ROOT_ERROR, limits_arithmetic
-from mambo_codegen.methods.limits_constants import LATER_LIMITS, LIMITS
+from mambo_codegen.methods.limits_constants import LATER_LIMITS, LIMITS, NEAR_SHARE
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -132,7 +132,9 @@ def test_the_law_is_that_of_the_page() -> None:
 
     error = target[:, 0:2] - position
     distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
-    expected = target[:, 2:4] + (f(distance) * error / distance)
+    knee = 2.0 / k**2
+    speed = np.where(distance > NEAR_SHARE * knee, f(distance + ((1 - NEAR_SHARE) * knee)), k * distance)
+    expected = target[:, 2:4] + (speed * error / distance)
     expected = np.clip(expected, -f(walls + position), f(walls - position))
     size = np.maximum(np.hypot(*expected.T)[:, None], 1e-12)
     expected = np.where(size > 2.0, expected * 2.0 / size, expected)
@@ -154,7 +156,7 @@ def test_flights_within_the_limits_keep_every_bit(base: str, scalar: str) -> Non
     ours, theirs = (method_of(settings).reference_controller(20) for settings in (wide, plain))
     target = np.column_stack([rng.normal(0, 5, (20, 2)), np.zeros((20, 2))])
     for _ in range(40):
-        state = np.column_stack([target + rng.normal(0, 0.2, (20, 4)), rng.normal(0, 0.1, (20, 3))])
+        state = np.column_stack([target + rng.normal(0, 0.15, (20, 4)), rng.normal(0, 0.1, (20, 3))])
         steps = [one.step(state, target, np.full(20, 9.8)) for one in (ours, theirs)]
         assert not ours.memory.limits.active.any()
         assert steps[0].command_rad.tobytes() == steps[1].command_rad.tobytes()
