@@ -196,16 +196,19 @@ class LimitsLaw:
         clear = np.all(np.abs(place) <= bounds.clear_m, axis=1)
         is_free = clear & self._is_free(bounds, fastest, position, target)
         half_width = bounds.clear_m + bounds.margin_m[:, None]
-        error, velocity, outside = _walled(half_width, position, target, bounds.centre_m)
+        held, outside = _held(half_width, target, bounds.centre_m)
+        error = held[:, 0:2] - position
         square = products.square_sum(error)
         far = square > products.square(bounds.near_m)
         ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
-        desired, fast = self._slowed(fastest, velocity + products.approach_speed(ratio[:, None], error))
-        walled = self._within_walls(bounds, half_width, place, desired)
-        cut = ~clear & np.any(walled != desired, axis=1)
-        limited = np.where(cut[:, None], self._slowed(fastest, walled)[0], desired)
+        desired = held[:, 2:4] + products.approach_speed(ratio[:, None], error)
+        desired, fast = self._slowed(fastest, desired)
+        walled, cut = self._cut_off(bounds, half_width, place, desired)
+        walled, fast_again = self._slowed(fastest, walled)
+        limited = clamp(np.where(clear[:, None], desired, walled), fastest[:, None])
+        fast = fast | (fast_again & ~clear)
         active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
-            outside | cut, ActiveLimit.FENCE, 0
+            outside | (cut & ~clear), ActiveLimit.FENCE, 0
         )
         return limited, np.where(is_free, 0, active)
 
@@ -219,21 +222,25 @@ class LimitsLaw:
         )
         return free
 
+    def _braking_speed(self, bounds: Bounds, excess: Real) -> Real:
+        """Return f (n,), m/s, at a distance that exceeds the knee by `excess` (n,)."""
+        products = self._products
+        within = products.half(bounds.knee_m) + excess
+        return products.braking_speed(products.braking_square(bounds.braking, within))
+
     def _approach(self, bounds: Bounds, distance: Real) -> Real:
         """Return the speeds from which the braking stops within `distance` (n,); negative beyond a wall."""
-        products = self._products
         excess = np.abs(distance) - bounds.knee_m
         far = excess > 0
-        within = products.half(bounds.knee_m) + np.where(far, excess, np.zeros_like(excess))
-        speed = products.braking_speed(products.braking_square(bounds.braking, within))
-        slow = products.approach_speed(products.approach, distance)
+        speed = self._braking_speed(bounds, np.where(far, excess, np.zeros_like(excess)))
+        slow = self._products.approach_speed(self._products.approach, distance)
         return np.where(far, np.where(distance < 0, -speed, speed), slow)
 
     def _braking_ratio(self, bounds: Bounds, square: Real) -> Real:
         """Return the approach speed over the distance (n,), where it brakes, from the distance's square."""
         root = self._products.inverse_root(square)
-        distance = self._products.length(square, root) + (bounds.knee_m - bounds.near_m)
-        return self._products.ratio(self._approach(bounds, distance), root)
+        excess = np.abs(self._products.length(square, root) - bounds.near_m)
+        return self._products.ratio(self._braking_speed(bounds, excess), root)
 
     def _slowed(self, fastest: Real, velocity: Real) -> tuple[Real, Rows]:
         """Return velocities (n, 2) of at most the speed limit (n,), and which were larger (n,)."""
@@ -241,20 +248,20 @@ class LimitsLaw:
         square = products.square_sum(velocity)
         fast = square > products.square(fastest)
         share = products.share(fastest, products.inverse_root(square))
-        slowed = np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity)
-        return clamp(slowed, self._ranges.velocity), fast
+        return np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity), fast
 
-    def _within_walls(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> Real:
-        """Return velocities (n, 2) cut off towards each wall at what brakes in time; outside they lead in."""
-        columns = []
-        for axis in range(2):
-            within, here = velocity[:, axis], place[:, axis]
-            for _ in range(2):
-                room = half_width[:, axis] - here
-                cut = ((within > 0) | (room < 0)) & (within > (most := self._approach(bounds, room)))
-                within, here = -np.where(cut, most, within), -here
-            columns.append(within)
-        return np.stack(columns, axis=1)
+    def _cut_off(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> tuple[Real, Rows]:
+        """Return velocities (n, 2) that brake in time before the walls, and which were others (n,).
+
+        Outside, where `place` (n, 2) is more than `half_width` from the centre, they lead back in.
+        """
+        scalar = velocity.dtype.type
+        towards = np.where(np.abs(place) <= half_width, velocity, place)
+        sign = np.where(towards < 0, scalar(-1), scalar(1))
+        room = half_width - (sign * place)
+        most = np.stack([self._approach(bounds, room[:, axis]) for axis in range(2)], axis=1)
+        cut = (sign * velocity) > most
+        return np.where(cut, sign * most, velocity), np.any(cut, axis=1)
 
     def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
@@ -289,12 +296,12 @@ class LimitsLaw:
         return np.where(np.abs(rate) <= self._jump, rate, np.zeros_like(rate))
 
 
-def _walled(half_width: Real, position: Real, target: Real, centre: Real) -> tuple[Real, Real, Rows]:
-    """Return error and velocity (n, 2) of targets held within the walls, and which were outside (n,)."""
-    aim, velocity = target[:, 0:2] - centre, target[:, 2:4]
-    beyond = np.abs(aim) > half_width
-    held = clamp(aim, half_width) - (position - centre)
-    error = np.where(beyond, held, target[:, 0:2] - position)
-    leads_out = (aim > 0) == (velocity > 0)
-    velocity = np.where(beyond & leads_out, np.zeros_like(velocity), velocity)
-    return error, velocity, np.any(beyond, axis=1)
+def _held(half_width: Real, target: Real, centre: Real) -> tuple[Real, Rows]:
+    """Return targets (n, 4) within the fence, with velocities that do not lead out, and which were not (n,)."""
+    place, velocity = target[:, 0:2] - centre, target[:, 2:4]
+    beyond = np.abs(place) > half_width
+    position = np.where(beyond, centre + clamp(place, half_width), target[:, 0:2])
+    zero = np.zeros_like(velocity)
+    within = np.where(place > 0, smaller(velocity, zero), larger(velocity, zero))
+    held = np.concatenate([position, np.where(beyond, within, velocity)], axis=1)
+    return held, np.any(beyond, axis=1)

@@ -197,7 +197,9 @@ def capture(flown: Captured, seeds: int, folder: Path) -> list[Path]:
     [
         pytest.param(Captured(), id="as the Crazyflie"),
         pytest.param(Captured(yaw_rad=2.5, share_g=0.9, trim_rad=0.03), id="turned, with trims"),
-        pytest.param(Captured(yaw_rate_rad_s=0.3, thrust="[thrust]\nlag_s = 0.149"), id="turning, slow rotors"),
+        pytest.param(
+            Captured(yaw_rate_rad_s=0.3, thrust="[thrust]\nlag_s = 0.149"), id="turning, slow rotors"
+        ),
         pytest.param(Captured(drag_1_s=0.15, size=1.5, filter_s=0.06), id="little drag, slow filter"),
         pytest.param(Captured(noise_m=0.003, noise_rad=0.01), id="noise"),
         pytest.param(Captured(drag_1_s=1.0), id="much drag"),
