@@ -206,21 +206,25 @@ class LimitsLaw:
         )
         return free
 
+    def _braking_speed(self, bounds: Bounds, excess: Real) -> Real:
+        """Return the speeds from which the braking stops within the knee and `excess` (n,)."""
+        products = self._products
+        square = products.braking_square(bounds.braking, products.half(bounds.knee_m) + excess)
+        return products.braking_speed(square)
+
     def _approach(self, bounds: Bounds, distance: Real) -> Real:
         """Return the speeds from which the braking stops within `distance` (n,); negative beyond a wall."""
-        products = self._products
         excess = np.abs(distance) - bounds.knee_m
         far = excess > 0
-        within = products.half(bounds.knee_m) + np.where(far, excess, np.zeros_like(excess))
-        speed = products.braking_speed(products.braking_square(bounds.braking, within))
-        slow = products.approach_speed(products.approach, distance)
+        speed = self._braking_speed(bounds, np.where(far, excess, np.zeros_like(excess)))
+        slow = self._products.approach_speed(self._products.approach, distance)
         return np.where(far, np.where(distance < 0, -speed, speed), slow)
 
     def _braking_ratio(self, bounds: Bounds, square: Real) -> Real:
         """Return the approach speed over the distance (n,), beyond the knee, from the distance's square."""
         root = self._products.inverse_root(square)
-        distance = self._products.length(square, root)
-        return self._products.ratio(self._approach(bounds, distance), root)
+        excess = np.abs(self._products.length(square, root) - bounds.knee_m)
+        return self._products.ratio(self._braking_speed(bounds, excess), root)
 
     def _slowed(self, fastest: Real, velocity: Real) -> tuple[Real, Rows]:
         """Return velocities (n, 2) of at most the speed limit (n,), and which were larger (n,)."""
@@ -230,9 +234,7 @@ class LimitsLaw:
         share = products.share(fastest, products.inverse_root(square))
         return np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity), fast
 
-    def _cut_off(
-        self, bounds: Bounds, half_width: Real, place: Real, velocity: Real
-    ) -> tuple[Real, Rows]:
+    def _cut_off(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> tuple[Real, Rows]:
         """Return velocities (n, 2) that brake in time before the walls, and which were others (n,).
 
         Outside, where `place` (n, 2) is more than `half_width` from the centre, they lead back in.
@@ -262,7 +264,8 @@ class LimitsLaw:
         bounds = memory.bounds
         columns = [bounds.centre_m, bounds.clear_m]
         columns += [
-            one[:, None] for one in (bounds.margin_m, bounds.knee_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
+            one[:, None]
+            for one in (bounds.margin_m, bounds.knee_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
         ]
         columns += [memory.command_limit] if has_command else []
         columns += [memory.velocity_m_s] if self.is_given else []
@@ -275,7 +278,7 @@ class LimitsLaw:
 
 
 def _held(half_width: Real, target: Real, centre: Real) -> tuple[Real, Rows]:
-    """Return targets (n, 4) within the fence, with velocities that do not lead out, and which were not (n,)."""
+    """Return targets (n, 4) put within the fence, velocities not leading out, and which were not (n,)."""
     place, velocity = target[:, 0:2] - centre, target[:, 2:4]
     beyond = np.abs(place) > half_width
     position = np.where(beyond, centre + clamp(place, half_width), target[:, 0:2])

@@ -19,8 +19,10 @@ TERMS: Final[dict[Any, tuple[float, ...]]] = {
     np.float32: (1.50087896, 1.50000058),
     np.float64: (1.50087896, 1.50000058, 1.5),
 }
-"""What stands for 1.5 in each of Newton's iterations, which square the error; it is 0.035 at the start. Newton's
-results are too small: a little more than 1.5 makes the error symmetric, and half as large."""
+"""What stands for 1.5 in each of Newton's iterations, which square the error; it is 0.035 at the start.
+
+Newton's results are too small: a little more than 1.5 makes the error symmetric, and half as large.
+"""
 
 STARTS: Final[dict[Any, tuple[Any, int]]] = {
     np.float32: (np.uint32, 0x5F376908),
