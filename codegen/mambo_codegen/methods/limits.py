@@ -186,11 +186,8 @@ class LimitsLaw:
         far = square > products.square(bounds.knee_m)
         ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
         desired = held[:, 2:4] + products.approach_speed(ratio[:, None], error)
-        desired, fast = self._slowed(fastest, desired)
         walled, cut = self._cut_off(bounds, half_width, place, desired)
-        walled, fast_again = self._slowed(fastest, walled)
-        limited = clamp(np.where(clear[:, None], desired, walled), fastest[:, None])
-        fast = fast | (fast_again & ~clear)
+        limited, fast = self._slowed(fastest, np.where(clear[:, None], desired, walled))
         active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
             outside | (cut & ~clear), ActiveLimit.FENCE, 0
         )
@@ -232,7 +229,8 @@ class LimitsLaw:
         square = products.square_sum(velocity)
         fast = square > products.square(fastest)
         share = products.share(fastest, products.inverse_root(square))
-        return np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity), fast
+        slowed = np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity)
+        return clamp(slowed, fastest[:, None]), fast
 
     def _cut_off(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> tuple[Real, Rows]:
         """Return velocities (n, 2) that brake in time before the walls, and which were others (n,).
