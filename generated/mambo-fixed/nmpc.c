@@ -809,9 +809,9 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
  *      two are the same at the knee.
- *   3. Speed: if |v_d| > V, a factor makes it V. The direction stays.
- *   4. Fence: towards a wall at distance d the component of v_d is at most f(d). Outside, it leads back in by f. If that
- *      acts, 3. follows once more.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
+ *      it leads back in by f.
+ *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
  * v_d for v_T.
@@ -1083,7 +1083,6 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     nmpc_square_t square;
     unsigned int fence = 0U;
     unsigned int others = 0U;
-    int pass;
 
     if (limits_are_clear(bounds, target->position_m) == 0) {
         fence = limits_hold(bounds, &held);
@@ -1103,19 +1102,16 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     }
     limited->velocity_m_s[0] = held.velocity_m_s[0] + approach_product(ratio_1_s, error_x_m);
     limited->velocity_m_s[1] = held.velocity_m_s[1] + approach_product(ratio_1_s, error_y_m);
-    /* The speed; where a wall may act, that too, and then the speed once more. */
-    for (pass = is_clear; pass < 2; pass++) {
-        square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
-        if (square > squared(bounds->speed_m_s)) {
-            const nmpc_real_t share = speed_ratio(bounds->speed_m_s, inverse_root(square));
+    if (is_clear == 0) {
+        fence |= limits_wall(bounds, limited);
+    }
+    square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
+    if (square > squared(bounds->speed_m_s)) {
+        const nmpc_real_t share = speed_ratio(bounds->speed_m_s, inverse_root(square));
 
-            limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
-            limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
-            others = NMPC_LIMIT_SPEED;
-        }
-        if (pass == 0) {
-            fence |= limits_wall(bounds, limited);
-        }
+        limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
+        limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
+        others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
     limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], bounds->speed_m_s);
