@@ -809,7 +809,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
  *      two are the same at the knee.
- *   3. Fence: towards a wall at distance d the component of v_d is at most f(d). Outside, it leads back in by f.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
+ *      it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
@@ -822,9 +823,9 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 #define NMPC_KNEE_S2 1665135272 /* 1/(2 k^2): the knee over 2 A */
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
 
-NMPC_INLINE nmpc_sum_t absolute(nmpc_sum_t value)
+NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
 {
-    return (value < (nmpc_sum_t)0) ? -value : value;
+    return (value < (nmpc_real_t)0) ? -value : value;
 }
 
 NMPC_INLINE nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
@@ -845,49 +846,60 @@ NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
 #endif
 
 typedef unsigned long long nmpc_square_t;
+#if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
+typedef unsigned long nmpc_mantissa_t;
+#else
+typedef unsigned int nmpc_mantissa_t;
+#endif
 
 /* 1/sqrt(x) = mantissa / 2^(30 + half); `scaled` is x, shifted into 2^30..2^32. */
 typedef struct {
-    nmpc_square_t mantissa;
-    nmpc_square_t scaled;
+    nmpc_mantissa_t mantissa;
+    nmpc_mantissa_t scaled;
     unsigned int half;
 } nmpc_root_t;
 
-/* 1/sqrt(x) for a positive x, with a relative error of at most 7e-08. The start is a line, 9 % off. */
+static nmpc_mantissa_t upper_product(nmpc_mantissa_t a, nmpc_mantissa_t b)
+{
+    return (nmpc_mantissa_t)(((nmpc_square_t)a * b) >> 32);
+}
+
+/* 1/sqrt(x) for a positive x, with a relative error of at most 1.2e-06. The start is a parabola, 2.4 % off. */
 NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
 {
-    nmpc_square_t scaled = x;
-    nmpc_square_t mantissa;
+    nmpc_square_t wide = x;
+    nmpc_mantissa_t scaled;
+    nmpc_mantissa_t mantissa;
     nmpc_root_t root;
     unsigned int half = 32U;
     int k;
 
-    if (scaled < ((nmpc_square_t)1 << 32)) {
-        scaled = scaled << 32;
+    if (wide < ((nmpc_square_t)1 << 32)) {
+        wide = wide << 32;
         half -= 16U;
     }
-    if (scaled < ((nmpc_square_t)1 << 48)) {
-        scaled = scaled << 16;
+    if (wide < ((nmpc_square_t)1 << 48)) {
+        wide = wide << 16;
         half -= 8U;
     }
-    if (scaled < ((nmpc_square_t)1 << 56)) {
-        scaled = scaled << 8;
+    if (wide < ((nmpc_square_t)1 << 56)) {
+        wide = wide << 8;
         half -= 4U;
     }
-    if (scaled < ((nmpc_square_t)1 << 60)) {
+    scaled = (nmpc_mantissa_t)(wide >> 32);
+    if (scaled < ((nmpc_mantissa_t)1 << 28)) {
         scaled = scaled << 4;
         half -= 2U;
     }
-    if (scaled < ((nmpc_square_t)1 << 62)) {
+    if (scaled < ((nmpc_mantissa_t)1 << 30)) {
         scaled = scaled << 2;
         half -= 1U;
     }
-    scaled = scaled >> 32;
-    mantissa = 2289921229ULL - ((1308545065ULL * scaled) >> 32);
-    for (k = 0; k < 3; k++) {
-        const nmpc_square_t product = (((mantissa * mantissa) >> 30) * scaled) >> 32;
+    mantissa = 2867787557UL - upper_product(3527627035UL - upper_product(1759398805UL, scaled), scaled);
+    for (k = 0; k < 2; k++) {
+        const nmpc_mantissa_t product = upper_product(upper_product(mantissa, mantissa), scaled);
 
-        mantissa = (mantissa * (((nmpc_square_t)3 << 30) - product)) >> 31;
+        mantissa = upper_product(mantissa, ((nmpc_mantissa_t)3 << 28) - product) << 3;
     }
     root.mantissa = mantissa;
     root.scaled = scaled;
@@ -907,10 +919,16 @@ static nmpc_square_t square_sum(nmpc_real_t a, nmpc_real_t b)
     return squared(a) + squared(b);
 }
 
+/* The product of two numbers that are not negative. */
+static nmpc_square_t product(nmpc_real_t a, nmpc_mantissa_t b)
+{
+    return (nmpc_square_t)(nmpc_mantissa_t)a * b;
+}
+
 /* sqrt(x), given 1/sqrt(x). */
 static nmpc_square_t length(nmpc_root_t root)
 {
-    return (root.scaled * root.mantissa) >> (62U - root.half);
+    return ((nmpc_square_t)root.scaled * root.mantissa) >> (62U - root.half);
 }
 
 /* The smaller of a number and a limit. */
@@ -919,31 +937,19 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
     return (value < (nmpc_square_t)limit) ? (nmpc_real_t)value : limit;
 }
 
-/* A distance less half the knee, and no less than that, by rounding. */
-static nmpc_square_t beyond(nmpc_square_t distance_m, nmpc_square_t half_m)
-{
-    nmpc_square_t beyond_m = half_m;
-
-    if (distance_m > (half_m + half_m)) {
-        beyond_m = distance_m - half_m;
-    }
-    return beyond_m;
-}
-
 /* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most((((nmpc_square_t)speed_m_s * root.mantissa) >> root.half) >> 5,
-                   NMPC_APPROACH_1_S);
+    return at_most((product(speed_m_s, root.mantissa) >> root.half) >> 5, NMPC_APPROACH_1_S);
 }
 
 static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most(((nmpc_square_t)speed_m_s * root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
+    return at_most(product(speed_m_s, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
 }
 
 /* Ratio times distance, m/s, within the range of velocities. */
-static nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
+NMPC_ASIDE nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
 {
     const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, 25);
 
@@ -963,9 +969,9 @@ static nmpc_real_t knee_product(nmpc_real_t knee_s2, nmpc_real_t braking_m_s2)
 }
 
 /* The square of a speed, from twice the braking and a distance. */
-static nmpc_square_t braking_product(nmpc_real_t braking_m_s2, nmpc_square_t distance_m)
+static nmpc_square_t braking_product(nmpc_real_t braking_m_s2, nmpc_real_t distance_m)
 {
-    return ((nmpc_square_t)braking_m_s2 * distance_m) << 1;
+    return product(braking_m_s2, (nmpc_mantissa_t)distance_m) << 1;
 }
 
 /* The root of such a square, within the range of velocities. */
@@ -974,45 +980,26 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
     return at_most(length(inverse_root(square)) << 1, NMPC_VELOCITY_RANGE_M_S);
 }
 
-/* 1 if a positive speed is at most the root of such a square. */
-static int is_slower(nmpc_real_t speed_m_s, nmpc_square_t square)
-{
-    return (squared(speed_m_s) >> 2) <= square;
-}
-
 static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_s * share, NMPC_SINE_BITS);
 }
 
-/* Cut a velocity towards a wall off at f(room), or lead it back in if `room_m`, the distance, is negative. */
-NMPC_ASIDE nmpc_real_t limits_below(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, nmpc_real_t velocity_m_s, nmpc_real_t room_m)
+/* f(d)^2 for d = A/k^2 + excess. */
+NMPC_INLINE nmpc_square_t braking_square(const nmpc_bounds_t *bounds, nmpc_real_t excess_m)
 {
-    const nmpc_real_t size_m = (room_m < (nmpc_real_t)0) ? -room_m : room_m;
-    nmpc_real_t most_m_s;
-
-    if (size_m > knee_m) {
-        const nmpc_real_t half_m = halved(knee_m);
-        const nmpc_square_t beyond_m = (nmpc_square_t)larger(size_m - half_m, half_m);
-        const nmpc_square_t square = braking_product(bounds->braking_m_s2, beyond_m);
-
-        if ((room_m > (nmpc_real_t)0)
-            && ((velocity_m_s <= (nmpc_real_t)0) || (is_slower(velocity_m_s, square) != 0))) {
-            most_m_s = velocity_m_s;
-        } else {
-            most_m_s = braking_speed(square);
-            if (room_m < (nmpc_real_t)0) {
-                most_m_s = -most_m_s;
-            }
-        }
-    } else {
-        most_m_s = approach_product(NMPC_APPROACH_1_S, room_m);
-    }
-    return smaller(velocity_m_s, most_m_s);
+    return braking_product(bounds->braking_m_s2, (halved(bounds->knee_m)) + excess_m);
 }
 
-/* 1 if drone, target and desired velocity are so far from every limit that none can act. */
-NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
+/* 1 if the drone is so far from every wall that none limits a velocity within the speed limit. */
+NMPC_INLINE int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2])
+{
+    return (absolute(position_m[0] - bounds->centre_m[0]) <= bounds->clear_m[0])
+           && (absolute(position_m[1] - bounds->centre_m[1]) <= bounds->clear_m[1]);
+}
+
+/* 1 if the target is so near, and the desired velocity so small, that neither braking nor speed is limited. */
+NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2],
                                 const nmpc_target_t *target)
 {
     const nmpc_real_t error_x_m = target->position_m[0] - position_m[0];
@@ -1020,9 +1007,7 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m,
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + approach_product(NMPC_APPROACH_1_S, error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + approach_product(NMPC_APPROACH_1_S, error_y_m);
 
-    return (absolute(position_m[0] - bounds->centre_m[0]) <= bounds->clear_m[0])
-           && (absolute(position_m[1] - bounds->centre_m[1]) <= bounds->clear_m[1])
-           && ((square_sum(error_x_m, error_y_m)) <= squared(knee_m))
+    return ((square_sum(error_x_m, error_y_m)) <= squared(bounds->knee_m))
            && ((square_sum(desired_x_m_s, desired_y_m_s)) <= squared(bounds->speed_m_s));
 }
 
@@ -1033,68 +1018,104 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
     return clamp(bounds->clear_m[axis] + bounds->margin_m, NMPC_POSITION_RANGE_M);
 }
 
-/* Set `desired_m_s` to v_d within the limits. Returns which limits act. */
-NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
-                                      const nmpc_target_t *target, nmpc_real_t desired_m_s[2])
+/* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if it
+ * is inside. */
+NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
 {
-    nmpc_real_t place_m[2];
-    nmpc_real_t error_m[2];
-    nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
-    nmpc_square_t square;
-    unsigned int fence = 0U;
-    unsigned int others = 0U;
+    unsigned int active = 0U;
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
-        const nmpc_real_t aim_m = target->position_m[axis] - bounds->centre_m[axis];
-        const nmpc_real_t velocity_m_s = target->velocity_m_s[axis];
+        const nmpc_real_t place_m = held->position_m[axis] - bounds->centre_m[axis];
+        const nmpc_real_t velocity_m_s = held->velocity_m_s[axis];
 
-        place_m[axis] = position_m[axis] - bounds->centre_m[axis];
-        error_m[axis] = clamp(aim_m, half_width_m) - place_m[axis];
-        desired_m_s[axis] = velocity_m_s;
-        if (within(aim_m, half_width_m) == 0) {
-            if (((aim_m > (nmpc_real_t)0) && (velocity_m_s > (nmpc_real_t)0))
-                || ((aim_m < (nmpc_real_t)0) && (velocity_m_s < (nmpc_real_t)0))) {
-                desired_m_s[axis] = (nmpc_real_t)0; /* it leads out */
-            }
-            fence = NMPC_LIMIT_FENCE;
+        if (within(place_m, half_width_m) == 0) {
+            held->position_m[axis] = bounds->centre_m[axis] + clamp(place_m, half_width_m);
+            held->velocity_m_s[axis] =
+                (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0) : larger(velocity_m_s, (nmpc_real_t)0);
+            active = NMPC_LIMIT_FENCE;
         }
     }
-    square = square_sum(error_m[0], error_m[1]);
-    if (square > squared(knee_m)) {
+    return active;
+}
+
+/* Cut the velocity of `limited` towards the walls off at f(d); outside it leads back in. Returns NMPC_LIMIT_FENCE, or 0
+ * if this changes nothing. */
+NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
+{
+    unsigned int active = 0U;
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
+        const nmpc_real_t place_m = limited->position_m[axis] - bounds->centre_m[axis];
+        const nmpc_real_t velocity_m_s = limited->velocity_m_s[axis];
+        /* Towards the wall to which the drone flies; outside towards the one behind which it is. */
+        const nmpc_real_t towards = (within(place_m, half_width_m) != 0) ? velocity_m_s : place_m;
+        const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
+        const nmpc_real_t room_m = half_width_m - (sign * place_m);
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
+        nmpc_real_t most_m_s = approach_product(NMPC_APPROACH_1_S, room_m);
+
+        if (excess_m > (nmpc_real_t)0) {
+            most_m_s = braking_speed(braking_square(bounds, excess_m));
+            if (room_m < (nmpc_real_t)0) {
+                most_m_s = -most_m_s;
+            }
+        }
+        if ((sign * velocity_m_s) > most_m_s) {
+            limited->velocity_m_s[axis] = sign * most_m_s;
+            active = NMPC_LIMIT_FENCE;
+        }
+    }
+    return active;
+}
+
+/* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
+NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
+                                   nmpc_target_t *limited)
+{
+    nmpc_target_t held = *target;
+    nmpc_real_t error_x_m;
+    nmpc_real_t error_y_m;
+    nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
+    nmpc_square_t square;
+    unsigned int fence = 0U;
+    unsigned int others = 0U;
+
+    if (limits_are_clear(bounds, target->position_m) == 0) {
+        fence = limits_hold(bounds, &held);
+    }
+    error_x_m = held.position_m[0] - limited->position_m[0];
+    error_y_m = held.position_m[1] - limited->position_m[1];
+    square = square_sum(error_x_m, error_y_m);
+    if (square > squared(bounds->knee_m)) {
         const nmpc_root_t root = inverse_root(square);
-        const nmpc_square_t half_m = (nmpc_square_t)(halved(knee_m));
-        const nmpc_square_t distance_m = length(root);
-        /* Not less than at the knee, by rounding. */
-        const nmpc_square_t beyond_m = beyond(distance_m, half_m);
-        const nmpc_real_t speed_m_s = braking_speed(braking_product(bounds->braking_m_s2, beyond_m));
+        const nmpc_real_t distance_m = at_most(length(root), 2 * NMPC_POSITION_RANGE_M);
+        /* Not less than 0, by rounding. */
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - bounds->knee_m);
+        const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = approach_ratio(speed_m_s, root);
         others = NMPC_LIMIT_BRAKING;
     }
-    for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
-        const nmpc_real_t free_m_s = desired_m_s[axis] + approach_product(ratio_1_s, error_m[axis]);
-        nmpc_real_t walled_m_s = limits_below(bounds, knee_m, free_m_s, half_width_m - place_m[axis]);
-
-        walled_m_s = -limits_below(bounds, knee_m, -walled_m_s, half_width_m + place_m[axis]);
-        if ((walled_m_s < free_m_s) || (walled_m_s > free_m_s)) {
-            fence = NMPC_LIMIT_FENCE;
-        }
-        desired_m_s[axis] = walled_m_s;
+    limited->velocity_m_s[0] = held.velocity_m_s[0] + approach_product(ratio_1_s, error_x_m);
+    limited->velocity_m_s[1] = held.velocity_m_s[1] + approach_product(ratio_1_s, error_y_m);
+    if (is_clear == 0) {
+        fence |= limits_wall(bounds, limited);
     }
-    square = square_sum(desired_m_s[0], desired_m_s[1]);
+    square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
     if (square > squared(bounds->speed_m_s)) {
         const nmpc_real_t share = speed_ratio(bounds->speed_m_s, inverse_root(square));
 
-        desired_m_s[0] = scaled_velocity(desired_m_s[0], share);
-        desired_m_s[1] = scaled_velocity(desired_m_s[1], share);
+        limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
+        limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
-    desired_m_s[0] = clamp(desired_m_s[0], NMPC_VELOCITY_RANGE_M_S);
-    desired_m_s[1] = clamp(desired_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], bounds->speed_m_s);
+    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], bounds->speed_m_s);
     return fence + others;
 }
 
@@ -1104,18 +1125,13 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
                                       nmpc_target_t *limited)
 {
     nmpc_bounds_t *const bounds = &self->bounds;
-    const nmpc_real_t knee_m = knee_product(NMPC_KNEE_S2, bounds->braking_m_s2);
+    const int is_clear = limits_are_clear(bounds, position_m);
     unsigned int active = 0U;
 
-    if (limits_are_free(bounds, knee_m, position_m, target) == 0) {
-        active = limits_desire(bounds, knee_m, position_m, target, limited->velocity_m_s);
-    }
-    if (active != 0U) {
-        int axis;
-
-        for (axis = 0; axis < 2; axis++) {
-            limited->position_m[axis] = position_m[axis];
-        }
+    if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
+        limited->position_m[0] = position_m[0];
+        limited->position_m[1] = position_m[1];
+        active = limits_act(bounds, is_clear, target, limited);
     }
     self->limited = (unsigned char)active;
     return active;
@@ -1146,10 +1162,10 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> 27;
     const nmpc_real_t braking_m_s2 = at_most(most_m_s2, limits->braking_m_s2 + limits->braking_m_s2);
     const nmpc_root_t root = inverse_root((nmpc_square_t)braking_m_s2 << 1);
-    const nmpc_square_t quotient = (((nmpc_square_t)speed_m_s * root.mantissa) >> root.half) >> 24;
+    const nmpc_square_t quotient = (product(speed_m_s, root.mantissa) >> root.half) >> 24;
     const nmpc_square_t stopping_m = (quotient * quotient) >> 14;
-    const nmpc_square_t half_knee_m = (nmpc_square_t)(halved(knee_product(NMPC_KNEE_S2, braking_m_s2)));
-    const nmpc_real_t margin_m = at_most(stopping_m + half_knee_m, 2 * NMPC_POSITION_RANGE_M);
+    const nmpc_real_t knee_m = knee_product(NMPC_KNEE_S2, braking_m_s2);
+    const nmpc_real_t margin_m = at_most(stopping_m + (nmpc_square_t)(halved(knee_m)), 2 * NMPC_POSITION_RANGE_M);
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
@@ -1160,6 +1176,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
         bounds->clear_m[axis] = halved(max_m - min_m) - margin_m;
     }
     bounds->margin_m = margin_m;
+    bounds->knee_m = knee_m;
     bounds->speed_m_s = speed_m_s;
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
@@ -1390,7 +1407,7 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0, 0 }, { 260899300, 260899300 }, 1244700, 41943040, 201326592, 11744051, { 23041, 23041 }
+        { 0, 0 }, { 260899300, 260899300 }, 1244700, 304895, 41943040, 201326592, 11744051, { 23041, 23041 }
     };
 
     self->bounds = bounds;

@@ -681,7 +681,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
  *      two are the same at the knee.
- *   3. Fence: towards a wall at distance d the component of v_d is at most f(d). Outside, it leads back in by f.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
+ *      it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
@@ -695,12 +696,12 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
 #define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
 
-NMPC_INLINE nmpc_sum_t absolute(nmpc_sum_t value)
+NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
 {
 #if defined(__GNUC__)
     return __builtin_fabsf(value);
 #else
-    return (value < (nmpc_sum_t)0) ? -value : value;
+    return (value < (nmpc_real_t)0) ? -value : value;
 #endif
 }
 
@@ -724,23 +725,22 @@ NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
 typedef nmpc_real_t nmpc_square_t;
 typedef nmpc_real_t nmpc_root_t;
 
-/* 1/sqrt(x) for a positive x, with a relative error of at most 3e-07. The start is 3.5 % off. */
+/* 1/sqrt(x) for a positive x, with a relative error of at most 8e-07. The start is 3.5 % off; constants a little
+ * above 1.5 halve the error of the next step. */
 NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
 {
     const nmpc_real_t half = 0.5f * x;
     nmpc_real_t root;
-    int k;
     union {
         nmpc_real_t real;
         nmpc_bits_t bits;
     } view;
 
     view.real = x;
-    view.bits = (nmpc_bits_t)0x5F3759DFUL - (view.bits >> 1);
+    view.bits = (nmpc_bits_t)0x5F376908UL - (view.bits >> 1);
     root = view.real;
-    for (k = 0; k < 3; k++) {
-        root = root * (1.5f - ((half * root) * root));
-    }
+    root = root * (1.5008789f - ((half * root) * root));
+    root = root * (1.5000006f - ((half * root) * root));
     return root;
 }
 
@@ -750,40 +750,21 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
     return square * inverse_root(square);
 }
 
-/* 1 if a positive speed is at most that with this square. */
-static int is_slower(nmpc_real_t speed_m_s, nmpc_square_t square)
+/* f(d)^2 for d = A/k^2 + excess. */
+NMPC_INLINE nmpc_square_t braking_square(const nmpc_bounds_t *bounds, nmpc_real_t excess_m)
 {
-    return (speed_m_s * speed_m_s) <= square;
+    return bounds->braking_m_s2 * ((NMPC_HALF * bounds->knee_m) + excess_m);
 }
 
-/* Cut a velocity towards a wall off at f(room), or lead it back in if `room_m`, the distance, is negative. */
-NMPC_ASIDE nmpc_real_t limits_below(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, nmpc_real_t velocity_m_s, nmpc_real_t room_m)
+/* 1 if the drone is so far from every wall that none limits a velocity within the speed limit. */
+NMPC_INLINE int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2])
 {
-    const nmpc_real_t size_m = (room_m < (nmpc_real_t)0) ? -room_m : room_m;
-    nmpc_real_t most_m_s;
-
-    if (size_m > knee_m) {
-        const nmpc_real_t half_m = NMPC_HALF * knee_m;
-        const nmpc_square_t beyond_m = (nmpc_square_t)larger(size_m - half_m, half_m);
-        const nmpc_square_t square = bounds->braking_m_s2 * beyond_m;
-
-        if ((room_m > (nmpc_real_t)0)
-            && ((velocity_m_s <= (nmpc_real_t)0) || (is_slower(velocity_m_s, square) != 0))) {
-            most_m_s = velocity_m_s;
-        } else {
-            most_m_s = braking_speed(square);
-            if (room_m < (nmpc_real_t)0) {
-                most_m_s = -most_m_s;
-            }
-        }
-    } else {
-        most_m_s = NMPC_APPROACH_1_S * room_m;
-    }
-    return smaller(velocity_m_s, most_m_s);
+    return (absolute(position_m[0] - bounds->centre_m[0]) <= bounds->clear_m[0])
+           && (absolute(position_m[1] - bounds->centre_m[1]) <= bounds->clear_m[1]);
 }
 
-/* 1 if drone, target and desired velocity are so far from every limit that none can act. */
-NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
+/* 1 if the target is so near, and the desired velocity so small, that neither braking nor speed is limited. */
+NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2],
                                 const nmpc_target_t *target)
 {
     const nmpc_real_t error_x_m = target->position_m[0] - position_m[0];
@@ -791,9 +772,7 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m,
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + (NMPC_APPROACH_1_S * error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + (NMPC_APPROACH_1_S * error_y_m);
 
-    return (absolute(position_m[0] - bounds->centre_m[0]) <= bounds->clear_m[0])
-           && (absolute(position_m[1] - bounds->centre_m[1]) <= bounds->clear_m[1])
-           && (((error_x_m * error_x_m) + (error_y_m * error_y_m)) <= (knee_m * knee_m))
+    return (((error_x_m * error_x_m) + (error_y_m * error_y_m)) <= (bounds->knee_m * bounds->knee_m))
            && (((desired_x_m_s * desired_x_m_s) + (desired_y_m_s * desired_y_m_s)) <= (bounds->speed_m_s * bounds->speed_m_s));
 }
 
@@ -803,68 +782,104 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
     return bounds->clear_m[axis] + bounds->margin_m;
 }
 
-/* Set `desired_m_s` to v_d within the limits. Returns which limits act. */
-NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
-                                      const nmpc_target_t *target, nmpc_real_t desired_m_s[2])
+/* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if it
+ * is inside. */
+NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
 {
-    nmpc_real_t place_m[2];
-    nmpc_real_t error_m[2];
-    nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
-    nmpc_square_t square;
-    unsigned int fence = 0U;
-    unsigned int others = 0U;
+    unsigned int active = 0U;
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
-        const nmpc_real_t aim_m = target->position_m[axis] - bounds->centre_m[axis];
-        const nmpc_real_t velocity_m_s = target->velocity_m_s[axis];
+        const nmpc_real_t place_m = held->position_m[axis] - bounds->centre_m[axis];
+        const nmpc_real_t velocity_m_s = held->velocity_m_s[axis];
 
-        place_m[axis] = position_m[axis] - bounds->centre_m[axis];
-        error_m[axis] = clamp(aim_m, half_width_m) - place_m[axis];
-        desired_m_s[axis] = velocity_m_s;
-        if (within(aim_m, half_width_m) == 0) {
-            if (((aim_m > (nmpc_real_t)0) && (velocity_m_s > (nmpc_real_t)0))
-                || ((aim_m < (nmpc_real_t)0) && (velocity_m_s < (nmpc_real_t)0))) {
-                desired_m_s[axis] = (nmpc_real_t)0; /* it leads out */
-            }
-            fence = NMPC_LIMIT_FENCE;
+        if (within(place_m, half_width_m) == 0) {
+            held->position_m[axis] = bounds->centre_m[axis] + clamp(place_m, half_width_m);
+            held->velocity_m_s[axis] =
+                (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0) : larger(velocity_m_s, (nmpc_real_t)0);
+            active = NMPC_LIMIT_FENCE;
         }
     }
-    square = (error_m[0] * error_m[0]) + (error_m[1] * error_m[1]);
-    if (square > (knee_m * knee_m)) {
+    return active;
+}
+
+/* Cut the velocity of `limited` towards the walls off at f(d); outside it leads back in. Returns NMPC_LIMIT_FENCE, or 0
+ * if this changes nothing. */
+NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
+{
+    unsigned int active = 0U;
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
+        const nmpc_real_t place_m = limited->position_m[axis] - bounds->centre_m[axis];
+        const nmpc_real_t velocity_m_s = limited->velocity_m_s[axis];
+        /* Towards the wall to which the drone flies; outside towards the one behind which it is. */
+        const nmpc_real_t towards = (within(place_m, half_width_m) != 0) ? velocity_m_s : place_m;
+        const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
+        const nmpc_real_t room_m = half_width_m - (sign * place_m);
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
+        nmpc_real_t most_m_s = NMPC_APPROACH_1_S * room_m;
+
+        if (excess_m > (nmpc_real_t)0) {
+            most_m_s = braking_speed(braking_square(bounds, excess_m));
+            if (room_m < (nmpc_real_t)0) {
+                most_m_s = -most_m_s;
+            }
+        }
+        if ((sign * velocity_m_s) > most_m_s) {
+            limited->velocity_m_s[axis] = sign * most_m_s;
+            active = NMPC_LIMIT_FENCE;
+        }
+    }
+    return active;
+}
+
+/* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
+NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
+                                   nmpc_target_t *limited)
+{
+    nmpc_target_t held = *target;
+    nmpc_real_t error_x_m;
+    nmpc_real_t error_y_m;
+    nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
+    nmpc_square_t square;
+    unsigned int fence = 0U;
+    unsigned int others = 0U;
+
+    if (limits_are_clear(bounds, target->position_m) == 0) {
+        fence = limits_hold(bounds, &held);
+    }
+    error_x_m = held.position_m[0] - limited->position_m[0];
+    error_y_m = held.position_m[1] - limited->position_m[1];
+    square = (error_x_m * error_x_m) + (error_y_m * error_y_m);
+    if (square > (bounds->knee_m * bounds->knee_m)) {
         const nmpc_root_t root = inverse_root(square);
-        const nmpc_square_t half_m = (nmpc_square_t)(NMPC_HALF * knee_m);
-        const nmpc_square_t distance_m = square * root;
-        /* Not less than at the knee, by rounding. */
-        const nmpc_square_t beyond_m = larger(distance_m - half_m, half_m);
-        const nmpc_real_t speed_m_s = braking_speed(bounds->braking_m_s2 * beyond_m);
+        const nmpc_real_t distance_m = square * root;
+        /* Not less than 0, by rounding. */
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - bounds->knee_m);
+        const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = speed_m_s * root;
         others = NMPC_LIMIT_BRAKING;
     }
-    for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t half_width_m = limits_half_width(bounds, axis);
-        const nmpc_real_t free_m_s = desired_m_s[axis] + (ratio_1_s * error_m[axis]);
-        nmpc_real_t walled_m_s = limits_below(bounds, knee_m, free_m_s, half_width_m - place_m[axis]);
-
-        walled_m_s = -limits_below(bounds, knee_m, -walled_m_s, half_width_m + place_m[axis]);
-        if ((walled_m_s < free_m_s) || (walled_m_s > free_m_s)) {
-            fence = NMPC_LIMIT_FENCE;
-        }
-        desired_m_s[axis] = walled_m_s;
+    limited->velocity_m_s[0] = held.velocity_m_s[0] + (ratio_1_s * error_x_m);
+    limited->velocity_m_s[1] = held.velocity_m_s[1] + (ratio_1_s * error_y_m);
+    if (is_clear == 0) {
+        fence |= limits_wall(bounds, limited);
     }
-    square = (desired_m_s[0] * desired_m_s[0]) + (desired_m_s[1] * desired_m_s[1]);
+    square = (limited->velocity_m_s[0] * limited->velocity_m_s[0]) + (limited->velocity_m_s[1] * limited->velocity_m_s[1]);
     if (square > (bounds->speed_m_s * bounds->speed_m_s)) {
         const nmpc_real_t share = bounds->speed_m_s * inverse_root(square);
 
-        desired_m_s[0] = desired_m_s[0] * share;
-        desired_m_s[1] = desired_m_s[1] * share;
+        limited->velocity_m_s[0] = limited->velocity_m_s[0] * share;
+        limited->velocity_m_s[1] = limited->velocity_m_s[1] * share;
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
-    desired_m_s[0] = clamp(desired_m_s[0], NMPC_VELOCITY_RANGE_M_S);
-    desired_m_s[1] = clamp(desired_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], bounds->speed_m_s);
+    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], bounds->speed_m_s);
     return fence + others;
 }
 
@@ -874,18 +889,13 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
                                       nmpc_target_t *limited)
 {
     nmpc_bounds_t *const bounds = &self->bounds;
-    const nmpc_real_t knee_m = NMPC_KNEE_S2 * bounds->braking_m_s2;
+    const int is_clear = limits_are_clear(bounds, position_m);
     unsigned int active = 0U;
 
-    if (limits_are_free(bounds, knee_m, position_m, target) == 0) {
-        active = limits_desire(bounds, knee_m, position_m, target, limited->velocity_m_s);
-    }
-    if (active != 0U) {
-        int axis;
-
-        for (axis = 0; axis < 2; axis++) {
-            limited->position_m[axis] = position_m[axis];
-        }
+    if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
+        limited->position_m[0] = position_m[0];
+        limited->position_m[1] = position_m[1];
+        active = limits_act(bounds, is_clear, target, limited);
     }
     self->limited = (unsigned char)active;
     return active;
@@ -918,7 +928,8 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     const nmpc_real_t braking_m_s2 =
         smaller(limits->braking_m_s2 + limits->braking_m_s2, NMPC_TWICE_APPROACH_1_S * speed_m_s);
     const nmpc_real_t quotient = speed_m_s * inverse_root(braking_m_s2);
-    const nmpc_real_t margin_m = (quotient * quotient) + (NMPC_HALF * (NMPC_KNEE_S2 * braking_m_s2));
+    const nmpc_real_t knee_m = NMPC_KNEE_S2 * braking_m_s2;
+    const nmpc_real_t margin_m = (quotient * quotient) + (NMPC_HALF * knee_m);
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
@@ -929,6 +940,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
         bounds->clear_m[axis] = (NMPC_HALF * (max_m - min_m)) - margin_m;
     }
     bounds->margin_m = margin_m;
+    bounds->knee_m = knee_m;
     bounds->speed_m_s = speed_m_s;
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
@@ -1165,7 +1177,7 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.748208f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
+        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.74821f, 1.1630836f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
     };
 
     self->bounds = bounds;

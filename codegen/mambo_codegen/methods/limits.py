@@ -202,11 +202,8 @@ class LimitsLaw:
         far = square > products.square(bounds.near_m)
         ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
         desired = held[:, 2:4] + products.approach_speed(ratio[:, None], error)
-        desired, fast = self._slowed(fastest, desired)
         walled, cut = self._cut_off(bounds, half_width, place, desired)
-        walled, fast_again = self._slowed(fastest, walled)
-        limited = clamp(np.where(clear[:, None], desired, walled), fastest[:, None])
-        fast = fast | (fast_again & ~clear)
+        limited, fast = self._slowed(fastest, np.where(clear[:, None], desired, walled))
         active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
             outside | (cut & ~clear), ActiveLimit.FENCE, 0
         )
@@ -223,10 +220,10 @@ class LimitsLaw:
         return free
 
     def _braking_speed(self, bounds: Bounds, excess: Real) -> Real:
-        """Return f (n,), m/s, at a distance that exceeds the knee by `excess` (n,)."""
+        """Return the speeds from which the braking stops within the knee and `excess` (n,)."""
         products = self._products
-        within = products.half(bounds.knee_m) + excess
-        return products.braking_speed(products.braking_square(bounds.braking, within))
+        square = products.braking_square(bounds.braking, products.half(bounds.knee_m) + excess)
+        return products.braking_speed(square)
 
     def _approach(self, bounds: Bounds, distance: Real) -> Real:
         """Return the speeds from which the braking stops within `distance` (n,); negative beyond a wall."""
@@ -248,7 +245,8 @@ class LimitsLaw:
         square = products.square_sum(velocity)
         fast = square > products.square(fastest)
         share = products.share(fastest, products.inverse_root(square))
-        return np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity), fast
+        slowed = np.where(fast[:, None], products.share_product(velocity, share[:, None]), velocity)
+        return clamp(slowed, fastest[:, None]), fast
 
     def _cut_off(self, bounds: Bounds, half_width: Real, place: Real, velocity: Real) -> tuple[Real, Rows]:
         """Return velocities (n, 2) that brake in time before the walls, and which were others (n,).
@@ -297,7 +295,7 @@ class LimitsLaw:
 
 
 def _held(half_width: Real, target: Real, centre: Real) -> tuple[Real, Rows]:
-    """Return targets (n, 4) within the fence, with velocities that do not lead out, and which were not (n,)."""
+    """Return targets (n, 4) put within the fence, velocities not leading out, and which were not (n,)."""
     place, velocity = target[:, 0:2] - centre, target[:, 2:4]
     beyond = np.abs(place) > half_width
     position = np.where(beyond, centre + clamp(place, half_width), target[:, 0:2])

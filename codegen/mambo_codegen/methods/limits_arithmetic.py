@@ -19,8 +19,10 @@ TERMS: Final[dict[Any, tuple[float, ...]]] = {
     np.float32: (1.50087896, 1.50000058),
     np.float64: (1.50087896, 1.50000058, 1.5),
 }
-"""What stands for 1.5 in each of Newton's iterations, which square the error; it is 0.035 at the start. Newton's
-results are too small: a little more than 1.5 makes the error symmetric, and half as large."""
+"""What stands for 1.5 in each of Newton's iterations, which square the error; it is 0.035 at the start.
+
+Newton's results are too small: a little more than 1.5 makes the error symmetric, and half as large.
+"""
 
 STARTS: Final[dict[Any, tuple[Any, int]]] = {
     np.float32: (np.uint32, 0x5F376908),
@@ -239,11 +241,13 @@ class LimitsFixedArithmetic:
 
     def inverse_root(self, square: Real) -> FixedRoot:
         scaled, half = np.maximum(square, 1).astype(np.uint64), np.full(square.shape, 32)
-        for shift in (32, 16, 8, 4, 2):
-            small = scaled < np.uint64(2 ** (64 - shift))
-            scaled = np.where(small, scaled << np.uint64(shift), scaled)
-            half = half - np.where(small, shift // 2, 0)
-        top = (scaled >> np.uint64(32)).astype(np.int64)
+        for bits, shifts in ((64, (32, 16, 8)), (32, (4, 2))):
+            for shift in shifts:
+                small = scaled < np.uint64(2 ** (bits - shift))
+                scaled = np.where(small, scaled << np.uint64(shift), scaled)
+                half = half - np.where(small, shift // 2, 0)
+            scaled = scaled >> np.uint64(bits - 32)
+        top = scaled.astype(np.int64)
         mantissa = FIXED_START[0] - _upper(FIXED_START[1] - _upper(FIXED_START[2], top), top)
         for _ in range(FIXED_ITERATIONS):
             product = _upper(_upper(mantissa, mantissa), top)

@@ -27,7 +27,8 @@ BRAKING_SHARE: Final = 0.8
 """Braking limit where none is given, over what the tilt limit gives: the rest is left for wind and lag."""
 
 NEAR_SHARE: Final = 0.7
-"""Braking ends at this share of the distance at which the approach speed becomes linear; see `limits.c.j2`."""
+"""Braking ends at this share of the distance up to which f is linear; see `limits.c.j2`. Flown with presets
+mambo and crazyflie: with less they overshoot, with more the command jumps."""
 
 SPELLING: Final = 1.0005
 """A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
@@ -167,8 +168,8 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
     """Return the fractional bits of the limits' own quantities in fixed point; 0 without limits.
 
     velocity and position are the formats of those inputs. braking: of twice the braking, with three bits to
-    spare for its product with a distance. approach: of k and what is steeper. knee: of `knee_s2`. slope: of `TiltAcceleration`.
-    rate: of the update rate.
+    spare for its product with a distance. approach: of `steepest_1_s`. knee: of `knee_s2`. slope: of
+    `TiltAcceleration`. rate: of the update rate.
     """
     if found is None:
         return dict.fromkeys(("braking", "approach", "knee", "slope", "rate"), 0)

@@ -50,10 +50,9 @@ static void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2
 
 /* Whatever reads a target also calls this. */
 /*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
-    assigns \result \from *bounds, knee_m, position_m[0 .. 1], *target;
+    assigns \result \from *bounds, position_m[0 .. 1], *target;
 */
-static int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
-                           const nmpc_target_t *target);
+static int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2], const nmpc_target_t *target);
 
 /* More than 1/sqrt(x) for any x that is a square of a speed or of a distance beyond the knee. */
 #define ROOT_LIMIT 63245.555f

@@ -313,15 +313,14 @@ class QuadraticController:
         missed = np.where(has_state, 0, waited)
         commands = allows_command & (missed < self._no_estimate)
         motion, limits = memory.target, memory.limits
-        seen = motion
         height, acts = self._aim_height(lift, target, state, commands)
         target = target[:, : len(self._constants.level_target)]
         if self._limits is not None:
             limited, within = self._limits.limit(limits, estimate.position_m, target)
-            seen = handed_over(motion, limits.active, limited.active)
             limits = choose(commands, limited, limits)
             target = np.where(commands[:, None], within, target)
         if self._tracker is not None:
+            seen = handed_over(motion, memory.limits.active, limits.active)
             motion = choose(commands, self._tracker.update(seen, target[:, self._tracker.columns]), motion)
         overdue = missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
