@@ -133,7 +133,8 @@ def test_the_law_is_that_of_the_page() -> None:
     error = target[:, 0:2] - position
     distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
     expected = target[:, 2:4] + (f(distance) * error / distance)
-    expected = np.clip(expected, -f(walls + position), f(walls - position))
+    clear = np.all(f(walls - np.abs(position)) >= 2.0, axis=1)[:, None]
+    expected = np.where(clear, expected, np.clip(expected, -f(walls + position), f(walls - position)))
     size = np.maximum(np.hypot(*expected.T)[:, None], 1e-12)
     expected = np.where(size > 2.0, expected * 2.0 / size, expected)
     acts = active != 0
