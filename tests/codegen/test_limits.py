@@ -135,9 +135,8 @@ def test_the_law_is_that_of_the_page() -> None:
     knee = 2.0 / k**2
     speed = np.where(distance > NEAR_SHARE * knee, f(distance + ((1 - NEAR_SHARE) * knee)), k * distance)
     expected = target[:, 2:4] + (speed * error / distance)
-    least, most = -f(walls + position), f(walls - position)
-    cut = np.any((least > -2.0) | (most < 2.0), axis=1, keepdims=True)
-    expected = np.where(cut, np.clip(expected, least, most), expected)
+    clear = np.all(f(walls - np.abs(position)) >= 2.0, axis=1)[:, None]
+    expected = np.where(clear, expected, np.clip(expected, -f(walls + position), f(walls - position)))
     size = np.maximum(np.hypot(*expected.T)[:, None], 1e-12)
     expected = np.where(size > 2.0, expected * 2.0 / size, expected)
     acts = active != 0

@@ -39,7 +39,7 @@ def measure_once(board: str, preset: str = "mambo", steps: int = 300) -> Footpri
 
 @pytest.mark.long
 def test_the_crazyflie_keeps_its_promises() -> None:
-    """Preset mambo: 5 KiB of flash, 160 B of RAM, 192 B of stack, 660 instructions, 1100 with a limit."""
+    """Preset mambo: 5 KiB of flash, 160 B of RAM, 176 B of stack, 660 instructions, 850 with a limit."""
     footprint = measure_once("crazyflie")
     assert footprint.added.flash.total <= 5120
     assert footprint.added.ram.total <= 160
@@ -47,16 +47,16 @@ def test_the_crazyflie_keeps_its_promises() -> None:
     limits = {limit.name: limit.value for limit in footprint.limits}
     assert (limits["flash"], limits["RAM"]) == (footprint.added.flash.total, footprint.added.ram.total)
     assert footprint.stack is not None
-    assert footprint.stack.bytes <= 192
+    assert footprint.stack.bytes <= 176
     assert footprint.counts is not None
     assert footprint.counts.mean <= 660
-    assert footprint.counts.most_met <= 1100
+    assert footprint.counts.most_met <= 850
     assert footprint.counts.ticks == 300
     assert footprint.fits
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize(("preset", "spread"), [("mambo", 2.05), ("mambo-1norm", 1.25), ("table1", 1.15)])
+@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.65), ("mambo-1norm", 1.25), ("table1", 1.15)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
     """Most instructions met over least, on the Cortex-M4F; where a limit acts, as in mambo, it does."""
     counts = measure_once("crazyflie", preset).counts
