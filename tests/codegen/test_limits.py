@@ -133,7 +133,9 @@ def test_the_law_is_that_of_the_page() -> None:
     error = target[:, 0:2] - position
     distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
     knee = 2.0 / k**2
-    speed = np.where(distance > NEAR_SHARE * knee, f(distance + ((1 - NEAR_SHARE) * knee)), k * distance)
+    slow = (np.hypot(*target[:, 2:4].T) < 1.0 / k)[:, None]
+    near = np.where(slow, NEAR_SHARE * knee, knee)
+    speed = np.where(distance > near, f(distance + knee - near), k * distance)
     expected = target[:, 2:4] + (speed * error / distance)
     clear = np.all(f(walls - np.abs(position)) >= 2.0, axis=1)[:, None]
     expected = np.where(clear, expected, np.clip(expected, -f(walls + position), f(walls - position)))

@@ -87,17 +87,6 @@ def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
     )
 
 
-def handed_over(motion: TargetMotion, before: NDArray[np.int64], active: NDArray[np.int64]) -> TargetMotion:
-    """Return what is known of targets for which the limits that act (n,) let another velocity stand.
-
-    Its change is no acceleration. Where only braking acted before, the deceleration is forgotten too.
-    """
-    was = before & ~ActiveLimit.HEIGHT
-    switched = (was != 0) != (active != 0)
-    known = replace(motion, is_known=motion.is_known & ~switched)
-    return choose(switched & (was == ActiveLimit.BRAKING), unknown_motion(motion.velocity_m_s), known)
-
-
 def no_limits(like: Real) -> LimitsMemory:
     """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
     pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
@@ -199,8 +188,9 @@ class LimitsLaw:
         held, outside = _held(half_width, target, bounds.centre_m)
         error = held[:, 0:2] - position
         square = products.square_sum(error)
-        far = square > products.square(bounds.near_m)
-        ratio = np.where(far, self._braking_ratio(bounds, square), products.approach)
+        end = np.where(self.is_slow(bounds, target) & ~outside, bounds.near_m, bounds.knee_m)
+        far = square > products.square(end)
+        ratio = np.where(far, self._braking_ratio(bounds, end, square), products.approach)
         desired = held[:, 2:4] + products.approach_speed(ratio[:, None], error)
         walled, cut = self._cut_off(bounds, half_width, place, desired)
         limited, fast = self._slowed(fastest, np.where(clear[:, None], desired, walled))
@@ -233,10 +223,10 @@ class LimitsLaw:
         slow = self._products.approach_speed(self._products.approach, distance)
         return np.where(far, np.where(distance < 0, -speed, speed), slow)
 
-    def _braking_ratio(self, bounds: Bounds, square: Real) -> Real:
-        """Return the approach speed over the distance (n,), where it brakes, from the distance's square."""
+    def _braking_ratio(self, bounds: Bounds, end: Real, square: Real) -> Real:
+        """Return the approach speed over the distance (n,), from its square, where braking ends at `end`."""
         root = self._products.inverse_root(square)
-        excess = np.abs(self._products.length(square, root) - bounds.near_m)
+        excess = np.abs(self._products.length(square, root) - end)
         return self._products.ratio(self._braking_speed(bounds, excess), root)
 
     def _slowed(self, fastest: Real, velocity: Real) -> tuple[Real, Rows]:
@@ -272,6 +262,21 @@ class LimitsLaw:
             columns.append(np.where(acts, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
             memory = replace(memory, velocity_m_s=velocity)
         return replace(memory, active=active), np.concatenate(columns, axis=1)
+
+    def forget_braking(
+        self, motion: TargetMotion, before: LimitsMemory, after: LimitsMemory, target: Real
+    ) -> TargetMotion:
+        """Return what is known of targets (n, 4 or more), nothing where braking ends."""
+        was = before.active & ~ActiveLimit.HEIGHT
+        ends = (was == ActiveLimit.BRAKING) & (after.active == 0) & self.is_slow(after.bounds, target)
+        return choose(ends, unknown_motion(motion.velocity_m_s), motion)
+
+    def is_slow(self, bounds: Bounds, target: Real) -> Rows:
+        """Return whether targets move at less than half the speed at which braking ends (n,)."""
+        products = self._products
+        slow = products.approach_speed(products.approach, products.half(bounds.knee_m))
+        rows: Rows = products.square_sum(target[:, 2:4]) < products.square(slow)
+        return rows
 
     def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
         """Return the columns of nmpc_bounds_t, in the order of `stored_quantities`."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Status, choose
-from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, handed_over, no_limits
+from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
@@ -175,9 +175,9 @@ class OneNormController:
         thrusts = np.where(good, thrusts, self._inputs.limits.thrust_least)
         if self.settings.model.thrust == "hover":
             thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
-        limits, targets = self._limit(states, targets)
-        motion = self._track(targets, limits)
-        searched = self._search(states, targets, thrusts, motion.acceleration_m_step2)
+        limits, within = self._limit(states, targets)
+        motion = self._track(targets, limits, within)
+        searched = self._search(states, within, thrusts, motion.acceleration_m_step2)
         new = replace(
             self.memory,
             command_rad=searched.moves_rad[:, 0],
@@ -283,11 +283,13 @@ class OneNormController:
         level = replace(self._held(np.zeros_like(memory.sent_rad)), missed=missed)
         return choose(bad & (missed == self._outage_steps), level, memory)
 
-    def _track(self, target: Real, limits: LimitsMemory) -> TargetMotion:
+    def _track(self, target: Real, limits: LimitsMemory, within: Real) -> TargetMotion:
+        """Return what is known of targets, of which `within` stands for `target`."""
         if self._tracker is None:
             return self.memory.target
-        motion = handed_over(self.memory.target, self.memory.limits.active, limits.active)
-        return self._tracker.update(motion, target[:, self._tracker.columns])
+        motion, before = self.memory.target, self.memory.limits
+        seen = self._limits.forget_braking(motion, before, limits, target) if self._limits else motion
+        return self._tracker.update(seen, within[:, self._tracker.columns])
 
     def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory

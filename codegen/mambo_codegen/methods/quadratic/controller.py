@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Rows, Status, choose, within
-from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, handed_over, no_limits
+from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, no_limits
 from mambo_codegen.methods.limits_constants import LIMITS
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
@@ -317,11 +317,11 @@ class QuadraticController:
         target = target[:, : len(self._constants.level_target)]
         if self._limits is not None:
             limited, within = self._limits.limit(limits, estimate.position_m, target)
+            motion = choose(commands, self._limits.forget_braking(motion, limits, limited, target), motion)
             limits = choose(commands, limited, limits)
             target = np.where(commands[:, None], within, target)
         if self._tracker is not None:
-            seen = handed_over(motion, memory.limits.active, limits.active)
-            motion = choose(commands, self._tracker.update(seen, target[:, self._tracker.columns]), motion)
+            motion = choose(commands, self._tracker.update(motion, target[:, self._tracker.columns]), motion)
         overdue = missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = (overdue & ~slow, overdue & slow) if self._limits else (overdue & False,) * 2
