@@ -31,7 +31,7 @@ FAULTS = {
     ),
     "the gain is not learnt": Harm("nmpc.c", r"height->gain = confine\([^;]*;", ""),
     "the tilt does not count": Harm(
-        "nmpc.c", r"(?s)NMPC_INLINE nmpc_real_t height_tilt.*?\{\n", r"\g<0>    roll_rad = pitch_rad;\n"
+        "nmpc.c", r"(?s)NMPC_SHARED nmpc_real_t height_tilt.*?\{\n", r"\g<0>    roll_rad = pitch_rad;\n"
     ),
     "a refused thrust is set": Harm(
         "nmpc.c", r"(?s)(nmpc_set_thrust\(.*?)        return NMPC_BAD_THRUST;\n", r"\1"
