@@ -920,7 +920,7 @@ static nmpc_square_t square_sum(nmpc_real_t a, nmpc_real_t b)
 }
 
 /* The product of two numbers that are not negative. */
-static nmpc_square_t product(nmpc_real_t a, nmpc_mantissa_t b)
+static nmpc_square_t size_product(nmpc_real_t a, nmpc_mantissa_t b)
 {
     return (nmpc_square_t)(nmpc_mantissa_t)a * b;
 }
@@ -940,12 +940,12 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
 /* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most((product(speed_m_s, root.mantissa) >> root.half) >> 5, NMPC_APPROACH_1_S);
+    return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> 5, NMPC_APPROACH_1_S);
 }
 
 static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most(product(speed_m_s, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
+    return at_most(size_product(speed_m_s, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
 }
 
 /* Ratio times distance, m/s, within the range of velocities. */
@@ -971,7 +971,7 @@ static nmpc_real_t knee_product(nmpc_real_t knee_s2, nmpc_real_t braking_m_s2)
 /* The square of a speed, from twice the braking and a distance. */
 static nmpc_square_t braking_product(nmpc_real_t braking_m_s2, nmpc_real_t distance_m)
 {
-    return product(braking_m_s2, (nmpc_mantissa_t)distance_m) << 1;
+    return size_product(braking_m_s2, (nmpc_mantissa_t)distance_m) << 1;
 }
 
 /* The root of such a square, within the range of velocities. */
@@ -1076,7 +1076,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
-    nmpc_target_t held = *target;
+    nmpc_target_t held;
     nmpc_real_t error_x_m;
     nmpc_real_t error_y_m;
     nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
@@ -1084,6 +1084,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     unsigned int fence = 0U;
     unsigned int others = 0U;
 
+    held = *target;
     if (limits_are_clear(bounds, target->position_m) == 0) {
         fence = limits_hold(bounds, &held);
     }
@@ -1162,7 +1163,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> 27;
     const nmpc_real_t braking_m_s2 = at_most(most_m_s2, limits->braking_m_s2 + limits->braking_m_s2);
     const nmpc_root_t root = inverse_root((nmpc_square_t)braking_m_s2 << 1);
-    const nmpc_square_t quotient = (product(speed_m_s, root.mantissa) >> root.half) >> 24;
+    const nmpc_square_t quotient = (size_product(speed_m_s, root.mantissa) >> root.half) >> 24;
     const nmpc_square_t stopping_m = (quotient * quotient) >> 14;
     const nmpc_real_t knee_m = knee_product(NMPC_KNEE_S2, braking_m_s2);
     const nmpc_real_t margin_m = at_most(stopping_m + (nmpc_square_t)(halved(knee_m)), 2 * NMPC_POSITION_RANGE_M);

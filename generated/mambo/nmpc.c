@@ -840,7 +840,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
-    nmpc_target_t held = *target;
+    nmpc_target_t held;
     nmpc_real_t error_x_m;
     nmpc_real_t error_y_m;
     nmpc_real_t ratio_1_s = NMPC_APPROACH_1_S;
@@ -848,6 +848,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     unsigned int fence = 0U;
     unsigned int others = 0U;
 
+    held = *target;
     if (limits_are_clear(bounds, target->position_m) == 0) {
         fence = limits_hold(bounds, &held);
     }
