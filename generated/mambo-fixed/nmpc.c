@@ -808,7 +808,9 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
- *      two are the same at the knee.
+ *      two are the same at the knee. A target that is slower than A/(2 k), and inside the fence, is approached with
+ *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not jump, and the
+ *      tracker forgets the deceleration.
  *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
  *      it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
@@ -819,8 +821,10 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
  */
 
-#define NMPC_APPROACH_1_S 1724467605 /* k */
+#define NMPC_APPROACH_1_S 862233802 /* k */
+#define NMPC_STEEPEST_1_S 1231762575 /* where braking ends: k/0.7 */
 #define NMPC_KNEE_S2 1665135272 /* 1/(2 k^2): the knee over 2 A */
+#define NMPC_NEAR_S2 1165594691 /* 0.7 times that */
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
 
 NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
@@ -940,7 +944,7 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
 /* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> 5, NMPC_APPROACH_1_S);
+    return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> 6, NMPC_STEEPEST_1_S);
 }
 
 static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
@@ -951,7 +955,7 @@ static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 /* Ratio times distance, m/s, within the range of velocities. */
 NMPC_ASIDE nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
 {
-    const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, 25);
+    const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, 24);
 
     return (speed_m_s > NMPC_VELOCITY_RANGE_M_S)
                ? NMPC_VELOCITY_RANGE_M_S
@@ -1007,8 +1011,17 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + approach_product(NMPC_APPROACH_1_S, error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + approach_product(NMPC_APPROACH_1_S, error_y_m);
 
-    return ((square_sum(error_x_m, error_y_m)) <= squared(bounds->knee_m))
+    return ((square_sum(error_x_m, error_y_m)) <= squared(bounds->near_m))
            && ((square_sum(desired_x_m_s, desired_y_m_s)) <= squared(bounds->speed_m_s));
+}
+
+/* 1 if the target is slower than A/(2 k), half the speed at which braking ends. */
+NMPC_ASIDE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
+{
+    const nmpc_real_t half_m = halved(bounds->knee_m);
+    const nmpc_real_t slow_m_s = approach_product(NMPC_APPROACH_1_S, half_m);
+
+    return (square_sum(target->velocity_m_s[0], target->velocity_m_s[1])) < squared(slow_m_s);
 }
 
 /* Half the width of the fence. */
@@ -1076,6 +1089,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
+    nmpc_real_t end_m = bounds->knee_m;
     nmpc_target_t held;
     nmpc_real_t error_x_m;
     nmpc_real_t error_y_m;
@@ -1088,14 +1102,17 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     if (limits_are_clear(bounds, target->position_m) == 0) {
         fence = limits_hold(bounds, &held);
     }
+    if ((fence == 0U) && (limits_are_slow(bounds, target) != 0)) {
+        end_m = bounds->near_m;
+    }
     error_x_m = held.position_m[0] - limited->position_m[0];
     error_y_m = held.position_m[1] - limited->position_m[1];
     square = square_sum(error_x_m, error_y_m);
-    if (square > squared(bounds->knee_m)) {
+    if (square > squared(end_m)) {
         const nmpc_root_t root = inverse_root(square);
         const nmpc_real_t distance_m = at_most(length(root), 2 * NMPC_POSITION_RANGE_M);
         /* Not less than 0, by rounding. */
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - bounds->knee_m);
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = approach_ratio(speed_m_s, root);
@@ -1128,11 +1145,15 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
     unsigned int active = 0U;
+    const unsigned int before = self->limited;
 
     if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, is_clear, target, limited);
+    }
+    if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(bounds, target) != 0)) {
+        tracker_clear(self); /* braking ends: what stood for the target decelerates no more */
     }
     self->limited = (unsigned char)active;
     return active;
@@ -1160,7 +1181,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const nmpc_real_t speed_m_s = limits->speed_m_s;
-    const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> 27;
+    const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> 26;
     const nmpc_real_t braking_m_s2 = at_most(most_m_s2, limits->braking_m_s2 + limits->braking_m_s2);
     const nmpc_root_t root = inverse_root((nmpc_square_t)braking_m_s2 << 1);
     const nmpc_square_t quotient = (size_product(speed_m_s, root.mantissa) >> root.half) >> 24;
@@ -1178,6 +1199,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     }
     bounds->margin_m = margin_m;
     bounds->knee_m = knee_m;
+    bounds->near_m = knee_product(NMPC_NEAR_S2, braking_m_s2);
     bounds->speed_m_s = speed_m_s;
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
@@ -1408,7 +1430,7 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0, 0 }, { 260899300, 260899300 }, 1244700, 304895, 41943040, 201326592, 11744051, { 23041, 23041 }
+        { 0, 0 }, { 260899300, 260899300 }, 1244700, 304895, 213426, 41943040, 201326592, 11744051, { 23041, 23041 }
     };
 
     self->bounds = bounds;

@@ -90,7 +90,7 @@ typedef long long nmpc_sum_t;
 #define NMPC_SETTINGS_ID 0x48A3891DUL
 
 #define NMPC_ANGLES 2 /* roll phi, pitch theta */
-#define NMPC_STORED_NUMBERS 37 /* numbers in nmpc_t, which come before its single bytes */
+#define NMPC_STORED_NUMBERS 38 /* numbers in nmpc_t, which come before its single bytes */
 #define NMPC_ONE 1073741824
 
 #define NMPC_UPDATE_PERIOD_S 0.01f /* for the caller: from one call of nmpc_step() to the next */
@@ -159,7 +159,7 @@ typedef long long nmpc_sum_t;
 #define NMPC_SINE_BITS 30
 
 /* Upper bound of sizeof(nmpc_t); nmpc.c asserts it. */
-#define NMPC_INSTANCE_BYTES 152
+#define NMPC_INSTANCE_BYTES 156
 
 typedef enum {
     NMPC_OK = 0,
@@ -319,6 +319,7 @@ typedef struct {
     nmpc_real_t clear_m[2];   /* half the width of the fence less the margin; may be less than 0 */
     nmpc_real_t margin_m;     /* a wall that is farther limits nothing */
     nmpc_real_t knee_m;       /* the distance up to which f is linear */
+    nmpc_real_t near_m;       /* the distance from the target within which the law brakes */
     nmpc_real_t speed_m_s;    /* V */
     nmpc_real_t braking_m_s2; /* 2 A */
     nmpc_real_t tilt_rad;     /* the tilt limit */

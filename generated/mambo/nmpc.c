@@ -680,7 +680,9 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
- *      two are the same at the knee.
+ *      two are the same at the knee. A target that is slower than A/(2 k), and inside the fence, is approached with
+ *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not jump, and the
+ *      tracker forgets the deceleration.
  *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
  *      it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
@@ -693,6 +695,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 
 #define NMPC_APPROACH_1_S 1.6060356f /* k */
 #define NMPC_KNEE_S2 0.19384725f /* 1/(2 k^2): the knee over 2 A */
+#define NMPC_NEAR_S2 0.13569309f /* 0.7 times that */
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
 #define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
 
@@ -772,8 +775,17 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + (NMPC_APPROACH_1_S * error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + (NMPC_APPROACH_1_S * error_y_m);
 
-    return (((error_x_m * error_x_m) + (error_y_m * error_y_m)) <= (bounds->knee_m * bounds->knee_m))
+    return (((error_x_m * error_x_m) + (error_y_m * error_y_m)) <= (bounds->near_m * bounds->near_m))
            && (((desired_x_m_s * desired_x_m_s) + (desired_y_m_s * desired_y_m_s)) <= (bounds->speed_m_s * bounds->speed_m_s));
+}
+
+/* 1 if the target is slower than A/(2 k), half the speed at which braking ends. */
+NMPC_ASIDE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
+{
+    const nmpc_real_t half_m = NMPC_HALF * bounds->knee_m;
+    const nmpc_real_t slow_m_s = NMPC_APPROACH_1_S * half_m;
+
+    return ((target->velocity_m_s[0] * target->velocity_m_s[0]) + (target->velocity_m_s[1] * target->velocity_m_s[1])) < (slow_m_s * slow_m_s);
 }
 
 /* Half the width of the fence. */
@@ -840,6 +852,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
+    nmpc_real_t end_m = bounds->knee_m;
     nmpc_target_t held;
     nmpc_real_t error_x_m;
     nmpc_real_t error_y_m;
@@ -852,14 +865,17 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     if (limits_are_clear(bounds, target->position_m) == 0) {
         fence = limits_hold(bounds, &held);
     }
+    if ((fence == 0U) && (limits_are_slow(bounds, target) != 0)) {
+        end_m = bounds->near_m;
+    }
     error_x_m = held.position_m[0] - limited->position_m[0];
     error_y_m = held.position_m[1] - limited->position_m[1];
     square = (error_x_m * error_x_m) + (error_y_m * error_y_m);
-    if (square > (bounds->knee_m * bounds->knee_m)) {
+    if (square > (end_m * end_m)) {
         const nmpc_root_t root = inverse_root(square);
         const nmpc_real_t distance_m = square * root;
         /* Not less than 0, by rounding. */
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - bounds->knee_m);
+        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = speed_m_s * root;
@@ -892,11 +908,15 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
     unsigned int active = 0U;
+    const unsigned int before = self->limited;
 
     if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, is_clear, target, limited);
+    }
+    if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(bounds, target) != 0)) {
+        tracker_clear(self); /* braking ends: what stood for the target decelerates no more */
     }
     self->limited = (unsigned char)active;
     return active;
@@ -942,6 +962,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     }
     bounds->margin_m = margin_m;
     bounds->knee_m = knee_m;
+    bounds->near_m = NMPC_NEAR_S2 * braking_m_s2;
     bounds->speed_m_s = speed_m_s;
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
@@ -1178,7 +1199,7 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.74821f, 1.1630836f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
+        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.74821f, 1.1630836f, 0.81415856f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
     };
 
     self->bounds = bounds;
