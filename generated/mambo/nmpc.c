@@ -681,10 +681,10 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
  *      two are the same at the knee. A target that is slower than A/(2 k), and inside the fence, is approached with
- *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not jump, and the
- *      tracker forgets the deceleration.
- *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall. Outside,
- *      it leads back in by f.
+ *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not
+ *      jump, and the tracker forgets the deceleration.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
+ *      Outside, it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
@@ -785,7 +785,9 @@ NMPC_ASIDE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t 
     const nmpc_real_t half_m = NMPC_HALF * bounds->knee_m;
     const nmpc_real_t slow_m_s = NMPC_APPROACH_1_S * half_m;
 
-    return ((target->velocity_m_s[0] * target->velocity_m_s[0]) + (target->velocity_m_s[1] * target->velocity_m_s[1])) < (slow_m_s * slow_m_s);
+    const nmpc_square_t square = (target->velocity_m_s[0] * target->velocity_m_s[0]) + (target->velocity_m_s[1] * target->velocity_m_s[1]);
+
+    return (square < (slow_m_s * slow_m_s)) ? 1 : 0;
 }
 
 /* Half the width of the fence. */
@@ -794,8 +796,8 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
     return bounds->clear_m[axis] + bounds->margin_m;
 }
 
-/* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if it
- * is inside. */
+/* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if
+ * it is inside. */
 NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
 {
     unsigned int active = 0U;
