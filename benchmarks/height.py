@@ -24,16 +24,18 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import flown as as_flown
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import (
     FALL_TIME_S,
     PLANNED_S,
     RISE_TIME_S,
+    HeightProfile,
     TakeOffAndLanding,
     UpAndDown,
 )
-from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.loop import HEIGHT, Flight, Outcome, PositionController
 from mambo_sil.flight.metrics import height_error_m, horizontal_error_m
 from mambo_sil.flight.names import AltitudeName
 from mambo_sil.flight.scenario import choose_sensors
@@ -44,6 +46,8 @@ from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION,
 
 SETTINGS: Final = Path(__file__).parent / "evidence" / "height.toml"
 HEADINGS: Final = 8
+SEEN_HEIGHT, GROUNDED = 7, 9
+"""Columns of the states of controllers of the height."""
 RANDOM: Final = 60
 CAMPAIGN: Final = 1000
 TRANSIENT_S: Final = 3.0
@@ -52,6 +56,11 @@ LATER_S: Final = 4.0
 BAND_M: Final = 0.03
 LIFT_M: Final = 0.05
 """Height of a target at which the motors are to come up to speed."""
+APP_GROUND_M: Final = 0.05
+APP_LIFT_M: Final = 0.125
+"""Up to this height the Crazyflie's app is on the floor, where it lifts targets that climb to the other."""
+PLACES: Final = 4
+"""Of the circle, where a step of height begins."""
 LOOPS: Final[tuple[AltitudeName, ...]] = get_args(AltitudeName)
 TITLES: Final = ("the vehicle's loop", "with feed-forward", "PID", "third axis")
 DRONE: Final = vehicle_toml.preset("crazyflie")
@@ -73,6 +82,24 @@ class Change:
 NOMINAL: Final = Change()
 
 
+class AppTakeOff:
+    """Controllers of the height, one for each heading, with the take-off of the Crazyflie's app."""
+
+    def __init__(self, controller: PositionController) -> None:
+        self.controller = as_flown(controller)
+        self._is_up = np.zeros(HEADINGS, np.bool_)
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
+        """Step with contact with the floor, and targets, as the app gives them."""
+        self._is_up |= state[:, SEEN_HEIGHT] > APP_GROUND_M
+        height_m, climb_m_s, _ = target[:, HEIGHT].T
+        given_m = np.where(self._is_up | (climb_m_s <= 0.0), height_m, np.maximum(height_m, APP_LIFT_M))
+        state, target = state.copy(), target.copy()
+        state[:, GROUNDED], target[:, HEIGHT.start] = ~self._is_up, given_m
+        outcome: Outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
+        return outcome
+
+
 def settings_of(*, height: bool) -> Settings:
     """Return the settings of `SETTINGS`, or the same without a height."""
     settings = controller_toml.read(SETTINGS)
@@ -85,8 +112,10 @@ def flown(
     loop: AltitudeName | None,
     change: Change = NOMINAL,
     flights: int = HEADINGS,
+    *,
+    around: Callable[[PositionController], PositionController] = lambda controller: controller,
 ) -> Trace:
-    """Fly with an altitude loop, or with the third axis (None)."""
+    """Fly with an altitude loop, or with the third axis (None), and what is `around` the controllers."""
     plant = Vehicle.of(DRONE)
     airframe = replace(
         plant.airframe,
@@ -111,7 +140,7 @@ def flown(
         sensors=choose_sensors("mocap", DRONE),
         altitude=AltitudeLaw(loop or "stock"),
     )
-    return fly(flight, CompiledController(settings_of(height=loop is None), flights))
+    return fly(flight, around(CompiledController(settings_of(height=loop is None), flights)))
 
 
 Figures = tuple[float, ...]
@@ -147,12 +176,31 @@ def step(loop: AltitudeName | None) -> Figures:
     return tuple(found)
 
 
+@dataclass(frozen=True)
+class Later:
+    """A profile of heights that begins `delay_s` later."""
+
+    profile: HeightProfile
+    delay_s: float
+
+    def vertical(self, time_s: ArrayLike) -> FloatArray:
+        """Return [height, climb, acceleration] (..., 3)."""
+        return self.profile.vertical(np.asarray(time_s) - self.delay_s)
+
+
 def step_on_circle(loop: AltitudeName | None) -> Figures:
-    """Return the worst distance to the circle of 1 m, 1.5 rad/s, after a step of 2 m up, and down."""
-    trace = flown(InSpace(Circle(1.0, 1.5), UpAndDown(2.0)), 11.0, loop)
-    error_m = horizontal_error_m(trace)
-    up = (trace.time_s >= RISE_TIME_S) & (trace.time_s < FALL_TIME_S)
-    return float(error_m[up].max()), float(error_m[trace.time_s >= FALL_TIME_S].max())
+    """Return the worst distance to the circle of 1 m, 1.5 rad/s, after a step of 2 m up, and down.
+
+    The drone starts at rest, and has caught up with the circle when the step begins.
+    """
+    up, down = [], []
+    for place in range(PLACES):
+        later_s = TRANSIENT_S + place / PLACES * (2.0 * np.pi / 1.5)
+        trace = flown(InSpace(Circle(1.0, 1.5), Later(UpAndDown(2.0), later_s)), 11.0 + later_s, loop)
+        error_m, time_s = horizontal_error_m(trace), trace.time_s - later_s
+        up.append(float(error_m[(time_s >= RISE_TIME_S) & (time_s < FALL_TIME_S)].max()))
+        down.append(float(error_m[time_s >= FALL_TIME_S].max()))
+    return max(up), max(down)
 
 
 class Prepared:
@@ -165,13 +213,16 @@ class Prepared:
         return np.asarray(np.where(rising, (LIFT_M, 0.0, 0.0) + (1.0 - LIFT_M) * found, found))
 
 
+def _planned(trace: Trace) -> FloatArray:
+    """Return the error of the height (k, n) in a planned take-off and the second after it."""
+    return _between(trace, RISE_TIME_S, RISE_TIME_S + PLANNED_S + 1.0)
+
+
 def _late_m(trajectory: Trajectory, loop: AltitudeName | None) -> Figures:
     """Return the largest lag of a planned take-off, and that with 30 % more mass."""
-    found = []
-    for mass in (1.0, 1.3):
-        trace = flown(trajectory, 9.0, loop, Change(mass=mass))
-        found.append(-float(_between(trace, RISE_TIME_S, RISE_TIME_S + PLANNED_S + 1.0).min()))
-    return tuple(found)
+    return tuple(
+        -float(_planned(flown(trajectory, 9.0, loop, Change(mass=mass))).min()) for mass in (1.0, 1.3)
+    )
 
 
 def take_off(loop: AltitudeName | None) -> Figures:
@@ -182,6 +233,17 @@ def take_off(loop: AltitudeName | None) -> Figures:
 def prepared_take_off(loop: AltitudeName | None) -> Figures:
     """Return the lags after a second with a target at 5 cm."""
     return _late_m(InSpace(Hover(), Prepared()), loop)
+
+
+def app_take_off(loop: AltitudeName | None) -> Figures:
+    """Return how far ahead the Crazyflie's app takes off, and its lag with 30 % more mass; without loops."""
+    if loop is not None:
+        return ()
+    curve = CURVES["take-off-and-landing"](1.0, 0.0)
+    light, heavy = (
+        _planned(flown(curve, 9.0, None, Change(mass=mass), around=AppTakeOff)) for mass in (1.0, 1.3)
+    )
+    return float(light.max()), -float(heavy.min())
 
 
 def weight(loop: AltitudeName | None) -> Figures:
@@ -252,9 +314,13 @@ def campaign(loop: AltitudeName | None) -> Figures:
 MEASURES: Final[dict[str, tuple[Measure, str]]] = {
     "circle 1 m, 1.5 rad/s, swing 0.3 m: rms of the height; of the place, m": (swing, "{:.4f}; {:.4f}"),
     "step of 2 m up: over, m, settled in 3 cm, s; down": (step, "{:.3f}, {:.2f}; {:.3f}, {:.2f}"),
-    "the step on that circle: worst place up; down, m": (step_on_circle, "{:.3f}; {:.3f}"),
+    "the step from 4 places of that circle: worst place up; down, m": (step_on_circle, "{:.3f}; {:.3f}"),
     "planned take-off, 1 m in 2 s: late; with 30 % more mass, m": (take_off, "{:.4f}; {:.3f}"),
     "the same after a second with the target at 5 cm, m": (prepared_take_off, "{:.4f}; {:.3f}"),
+    "the same as the Crazyflie's app begins it: ahead; late with 30 % more mass, m": (
+        app_take_off,
+        "{:.4f}; {:.3f}",
+    ),
     "20 % more mass: drop, what stays; 15 % dropped: up, m": (weight, "{:.3f}, {:.4f}; {:.3f}"),
     "vertical gust of 1 m/s^2: worst, left after a second, m": (gust, "{:.3f}, {:.4f}"),
     "60 random drones on that circle: rms, median; 95 %, m": (random_drones, "{:.4f}; {:.4f}"),
@@ -265,11 +331,15 @@ MEASURES: Final[dict[str, tuple[Measure, str]]] = {
 """What is measured, by its words in the table, and the form of its figures."""
 
 
+def _spell(form: str, figures: Figures) -> str:
+    return form.format(*figures) if figures else "\N{EN DASH}"
+
+
 def rows() -> list[dict[str, str]]:
     """Fly everything and return the table."""
     return [
         {"flight": words}
-        | {title: form.format(*measure(loop)) for title, loop in zip(TITLES, (*LOOPS, None), strict=True)}
+        | {title: _spell(form, measure(loop)) for title, loop in zip(TITLES, (*LOOPS, None), strict=True)}
         for words, (measure, form) in MEASURES.items()
     ]
 

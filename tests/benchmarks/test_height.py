@@ -7,10 +7,12 @@ from benchmarks.height import (
     DRONE,
     LOOPS,
     SETTINGS,
+    app_take_off,
     drawn,
     gust,
     prepared_take_off,
     settings_of,
+    step_on_circle,
     swing,
     weight,
 )
@@ -27,13 +29,18 @@ def test_the_settings_are_those_that_design_writes() -> None:
 
 @pytest.mark.long
 def test_the_third_axis_keeps_its_promises() -> None:
-    """Height and place on the circle with swing, take-off, weight and gust; and it beats every loop there."""
+    """Height and place on circles with swing and steps, take-off, weight, gust; it beats every loop there."""
     rms_m, place_m = swing(None)
     assert rms_m <= 0.002
     assert place_m <= 0.005
+    assert max(step_on_circle(None)) <= 0.04
     late_m, heavy_late_m = prepared_take_off(None)
     assert late_m <= 0.01
     assert heavy_late_m <= 0.08
+    ahead_m, heavy_late_m = app_take_off(None)
+    assert ahead_m <= 0.08
+    assert heavy_late_m <= 0.1
+    assert not app_take_off("pid")
     drop_m, rest_m, rise_m = weight(None)
     assert drop_m <= 0.07
     assert rest_m <= 0.002

@@ -9,15 +9,27 @@ import pytest
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.errors import FlightError
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.native import is_native
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.fences import LimitMetrics, fenced, measure_limits, square_fence, walls_m, with_limits
-from mambo_sil.flight.flight_plots import draw_flights
+from mambo_sil.flight.fences import (
+    LIMIT_METRICS,
+    LimitMetrics,
+    fenced,
+    measure_limits,
+    square_fence,
+    walls_m,
+    with_limits,
+)
+from mambo_sil.flight.flight_plots import draw_flights, flight_columns
+from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
+from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.metric_names import titled
 from tests.support.tools import toolchain
 
 MAMBO = presets.preset("mambo")
@@ -111,6 +123,63 @@ def test_the_picture_of_a_fast_flight_has_its_speed_limit(tmp_path: Path) -> Non
         drawn = (tmp_path / "fast.svg").read_text("utf-8")
         shown[limit_m_s] = drawn.count("stroke-dasharray"), drawn.count("speed, m/s")
     assert shown == {0.0: (0, 0), 5.0: (1, 1), 9.0: (0, 0)}
+
+
+@pytest.mark.long
+def test_the_picture_on_a_page_has_fence_and_speed_too() -> None:
+    """The speed over time, and a line for each wall and the limit."""
+    fast = trace_of([0.0, 4.0], [0.0, 4.0], [0.0, 8.0])
+    plain, near = (flight_columns({"fast": fast}, *given)[0] for given in ((), (walls_m(MAMBO, 2.0), 5.0)))
+    assert ["speed, m/s" in one for one in (plain, near)] == [False, True]
+    assert [one.count("stroke-dasharray") for one in (plain, near)] == [0, 5]
+    assert ["from above, speed, distance" in one for one in (plain, near)] == [False, True]
+
+
+def test_a_summary_says_how_a_flight_keeps_its_limits(tmp_path: Path) -> None:
+    """Past the wall with a fence; over the speed limit if the flight came near it; read again, the same."""
+    shown = {}
+    walled = with_option(MAMBO, "limits.fence.y_min_m", -1.0)
+    walled = with_option(walled, "limits.fence.y_max_m", 1.0)
+    slow = replace(FLOWN, velocity_m_s=FLOWN.velocity_m_s * 0.4)
+    cases = {
+        "pd": (FLOWN, MAMBO, None),
+        "no limits": (FLOWN, presets.preset("table1"), Scenario()),
+        "slow": (slow, MAMBO, Scenario()),
+        "fast": (FLOWN, MAMBO, Scenario()),
+        "walls": (slow, walled, Scenario()),
+        "both": (FLOWN, MAMBO, Scenario(fence_m=2.0)),
+    }
+    for name, (trace, settings, scenario) in cases.items():
+        judged = judge(trace, settings, NOMINAL, scenario)
+        summary = RepeatSummary(
+            repeat=name,
+            scenario=Scenario(),
+            controller="nmpc",
+            settings=None,
+            same_bits_as_recorded=None,
+            same_bits_as_host=None,
+            **judged,
+        )
+        summary.write(tmp_path)
+        again = RepeatSummary.model_validate_json((tmp_path / SUMMARY).read_text("utf-8"))
+        text = flight_text(again)
+        assert ("past the wall" in text) == (name in ("walls", "both"))
+        assert ("speed over the limit" in text) == (name in ("fast", "both"))
+        assert ("walls_m" in summary.text()) == (again.walls_m is not None) == (name in ("walls", "both"))
+        assert again.speed_limit_m_s == (5.0 if name in ("fast", "both") else None)
+        shown[name] = {key: again.metrics[key] for key in LIMIT_METRICS if key in again.metrics}
+        section = summary.section(tmp_path).content["metrics"]
+        assert len(section) == len(again.metrics)
+    assert shown["pd"] == shown["no limits"] == shown["slow"] == {}
+    assert shown["fast"] == pytest.approx({"speed_excess": 0.2})
+    assert shown["walls"] == {"past_wall_m": 0.0}
+    assert shown["both"] == pytest.approx({"speed_excess": 0.2, "past_wall_m": 1.5})
+
+
+def test_metrics_of_limits_have_plain_names() -> None:
+    """In tables, pages and pictures."""
+    assert titled("past_wall_m") == "past the wall, m"
+    assert titled("seen_speed_excess") == "speed over the limit as estimated, share"
 
 
 def test_a_lost_flight_has_no_metrics() -> None:

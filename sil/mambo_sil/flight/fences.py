@@ -13,7 +13,7 @@ from mambo_sil.drone.plant.elementary import hypotenuse
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.engine.adjusted import AdjustedController, Adjustment
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m
+from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, horizontal_speed_m_s
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace
 
@@ -23,6 +23,9 @@ Walls = tuple[float, float, float, float]
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
 HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
 """The numbers of nmpc_limits_t, in their order; the last are those of a controller of the height."""
+
+FAST: Final = 0.5
+"""Share of the speed limit beyond which a flight shows its speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +80,7 @@ def fenced(
 
 def measure_limits(trace: Trace, settings: Settings, scenarios: Sequence[Scenario]) -> LimitMetrics:
     """Return how flights keep within the limits of `settings` and the fences of their scenarios."""
-    speed_m_s = hypotenuse(trace.velocity_m_s[..., 0], trace.velocity_m_s[..., 1])
-    excess = (speed_m_s.max(axis=0) / with_limits(settings)[0]) - 1.0
+    excess = (horizontal_speed_m_s(trace).max(axis=0) / with_limits(settings)[0]) - 1.0
     return LimitMetrics(
         speed_excess=np.maximum(excess, 0.0),
         overshoot_m=_overshoot_m(trace),
@@ -99,6 +101,11 @@ def walls_m(settings: Settings, fence_m: float = 0.0) -> Walls | None:
         for end, sign in (("min", -1), ("max", 1))
     )
     return low[0], low[1], high[0], high[1]
+
+
+def nears_limit(trace: Trace, speed_limit_m_s: float) -> bool:
+    """Return whether the first flight shows its speed: it came near the limit (0: none)."""
+    return bool(0.0 < FAST * speed_limit_m_s < horizontal_speed_m_s(trace)[:, 0].max())
 
 
 def _has_walls(settings: Settings, axis: str) -> bool:

@@ -14,11 +14,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.plant.elementary import hypotenuse
 from mambo_sil.flight.animation import animate
-from mambo_sil.flight.fences import Walls
-from mambo_sil.flight.metrics import horizontal_error_m
+from mambo_sil.flight.fences import Walls, nears_limit
+from mambo_sil.flight.metrics import horizontal_error_m, horizontal_speed_m_s
 from mambo_sil.flight.traces import Trace
 from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, INK, TARGET, THIN, style
@@ -38,8 +36,6 @@ _BOUND: Final[Mapping[str, Any]] = {"color": INK, "linestyle": "--", "linewidth"
 _SPEED: Final = "speed, m/s"
 _ABOVE_ERROR: Final = -4
 """Row of the speed: above error, roll and pitch."""
-_FAST: Final = 0.5
-"""Share of the speed limit beyond which a flight shows its speed."""
 
 
 def draw_flights(
@@ -50,39 +46,40 @@ def draw_flights(
     The speed and its limit (0: none) are shown where a flight comes near it. Writes stem.png and stem.svg.
     """
     with style():
-        labels = dict(_labels(flights))
-        near = any(0.0 < _FAST * speed_limit_m_s < _speed_m_s(trace).max() for trace in flights.values())
-        if near:
-            placed = list(labels.items())
-            placed.insert(_ABOVE_ERROR + 1, (_SPEED, 1.0))
-            labels = dict(placed)
+        labels = _labels(flights, speed_limit_m_s)
         figure = Figure(
             figsize=(COLUMN_INCHES * len(flights), 1.47 * sum(labels.values())), layout="constrained"
         )
         ratios = tuple(labels.values())
         rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            _draw_column(np.delete(column, _ABOVE_ERROR) if near else column, trace, title)
-            if near:
-                _draw_speed(column[_ABOVE_ERROR], trace, speed_limit_m_s)
-            if walls is not None:
-                _draw_walls(column[0], walls)
+            _draw_column(column, trace, title, walls, speed_limit_m_s if _SPEED in labels else 0.0)
         _share_scales(rows[0])
         rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
         _label_column(rows[:, 0], labels)
         return save(figure, stem)
 
 
-def _labels(flights: Mapping[str, Trace]) -> Mapping[str, float]:
+def _labels(flights: Mapping[str, Trace], speed_limit_m_s: float) -> dict[str, float]:
     """Return the labels of the axes of a column, and their relative heights."""
-    return _SPATIAL if any(trace.spatial for trace in flights.values()) else _LEVEL
+    labels = _SPATIAL if any(trace.spatial for trace in flights.values()) else _LEVEL
+    placed = list(labels.items())
+    if any(nears_limit(trace, speed_limit_m_s) for trace in flights.values()):
+        placed.insert(_ABOVE_ERROR + 1, (_SPEED, 1.0))
+    return dict(placed)
 
 
-def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
+def _draw_column(
+    column: NDArray[Any], trace: Trace, title: str, walls: Walls | None, speed_limit_m_s: float
+) -> None:
     """Draw the first flight of a trace in axes (4,): path, error, roll, pitch; or (6,), with the height.
 
-    Target and commands are broad lines below the flown ones, so that both stay visible.
+    With a speed limit the speed is above the error. Target and commands are broad lines below the flown ones,
+    so that both stay visible.
     """
+    if speed_limit_m_s:
+        _draw_speed(column[_ABOVE_ERROR], trace, speed_limit_m_s)
+        column = np.delete(column, _ABOVE_ERROR)
     path, *heights, error, roll, pitch = column
     angles = roll, pitch
     path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=BROAD, label="target")
@@ -99,15 +96,13 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
         )
         axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=THIN, label="flown")
     angles[-1].set_xlabel("time, s")
-
-
-def _speed_m_s(trace: Trace) -> FloatArray:
-    return hypotenuse(trace.velocity_m_s[:, 0, 0], trace.velocity_m_s[:, 0, 1])
+    if walls is not None:
+        _draw_walls(path, walls)
 
 
 def _draw_speed(axes: Axes, trace: Trace, limit_m_s: float) -> None:
     """Draw the horizontal speed of the first flight and its limit over time."""
-    axes.plot(trace.time_s, _speed_m_s(trace), color=FLOWN)
+    axes.plot(trace.time_s, horizontal_speed_m_s(trace)[:, 0], color=FLOWN)
     axes.axhline(limit_m_s, **_BOUND)
     axes.set_ylim(0, None)
 
@@ -139,20 +134,29 @@ def _label_column(column: NDArray[Any], labels: Mapping[str, float]) -> None:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
 
 
-def page_pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
+def page_pictures(
+    flights: Mapping[str, Trace], walls: Walls | None = None, speed_limit_m_s: float = 0.0
+) -> dict[str, Any]:
     """Return animation and pictures of flights for a page, if there are any flights."""
     return {
         "animation": animate(flights) if flights else None,
-        "columns": flight_columns(flights) if flights else [],
+        "columns": flight_columns(flights, walls, speed_limit_m_s) if flights else [],
     }
 
 
-def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
-    """Return one picture per flight: path, height, error, roll and pitch, with the same scales in all."""
+def flight_columns(
+    flights: Mapping[str, Trace], walls: Walls | None = None, speed_limit_m_s: float = 0.0
+) -> list[Markup]:
+    """Return one picture per flight: path, height, error, roll and pitch, with the same scales in all.
+
+    Fence and speed are shown as in `draw_flights`.
+    """
     with style():
-        labels = _labels(flights)
-        height = "height, " if labels is _SPATIAL else ""
-        figures = [_column(title, trace, labels) for title, trace in flights.items()]
+        labels = _labels(flights, speed_limit_m_s)
+        height = "height, " if "height, m" in labels else ""
+        speed = "speed, " if _SPEED in labels else ""
+        limit_m_s = speed_limit_m_s if speed else 0.0
+        figures = [_column(title, trace, labels, walls, limit_m_s) for title, trace in flights.items()]
         for row in zip(*(figure.axes for figure in figures), strict=True):
             _share_scales(row)
         for figure in figures:
@@ -160,16 +164,19 @@ def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
         return [
             inline(
                 figure,
-                f"{title}: path seen from above, {height}distance to the target, roll and pitch over time",
+                f"{title}: path seen from above, {height}{speed}distance to the target, "
+                "roll and pitch over time",
             )
             for title, figure in zip(flights, figures, strict=True)
         ]
 
 
-def _column(title: str, trace: Trace, labels: Mapping[str, float]) -> Figure:
+def _column(
+    title: str, trace: Trace, labels: Mapping[str, float], walls: Walls | None, speed_limit_m_s: float
+) -> Figure:
     figure = Figure(figsize=(COLUMN_INCHES, 1.347 * sum(labels.values())), layout="constrained")
     column = figure.subplots(len(labels), 1, height_ratios=tuple(labels.values()))
-    _draw_column(column, trace, "")
+    _draw_column(column, trace, "", walls, speed_limit_m_s)
     figure.suptitle(title, parse_math=False)  # above the legend, whatever the path's shape
     _label_column(column, labels)
     return figure

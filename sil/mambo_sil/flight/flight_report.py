@@ -10,12 +10,14 @@ import numpy as np
 from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
+from mambo_sil.flight.fences import measure_limits, nears_limit, walls_m
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
@@ -42,6 +44,10 @@ class FlightSummary(ReportedSummary):
     metrics: dict[str, Number]
     metrics_without_transient: dict[str, Number] | None = None
     metrics_as_seen: dict[str, Number] | None = None
+    walls_m: tuple[Number, Number, Number, Number] | None = None
+    """x_min, y_min, x_max, y_max, if there is a fence; None for no wall."""
+    speed_limit_m_s: float | None = None
+    """The speed limit, if the flight came near it."""
 
     @property
     def columns(self) -> dict[str, dict[str, float]]:
@@ -82,7 +88,7 @@ class FlightSummary(ReportedSummary):
             "metrics": [
                 (*named(key), [values.get(key) for values in columns.values()]) for key in self.metrics
             ],
-            **page_pictures(flights),
+            **page_pictures(flights, self.walls_m, self.speed_limit_m_s or 0.0),
         }
         finding = "; ".join(bad) or ", ".join(
             f"{words} {value:.3g} m" for words, value in tracked.items() if value
@@ -91,7 +97,7 @@ class FlightSummary(ReportedSummary):
 
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        optional = ("metrics_without_transient", "metrics_as_seen")
+        optional = ("metrics_without_transient", "metrics_as_seen", "walls_m", "speed_limit_m_s")
         return {key: value for key, value in dump(self).items() if value is not None or key not in optional}
 
 
@@ -224,23 +230,41 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
     return [f"{sentence}; the drone kept the last command" for sentence in sentences]
 
 
-def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any]:
-    """Return the fields of a `FlightSummary` that follow from the trace."""
+def judge(
+    trace: Trace, settings: Settings, drone: VehicleFile, limited: Scenario | None = None
+) -> dict[str, Any]:
+    """Return the fields of a `FlightSummary` that follow from the trace.
+
+    limited: has the fence set in flight; None for a controller that is a PD, which has no limits.
+    """
     status = trace.status[:, 0]
+    seen = trace.as_seen() if isinstance(trace, SensedTrace) else None
     names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
     counts = {name: int((status == value).sum()) for value, name in names.items()}
     refused = ~np.isin(status[trace.time_s >= 0.0], (Status.OK, NOT_CALLED))
     long = trace.time_s[-2] >= TRANSIENT_S
     shown = partial(numbers, spatial=trace.spatial)
+    walls = speed_m_s = None
+    if limited is not None and method_of(settings).limiting is not None:
+        walls = walls_m(settings, limited.fence_m)
+        speed_m_s = settings.limits.speed_m_s if nears_limit(trace, settings.limits.speed_m_s) else None
+    keys = [key for key, limit in (("past_wall_m", walls), ("speed_excess", speed_m_s)) if limit]
+
+    def kept(view: Trace) -> dict[str, float]:
+        found = measure_limits(view, settings, [limited or Scenario()]) if keys else None
+        return {key: float(getattr(found, key)[0]) for key in keys}
+
     return {
         "lost": bool(trace.diverged[0]),
         "crash": first_crash(trace, drone=drone),
         "mostly_refused": bool(np.mean(refused) > 0.5),
         "statuses": {name: count for name, count in counts.items() if count},
         "refusals": refusals(trace, settings),
-        "metrics": shown(measure(trace)),
+        "metrics": shown(measure(trace)) | kept(trace),
         "metrics_without_transient": shown(measure(trace, TRANSIENT_S)) if long else None,
-        "metrics_as_seen": shown(measure(trace.as_seen())) if isinstance(trace, SensedTrace) else None,
+        "metrics_as_seen": shown(measure(seen)) | kept(seen) if seen is not None else None,
+        "walls_m": walls,
+        "speed_limit_m_s": speed_m_s,
     }
 
 
@@ -250,7 +274,8 @@ def flight_text(summary: FlightSummary) -> str:
     rows = []
     for key in summary.metrics:
         name, unit = named(key)
-        rows.append((name, *(digits(values[key]) for values in columns.values()), unit))
+        shown = (digits(values[key]) if key in values else "-" for values in columns.values())
+        rows.append((name, *shown, unit))
     lines = [*_answer(summary), *table(("", *columns, ""), rows, (0, -1))]
     if summary.metrics_as_seen is not None:
         lines.append("as estimated: error of the estimated position, which the controller knows")

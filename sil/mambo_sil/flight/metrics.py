@@ -69,6 +69,11 @@ def horizontal_error_m(trace: Trace) -> FloatArray:
     return hypotenuse(offset_m[..., 0], offset_m[..., 1])
 
 
+def horizontal_speed_m_s(trace: Trace) -> FloatArray:
+    """Return the horizontal speed of the drone (k, n) in m/s."""
+    return hypotenuse(trace.velocity_m_s[..., 0], trace.velocity_m_s[..., 1])
+
+
 def saturated_share(command_rad: FloatArray, limit_rad: float) -> FloatArray:
     """Return the share (n,) of the commands (k, n, 2) with roll or pitch at the limit."""
     return np.asarray(np.mean((np.abs(command_rad) >= limit_rad).any(axis=-1), axis=0))

@@ -19,14 +19,19 @@ _WORDS: Final = {
     "max": "largest",
     "3d": "in space",
 }
+_NAMES: Final = {
+    "past_wall_m": ("past the wall", "m"),
+    "speed_excess": ("speed over the limit", "share"),
+}
 
 
 def named(key: str) -> tuple[str, str]:
     """Split the key of a metric, such as rms_error_m, into its name and its unit."""
     suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
-    words = key.removeprefix(SEEN).removesuffix(suffix).split("_")
-    name = " ".join(_WORDS.get(word, word) for word in words)
-    return name + (" as estimated" if key.startswith(SEEN) else ""), _UNITS.get(suffix, "")
+    own = key.removeprefix(SEEN)
+    words = (_WORDS.get(word, word) for word in own.removesuffix(suffix).split("_"))
+    name, unit = _NAMES.get(own, (" ".join(words), _UNITS.get(suffix, "")))
+    return name + (" as estimated" if key.startswith(SEEN) else ""), unit
 
 
 def titled(key: str) -> str:

@@ -37,6 +37,7 @@ from mambo_sil.flight.scenario import (
     LARGEST_SIZE_M,
     LARGEST_YAW_RAD,
     LONGEST_S,
+    Scenario,
     choose_sensors,
 )
 from mambo_sil.flight.traces import Trace, write_csv, write_npz
@@ -72,7 +73,9 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
             trace = trace.in_space()
         write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
-        summary = FlySummary(**fields | judge(trace, settings, drone) | {"same_bits_as_host": same_bits})
+        limited = None if runner.controller in PD_TITLES else Scenario()
+        fields |= judge(trace, settings, drone, limited) | {"same_bits_as_host": same_bits}
+        summary = FlySummary(**fields)
         summary.write(folder)
     finish(summary, flight_text(summary), output, written(output))
 

@@ -35,6 +35,7 @@ from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.flight.flight_report import judge
 from mambo_sil.flight.loop import fly as simulate
+from mambo_sil.flight.scenario import Scenario
 from mambo_sil.results.folders import new_results
 
 EPISODES = 4
@@ -67,7 +68,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
                 trace = simulate(flight, controller, progress)
         write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
-        fields |= judge(trace, settings, drone) | board_fields(board, controller)
+        fields |= judge(trace, settings, drone, Scenario()) | board_fields(board, controller)
         fields |= {"baud": runner.baud or BAUD} | _emulated(settings, board.greeting.board)
         summary = BoardFlightSummary(
             **fields

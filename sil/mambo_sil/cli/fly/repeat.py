@@ -54,6 +54,7 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
+        limited = None if record.controller in PD_TITLES else record.scenario
         summary = RepeatSummary(
             repeat=str(file),
             same_bits_as_recorded=None if recorded is None else trace.digest() == recorded,
@@ -61,7 +62,7 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
             controller=record.controller,
             scenario=record.scenario,
             settings=None if record.controller in PD_TITLES else record.settings.digest,
-            **judge(trace, record.settings, record.scenario.vehicle),
+            **judge(trace, record.settings, record.scenario.vehicle, limited),
         )
         summary.write(folder)
     written = FLIGHT_FILES if output.pictures else TRACE_FILES

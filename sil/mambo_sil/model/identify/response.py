@@ -208,7 +208,7 @@ def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], windo
 
 def _smooth(values: FloatArray, span: int) -> FloatArray:
     """Return the means of `span` samples of the means of `span` samples (m,), where there are so many."""
-    for _ in range(2):
+    for _ in range(2 if span > 1 else 0):
         sums = np.concatenate([[0.0], np.cumsum(values)])
         values = (sums[span:] - sums[:-span]) / span
     return values
