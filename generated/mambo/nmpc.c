@@ -902,6 +902,14 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     return fence + others;
 }
 
+/* Braking ends: what stood for a slow target decelerates no more. */
+NMPC_ASIDE void limits_end(nmpc_t *self, const nmpc_target_t *target)
+{
+    if (limits_are_slow(&self->bounds, target) != 0) {
+        tracker_clear(self);
+    }
+}
+
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
  * 0, the target stays as it is, and `limited` is not to be used. */
 NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m[2], const nmpc_target_t *target,
@@ -910,15 +918,14 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
     unsigned int active = 0U;
-    const unsigned int before = self->limited;
 
     if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, is_clear, target, limited);
     }
-    if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(bounds, target) != 0)) {
-        tracker_clear(self); /* braking ends: what stood for the target decelerates no more */
+    if ((active == 0U) && (self->limited == NMPC_LIMIT_BRAKING)) {
+        limits_end(self, target);
     }
     self->limited = (unsigned char)active;
     return active;
