@@ -780,7 +780,7 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
 }
 
 /* 1 if the target is slower than A/(2 k), half the speed at which braking ends. */
-NMPC_ASIDE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
+NMPC_INLINE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
 {
     const nmpc_real_t half_m = NMPC_HALF * bounds->knee_m;
     const nmpc_real_t slow_m_s = NMPC_APPROACH_1_S * half_m;
@@ -902,12 +902,15 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     return fence + others;
 }
 
-/* Braking ends: what stood for a slow target decelerates no more. */
-NMPC_ASIDE void limits_end(nmpc_t *self, const nmpc_target_t *target)
+/* Take in which limits act now. Where braking ends, what stood for a slow target decelerates no more. */
+NMPC_ASIDE void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
 {
-    if (limits_are_slow(&self->bounds, target) != 0) {
+    const unsigned int before = self->limited;
+
+    if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(&self->bounds, target) != 0)) {
         tracker_clear(self);
     }
+    self->limited = (unsigned char)active;
 }
 
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
@@ -924,10 +927,9 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, is_clear, target, limited);
     }
-    if ((active == 0U) && (self->limited == NMPC_LIMIT_BRAKING)) {
-        limits_end(self, target);
+    if (active != self->limited) {
+        limits_change(self, active, target);
     }
-    self->limited = (unsigned char)active;
     return active;
 }
 
