@@ -824,7 +824,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 #define NMPC_APPROACH_1_S 862233802 /* k */
 #define NMPC_STEEPEST_1_S 1231762575 /* where braking ends: k/0.7 */
 #define NMPC_KNEE_S2 1665135272 /* 1/(2 k^2): the knee over 2 A */
-#define NMPC_NEAR_S2 1165594691 /* 0.7 times that */
+#define NMPC_NEAR_S2 1165594691 /* 0.7 times that: where braking ends */
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
 
 NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)

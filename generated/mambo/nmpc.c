@@ -695,7 +695,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 
 #define NMPC_APPROACH_1_S 1.6060356f /* k */
 #define NMPC_KNEE_S2 0.19384725f /* 1/(2 k^2): the knee over 2 A */
-#define NMPC_NEAR_S2 0.13569309f /* 0.7 times that */
+#define NMPC_NEAR_S2 0.13569309f /* 0.7 times that: where braking ends */
 #define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
 #define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
 

@@ -27,8 +27,8 @@ BRAKING_SHARE: Final = 0.8
 """Braking limit where none is given, over what the tilt limit gives: the rest is left for wind and lag."""
 
 NEAR_SHARE: Final = 0.7
-"""Braking ends at this share of the distance up to which f is linear; see `limits.c.j2`. Flown with presets
-mambo and crazyflie: with less they overshoot, with more the command jumps."""
+"""Braking that is fed forward ends at this share of the distance up to which f is linear; see `limits.c.j2`.
+Flown with presets mambo and crazyflie: with less they overshoot, with more the command jumps."""
 
 SPELLING: Final = 1.0005
 """A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
@@ -76,6 +76,7 @@ class LimitsConstants:
     limits:       (7,) the limits of the settings, of the quantities LIMITS: a missing one is the widest that
                   may be set. With a height (11,), HEIGHT_LIMITS too.
     steps_per_s:  the update rate.
+    is_tracked:   whether the target's acceleration is fed forward, and so the braking.
     turn_m_s_rad: change of velocity in an update period that a turn may take, per tilt; None if turns do not
                   limit the speed.
     """
@@ -84,6 +85,7 @@ class LimitsConstants:
     tilted: TiltAcceleration
     limits: NDArray[np.float64]
     steps_per_s: float
+    is_tracked: bool
     turn_m_s_rad: float | None = None
 
     @property
@@ -99,12 +101,17 @@ class LimitsConstants:
     @property
     def near_s2(self) -> float:
         """The distance from the target at which braking ends, over twice the braking limit."""
-        return NEAR_SHARE * self.knee_s2
+        return self.near_share * self.knee_s2
+
+    @property
+    def near_share(self) -> float:
+        """The share of the knee's distance at which braking ends."""
+        return NEAR_SHARE if self.is_tracked else 1.0
 
     @property
     def steepest_1_s(self) -> float:
         """The largest speed over distance: where braking ends."""
-        return self.approach_1_s / NEAR_SHARE
+        return self.approach_1_s / self.near_share
 
 
 def has_limits(settings: Sections) -> bool:
@@ -132,6 +139,7 @@ def limits_constants(
             ]
         ),
         steps_per_s=1 / settings.horizon.update_period_s,
+        is_tracked=settings.target.acceleration != "none",
     )
 
 

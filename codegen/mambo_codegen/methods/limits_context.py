@@ -16,7 +16,6 @@ from mambo_codegen.methods.limits_arithmetic import (
 )
 from mambo_codegen.methods.limits_constants import (
     LEAST_TURN_M2_S2,
-    NEAR_SHARE,
     ROOT_BITS,
     SHARE_BITS,
     SPELLING,
@@ -56,7 +55,6 @@ def limits_context(method: Method) -> dict[str, object]:
         "default_target_bounds": _target_bounds(method, others),
         "turning": limiting.turn_m_s_rad is not None,
         "turn_zeros": others[-3:],
-        "near_share": NEAR_SHARE,
         "turn_share": TURN_SHARE,
         "turn_bits": TURN_BITS,
         "least_turn": LEAST_TURN_M2_S2,
