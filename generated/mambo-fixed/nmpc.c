@@ -45,6 +45,14 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_INLINE static
 #endif
 
+/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger and
+ * no faster. */
+#if defined(__GNUC__)
+#define NMPC_SHARED static __attribute__((noinline))
+#else
+#define NMPC_SHARED static
+#endif
+
 /* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
@@ -671,7 +679,7 @@ static void observer_clear(nmpc_observer_t *observer)
 #define NMPC_TRACKER_JERK_GAIN 178956971 /* beta */
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
-static void tracker_clear(nmpc_t *self)
+NMPC_SHARED void tracker_clear(nmpc_t *self)
 {
     int axis;
 
@@ -842,13 +850,6 @@ NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
     return (a > b) ? a : b;
 }
 
-/* A function that is called where a limit acts, and kept out of the rest of a control step. */
-#if defined(__GNUC__)
-#define NMPC_ASIDE static __attribute__((noinline))
-#else
-#define NMPC_ASIDE static
-#endif
-
 typedef unsigned long long nmpc_square_t;
 #if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
 typedef unsigned long nmpc_mantissa_t;
@@ -869,7 +870,7 @@ static nmpc_mantissa_t upper_product(nmpc_mantissa_t a, nmpc_mantissa_t b)
 }
 
 /* 1/sqrt(x) for a positive x, with a relative error of at most 1.2e-06. The start is a parabola, 2.4 % off. */
-NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
+NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
 {
     nmpc_square_t wide = x;
     nmpc_mantissa_t scaled;
@@ -953,7 +954,7 @@ static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 }
 
 /* Ratio times distance, m/s, within the range of velocities. */
-NMPC_ASIDE nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
+NMPC_SHARED nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
 {
     const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, 24);
 
@@ -1011,19 +1012,17 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + approach_product(NMPC_APPROACH_1_S, error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + approach_product(NMPC_APPROACH_1_S, error_y_m);
 
-    return ((square_sum(error_x_m, error_y_m)) <= squared(bounds->near_m))
-           && ((square_sum(desired_x_m_s, desired_y_m_s)) <= squared(bounds->speed_m_s));
+    return (square_sum(error_x_m, error_y_m) <= squared(bounds->near_m))
+           && (square_sum(desired_x_m_s, desired_y_m_s) <= squared(bounds->speed_m_s));
 }
 
-/* 1 if the target is slower than A/(2 k), half the speed at which braking ends. */
+/* 1 if the target moves at less than A/(2 k), half the speed at which braking ends, along x and y. */
 NMPC_INLINE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
 {
     const nmpc_real_t half_m = halved(bounds->knee_m);
     const nmpc_real_t slow_m_s = approach_product(NMPC_APPROACH_1_S, half_m);
 
-    const nmpc_square_t square = square_sum(target->velocity_m_s[0], target->velocity_m_s[1]);
-
-    return (square < squared(slow_m_s)) ? 1 : 0;
+    return (within(target->velocity_m_s[0], slow_m_s) != 0) && (within(target->velocity_m_s[1], slow_m_s) != 0);
 }
 
 /* Half the width of the fence. */
@@ -1035,7 +1034,7 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
 
 /* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if
  * it is inside. */
-NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
+NMPC_SHARED unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
 {
     unsigned int active = 0U;
     int axis;
@@ -1057,7 +1056,7 @@ NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *
 
 /* Cut the velocity of `limited` towards the walls off at f(d); outside it leads back in. Returns NMPC_LIMIT_FENCE, or 0
  * if this changes nothing. */
-NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
+NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
 {
     unsigned int active = 0U;
     int axis;
@@ -1088,7 +1087,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 }
 
 /* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
-NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
+NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
     nmpc_real_t end_m = bounds->knee_m;
@@ -1140,7 +1139,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
 }
 
 /* Take in which limits act now. Where braking ends, what stood for a slow target decelerates no more. */
-NMPC_ASIDE void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
+NMPC_SHARED void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
 {
     const unsigned int before = self->limited;
 

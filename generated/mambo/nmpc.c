@@ -59,6 +59,14 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_INLINE static inline
 #endif
 
+/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger and
+ * no faster. */
+#if defined(__GNUC__)
+#define NMPC_SHARED static __attribute__((noinline))
+#else
+#define NMPC_SHARED static
+#endif
+
 /* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
@@ -542,7 +550,7 @@ static void observer_clear(nmpc_observer_t *observer)
 #define NMPC_TRACKER_JERK_GAIN 0.16666667f /* beta */
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
-static void tracker_clear(nmpc_t *self)
+NMPC_SHARED void tracker_clear(nmpc_t *self)
 {
     int axis;
 
@@ -718,19 +726,17 @@ NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
     return (a > b) ? a : b;
 }
 
-/* A function that is called where a limit acts, and kept out of the rest of a control step. */
-#if defined(__GNUC__)
-#define NMPC_ASIDE static __attribute__((noinline))
-#else
-#define NMPC_ASIDE static
-#endif
-
 typedef nmpc_real_t nmpc_square_t;
 typedef nmpc_real_t nmpc_root_t;
 
+NMPC_INLINE nmpc_square_t square_sum(nmpc_real_t a, nmpc_real_t b)
+{
+    return (a * a) + (b * b);
+}
+
 /* 1/sqrt(x) for a positive x, with a relative error of at most 8e-07. The start is 3.5 % off; constants a little
  * above 1.5 halve the error of the next step. */
-NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
+NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
 {
     const nmpc_real_t half = 0.5f * x;
     nmpc_real_t root;
@@ -775,19 +781,17 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + (NMPC_APPROACH_1_S * error_x_m);
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + (NMPC_APPROACH_1_S * error_y_m);
 
-    return (((error_x_m * error_x_m) + (error_y_m * error_y_m)) <= (bounds->near_m * bounds->near_m))
-           && (((desired_x_m_s * desired_x_m_s) + (desired_y_m_s * desired_y_m_s)) <= (bounds->speed_m_s * bounds->speed_m_s));
+    return (square_sum(error_x_m, error_y_m) <= (bounds->near_m * bounds->near_m))
+           && (square_sum(desired_x_m_s, desired_y_m_s) <= (bounds->speed_m_s * bounds->speed_m_s));
 }
 
-/* 1 if the target is slower than A/(2 k), half the speed at which braking ends. */
+/* 1 if the target moves at less than A/(2 k), half the speed at which braking ends, along x and y. */
 NMPC_INLINE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
 {
     const nmpc_real_t half_m = NMPC_HALF * bounds->knee_m;
     const nmpc_real_t slow_m_s = NMPC_APPROACH_1_S * half_m;
 
-    const nmpc_square_t square = (target->velocity_m_s[0] * target->velocity_m_s[0]) + (target->velocity_m_s[1] * target->velocity_m_s[1]);
-
-    return (square < (slow_m_s * slow_m_s)) ? 1 : 0;
+    return (within(target->velocity_m_s[0], slow_m_s) != 0) && (within(target->velocity_m_s[1], slow_m_s) != 0);
 }
 
 /* Half the width of the fence. */
@@ -798,7 +802,7 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
 
 /* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if
  * it is inside. */
-NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
+NMPC_SHARED unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *held)
 {
     unsigned int active = 0U;
     int axis;
@@ -820,7 +824,7 @@ NMPC_ASIDE unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t *
 
 /* Cut the velocity of `limited` towards the walls off at f(d); outside it leads back in. Returns NMPC_LIMIT_FENCE, or 0
  * if this changes nothing. */
-NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
+NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *limited)
 {
     unsigned int active = 0U;
     int axis;
@@ -851,7 +855,7 @@ NMPC_ASIDE unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t *
 }
 
 /* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
-NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
+NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
                                    nmpc_target_t *limited)
 {
     nmpc_real_t end_m = bounds->knee_m;
@@ -872,7 +876,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     }
     error_x_m = held.position_m[0] - limited->position_m[0];
     error_y_m = held.position_m[1] - limited->position_m[1];
-    square = (error_x_m * error_x_m) + (error_y_m * error_y_m);
+    square = square_sum(error_x_m, error_y_m);
     if (square > (end_m * end_m)) {
         const nmpc_root_t root = inverse_root(square);
         const nmpc_real_t distance_m = square * root;
@@ -888,7 +892,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
     if (is_clear == 0) {
         fence |= limits_wall(bounds, limited);
     }
-    square = (limited->velocity_m_s[0] * limited->velocity_m_s[0]) + (limited->velocity_m_s[1] * limited->velocity_m_s[1]);
+    square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
     if (square > (bounds->speed_m_s * bounds->speed_m_s)) {
         const nmpc_real_t share = bounds->speed_m_s * inverse_root(square);
 
@@ -903,7 +907,7 @@ NMPC_ASIDE unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, co
 }
 
 /* Take in which limits act now. Where braking ends, what stood for a slow target decelerates no more. */
-NMPC_ASIDE void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
+NMPC_SHARED void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
 {
     const unsigned int before = self->limited;
 

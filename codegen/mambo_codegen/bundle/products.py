@@ -67,7 +67,6 @@ _FORMS: Final = (
         "halved": "NMPC_HALF * {}",
         "squared": "{0} * {0}",
         "angle_square": "{0} * {0}",
-        "square_sum": "({0} * {0}) + ({1} * {1})",
         "sine_difference": "({} * {}) - ({} * {})",
         "sine_sum": "({} * {}) + ({} * {})",
         "position_correction": "({} * {}) + ({} * {})",

@@ -272,10 +272,10 @@ class LimitsLaw:
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
 
     def is_slow(self, bounds: Bounds, target: Real) -> Rows:
-        """Return whether targets move at less than half the speed at which braking ends (n,)."""
+        """Return whether targets move at half the speed at which braking ends or less, along x and y (n,)."""
         products = self._products
         slow = products.approach_speed(products.approach, products.half(bounds.knee_m))
-        rows: Rows = products.square_sum(target[:, 2:4]) < products.square(slow)
+        rows: Rows = np.all(np.abs(target[:, 2:4]) <= slow[:, None], axis=1)
         return rows
 
     def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
