@@ -117,9 +117,10 @@ def test_no_desired_velocity_exceeds_a_limit(base: str, scalar: str) -> None:
             assert np.all(towards[acts & (room < -1e-3)] < 0), "outside it leads back in"
 
 
-def test_the_law_is_that_of_the_page() -> None:
+@pytest.mark.parametrize("acceleration", ["tracked", "none"])
+def test_the_law_is_that_of_the_page(acceleration: str) -> None:
     """In float64 it equals the formulas, with roots and norms, where drone and target are inside."""
-    settings = limited(fence=FENCE)
+    settings = with_option(limited(fence=FENCE), "target.acceleration", acceleration)
     method = method_of(settings)
     assert method.limiting is not None
     k, position, target = method.limiting.approach_1_s, *random_flights(3)
@@ -133,7 +134,7 @@ def test_the_law_is_that_of_the_page() -> None:
     error = target[:, 0:2] - position
     distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
     knee = 2.0 / k**2
-    slow = (np.hypot(*target[:, 2:4].T) < 1.0 / k)[:, None]
+    slow = np.all(np.abs(target[:, 2:4]) < 1.0 / k, axis=1)[:, None] & (acceleration == "tracked")
     near = np.where(slow, NEAR_SHARE * knee, knee)
     speed = np.where(distance > near, f(distance + knee - near), k * distance)
     expected = target[:, 2:4] + (speed * error / distance)
