@@ -155,7 +155,7 @@ def test_a_base_control_gets_thrust_and_attitude() -> None:
     made = Controller.from_preset("crazyflie", vehicle="crazyflie", height="feedforward")
     control = pybullet_control("cf2x", made)
     assert isinstance(control, DSLPIDControl)
-    here, there, rest = np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 1.0]), np.zeros(3)
+    here, there, rest = np.array([0.0, 0.0, 1.0]), np.array([0.2, 0.0, 1.0]), np.zeros(3)
     turned = Rotation.from_euler("z", 0.5).as_quat()
     heading = np.array([0.0, 0.0, 0.5])
     pwm, angles, error = control.computeControl(0.01, here, turned, rest, there, target_rpy=heading)

@@ -275,11 +275,11 @@ def test_the_search_never_returns_less_than_the_flight(crazyflie: Path) -> None:
 
 @pytest.mark.long
 def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
-    """They take half as much again as any of the flight, whose target is within the limits."""
+    """They take a fifth more than any of the flight, whose target is within the limits."""
     settings = presets.load("mambo")
     elf = build_guest(settings, board_builder("crazyflie"), tmp_path)
     flight, searched = (counted(settings, elf, 30, steps) for steps in (0, 60))
-    assert searched.most_met > 1.4 * flight.most_met
+    assert searched.most_met > 1.2 * flight.most_met
 
 
 @pytest.mark.long
