@@ -16,7 +16,6 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest, digest_emulated
 from mambo_sil.board.emulation.avr_machine import AvrMachine, Long
 from mambo_sil.board.emulation.machine import start
@@ -49,6 +48,7 @@ unsigned long run(void)
     return nmpc_self_test_episode(&scratch, 1, nmpc_self_test_episode(&scratch, 0, 0UL));
 }
 """
+COMPARISON = "#define NMPC_COMPARISON static\n"
 ABANDONED = """
 import sys
 from pathlib import Path
@@ -249,26 +249,28 @@ def test_other_skips_are_emulated(skipped: str, returned: int, mega: Builder, tm
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("optimisation", ["-O2", "-Os"])
-@pytest.mark.parametrize(
-    "settings",
-    [presets.load("mambo"), height_case(1, "fixed")],
-    ids=["mambo", "height in fixed point"],
-)
+@pytest.mark.parametrize(("name", "optimisation"), [("mambo", "-O2"), ("mambo-1norm", "-Os")])
 def test_a_second_emulator_has_the_digest_of_the_reference(
-    settings: Settings, optimisation: str, tmp_path: Path
+    name: str, optimisation: str, tmp_path: Path
 ) -> None:
     """simavr, which has nothing in common with QEMU, starts the program from reset with avr-libc's code."""
-    files = render(settings, with_digest=False)
-    assert run_in_simavr(files | {"digest.c": DIGEST}, optimisation, tmp_path) == self_test_digest(
-        method_of(settings), 2
-    )
+    settings = presets.load(name)
+    files = render(settings, with_digest=False) | {"digest.c": DIGEST}
+    assert run_in_simavr(files, optimisation, tmp_path) == self_test_digest(method_of(settings), 2)
 
 
 @pytest.mark.long
-def test_a_second_emulator_skips_over_a_return(tmp_path: Path) -> None:
-    """So what QEMU is not given to run is right, and runs in simavr."""
-    assert run_in_simavr({"run.c": SKIPPING.format(skip="sbrs r24, 0", skipped="ret")}, "-O2", tmp_path) == 42
+def test_a_controller_that_qemu_would_not_run_is_refused_and_right(mega: Builder, tmp_path: Path) -> None:
+    """With comparisons as functions that return from two places; simavr has the digest of the reference."""
+    settings = height_case(1, "fixed")
+    files = render(settings, with_digest=False)
+    assert files["nmpc.c"].count(COMPARISON) == 1
+    files["nmpc.c"] = files["nmpc.c"].replace(COMPARISON, "#define NMPC_COMPARISON NMPC_INLINE\n")
+    elf = mega.guest(files, batch_source(), GUEST, tmp_path / "guest")
+    with pytest.raises(EmulatorError, match=r"`sbrs r25, 7; ret` in (absolute|larger)"):
+        EmulatedController(settings, elf, "avr")
+    found = run_in_simavr(files | {"digest.c": DIGEST}, "-O2", tmp_path / "simavr")
+    assert found == self_test_digest(method_of(settings), 2)
 
 
 def bound_assembly(assembly: str, folder: Path) -> StackReport:
