@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.math import Real, clamp, rounded
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.math import Real, clamp, rounded
 
 TURN_RAD: Final = 2 * math.pi
 TURNS_PER_RAD: Final = 1 / TURN_RAD

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.numbers.representation import STATE, THRUST
 
 if TYPE_CHECKING:

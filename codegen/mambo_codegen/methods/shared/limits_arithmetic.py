@@ -10,9 +10,9 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.limits_constants import ROOT_BITS, SHARE_BITS, LimitsConstants
-from mambo_codegen.methods.math import Real, rounded, smaller
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.limits_constants import ROOT_BITS, SHARE_BITS, LimitsConstants
+from mambo_codegen.methods.shared.math import Real, rounded, smaller
 from mambo_codegen.numbers.representation import Representation
 
 TERMS: Final[dict[Any, tuple[float, ...]]] = {

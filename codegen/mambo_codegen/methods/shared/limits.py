@@ -10,12 +10,12 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.inputs import choose
-from mambo_codegen.methods.limits_arithmetic import limits_arithmetic
-from mambo_codegen.methods.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
-from mambo_codegen.methods.math import Real, clamp, larger, smaller
-from mambo_codegen.methods.tracker import TargetMotion, unknown_motion
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.inputs import choose
+from mambo_codegen.methods.shared.limits_arithmetic import limits_arithmetic
+from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
+from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
+from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]

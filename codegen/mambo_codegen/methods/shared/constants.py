@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mambo_codegen.methods.limits_constants import LimitsConstants
-from mambo_codegen.methods.rate_feedback import feedback_steps
-from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
+from mambo_codegen.methods.shared.limits_constants import LimitsConstants
+from mambo_codegen.methods.shared.rate_feedback import feedback_steps
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import Formats
 from mambo_codegen.numbers.representation import (
     ACCELERATION,

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.methods.tracker_constants import TrackerConstants
+from mambo_codegen.methods.shared.math import Real, clamp
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
 from mambo_codegen.numbers.representation import Representation
 
 

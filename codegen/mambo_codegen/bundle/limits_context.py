@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from mambo_codegen.methods.interface import Method
-from mambo_codegen.methods.limits import ActiveLimit
-from mambo_codegen.methods.limits_arithmetic import (
+from mambo_codegen.methods.shared.limits import ActiveLimit
+from mambo_codegen.methods.shared.limits_arithmetic import (
     FIXED_ITERATIONS,
     FIXED_START,
     ROOT_ERROR,
@@ -14,7 +14,7 @@ from mambo_codegen.methods.limits_arithmetic import (
     TERMS,
     TURN_BITS,
 )
-from mambo_codegen.methods.limits_constants import (
+from mambo_codegen.methods.shared.limits_constants import (
     LEAST_TURN_M2_S2,
     ROOT_BITS,
     SHARE_BITS,
