@@ -2,7 +2,7 @@
 
 Every contender is generated once, built portably and for this machine, and tried in a process of its own. One
 process then times all of them: in every round each contender passes through each set of states. Table and
-plot go to build/bench; docs/evidence/benchmarks.md explains them. The row of a contender that fails states
+plot go to build/bench; docs/evidence/benchmarks.md has the plot. The row of a contender that fails states
 the reason.
 """
 

@@ -279,7 +279,6 @@ ITEMS: Final = (
         read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
         tables={
             "faults": faults("mambo"),
-            "faults-1norm": faults(_ONE_NORM),
             "faults-compared": faults_compared,
         },
         pictures={"faults.png": "mambo/faults.png"},
