@@ -27,7 +27,7 @@ _ALLOCATORS: Final = ("malloc", "calloc", "realloc", "_Znwm", "_Znam")
 def build(program: Program, folder: Path, flags: str, library: Path) -> Path:
     """Build `program`, whose C is in `folder`, as the shared library `library`; raises NotHereError.
 
-    Peers may use fused multiply-add if `flags` allow it; ours and the roll-out do not, to keep their bits.
+    Peers may use fused multiply-add if `flags` allow it; ours does not, to keep its bits.
     """
     work = library.with_suffix("")
     work.mkdir(parents=True)

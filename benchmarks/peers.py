@@ -4,12 +4,9 @@
 generated or built states the reason. The peers are those of `make bench-peers`; their C needs newlib.
 """
 
-import filecmp
 import re
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Final
 
@@ -21,7 +18,7 @@ from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle
 from benchmarks.peers_setups import DOUBLE, PEERS
 from benchmarks.programs import NotHereError, Program, run_tool
 from mambo_codegen import boards
-from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_sil.board.firmware.elf import FootprintError, Image, load
@@ -31,10 +28,6 @@ from mambo_sil.board.firmware.sizes import measure_added, measure_sections
 from mambo_sil.board.firmware.stack import bound_stack
 
 _BOARD: Final = "crazyflie"
-_VEHICLE: Final = "mambo"
-"""The board with whose compiler and flags the C is compiled under -Wall -Werror."""
-_C_ONLY: Final = ("-Wstrict-prototypes", "-Wmissing-prototypes", "-Wunsuffixed-float-constants")
-_STRICT: Final = (*WARNING_FLAGS, "-Wunsuffixed-float-constants")
 _NEWLIB: Final = (
     "-static",
     "-nostartfiles",
@@ -46,8 +39,6 @@ _NEWLIB: Final = (
 )
 """The C library as the Crazyflie's firmware links it, without start-up code, whose __dso_handle C++ needs."""
 _EMPTY: Final = "void run(void);\n\nvoid run(void)\n{\n}\n"
-_CLOCK_S: Final = 1.1
-"""Pause between two runs of a generator, so that a time of day in its output differs."""
 
 
 def _compiler(program: Program, found: Builder) -> list[str]:
@@ -96,56 +87,6 @@ def _sizes(program: Program, found: Builder, folder: Path, work: Path) -> tuple[
     return image, added.flash.total, added.flash.total - own_bytes, added.ram.total
 
 
-def _compile_each(line: list[str], program: Program, folder: Path) -> list[subprocess.CompletedProcess[str]]:
-    """Compile every source file on its own and discard the objects."""
-    return [
-        subprocess.run(
-            [*line, *program.definitions(folder), "-c", str(source), "-o", "/dev/null"],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        for source in program.files(folder)
-    ]
-
-
-def _count_warnings(program: Program, found: Builder, folder: Path) -> int:
-    """Count the distinct warnings under our own warning flags."""
-    strict = [flag for flag in _STRICT if program.language == "c" or flag not in _C_ONLY]
-    done = _compile_each([*_compiler(program, found), program.dialect, *strict], program, folder)
-    return len({text for each in done for text in each.stderr.splitlines() if ": warning: " in text})
-
-
-def _check_vehicle_flags(program: Program, folder: Path) -> str:
-    """Say whether all sources compile with the Mambo's compiler and flags, -Wall and -Werror."""
-    if program.language == "c++":
-        return "no: C++"
-    try:
-        found = builder(boards.load(_VEHICLE))
-    except BuildError:
-        return "no compiler here"
-    line = [*found.toolchain.command, *found.board.compiler.flags, "-O2", "-Wall", "-Werror"]
-    done = _compile_each(line, program, folder)
-    refused = sum(each.returncode != 0 for each in done)
-    return f"no: {refused} of {len(done)} files" if refused else "yes"
-
-
-def _compare_runs(first: Path, second: Path) -> str:
-    """Compare the output of two runs; count files that differ only in a time of day, and others."""
-    names = sorted(
-        {str(p.relative_to(folder)) for folder in (first, second) for p in folder.rglob("*") if p.is_file()}
-    )
-    _, unequal, missing = filecmp.cmpfiles(first, second, names, shallow=False)
-    clock = [name for name in unequal if _timeless(first / name) == _timeless(second / name)]
-    more = len(unequal) + len(missing) - len(clock)
-    said = [f"time of day in {len(clock)}"] * bool(clock) + [f"more in {more}"] * bool(more)
-    return f"no: {', '.join(said)} of {len(names)} files" if said else "yes"
-
-
-def _timeless(path: Path) -> bytes:
-    return re.sub(rb"\d\d:\d\d:\d\d", b"", path.read_bytes())
-
-
 def _stack(image: Image) -> str:
     """Return the stack bound in bytes, or the function that has none."""
     try:
@@ -165,14 +106,11 @@ def _generate(program: Program, folder: Path) -> dict[str, str]:
 
 
 def _measure(program: Program, found: Builder, work: Path) -> tuple[dict[str, str], dict[str, str]]:
-    """Generate twice into the same folder, build and measure; returns the row, and versions of packages."""
+    """Generate, build and measure; returns the row, and versions of packages."""
     row = {"generator": program.title, "cost": program.cost, "scalar": program.scalar}
-    first, folder, versions = work / "first", work / "c", {}
+    folder, versions = work / "c", {}
     try:
         versions = _generate(program, folder)
-        folder.rename(first)
-        time.sleep(_CLOCK_S)
-        _generate(program, folder)
         image, flash, libraries, ram = _sizes(program, found, folder, work)
     except (NotHereError, BuildError) as error:
         return row | {"flash": f"not measured: {error}"}, versions
@@ -184,10 +122,6 @@ def _measure(program: Program, found: Builder, work: Path) -> tuple[dict[str, st
         "stack": _stack(image),
         "heap": "yes" if "heap" in kinds else "no",
         "double helpers": f"{kinds.count('double precision')}",
-        "libm, printf": " ".join(kind for kind in ("libm", "printf") if kind in kinds) or "-",
-        "Mambo's flags": _check_vehicle_flags(program, folder),
-        "warnings": f"{_count_warnings(program, found, folder):,}",
-        "same again": _compare_runs(first, folder),
     }
     return row, versions
 

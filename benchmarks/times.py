@@ -1,8 +1,8 @@
-"""Time of an update on this machine, largest tilt planned and memory: ours, a plain roll-out and the peers.
+"""Time of an update on this machine, largest tilt planned and memory: ours and the peers.
 
 Every contender is generated once, built portably and for this machine, and tried in a process of its own. One
 process then times all of them: in every round each contender passes through each set of states. Table and
-plot go to build/bench; docs/evidence/benchmarks.md explains them. The row of a contender that fails states
+plot go to build/bench; docs/evidence/benchmarks.md has the plot. The row of a contender that fails states
 the reason.
 """
 
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from benchmarks.host_builds import build, plans, silence, sizes
-from benchmarks.ours import ONE_NORM, PEERS_MODEL, bundle, rollout
+from benchmarks.ours import ONE_NORM, PEERS_MODEL, bundle
 from benchmarks.peers_setups import PEERS
 from benchmarks.programs import BENCHMARKS, ROOT, NotHereError, Program, run_tool
 from benchmarks.states import Inputs, state_sets
@@ -46,12 +46,11 @@ _SLOW_NS: Final = 20_000
 _SLOW_COUNT: Final = 200
 """Number of states of each set for contenders that take longer than _SLOW_NS."""
 _SWEPT_BYTES: Final = 64 << 20
-_SAME_RAD: Final = 1e-6
 _FOLDER: Final = ROOT / "build/bench"
 
 
 def contenders() -> list[Program]:
-    """Return ours, the roll-outs, and the peers."""
+    """Return ours and the peers."""
     alike, mambo = PEERS_MODEL, ONE_NORM
     return [
         bundle("ours", "mambo-nmpc, the peers' model", alike),
@@ -59,8 +58,6 @@ def contenders() -> list[Program]:
         bundle("ours-float64", "the same, float64", with_option(alike, "code.scalar", "float64")),
         bundle("ours-fixed", "the same, fixed point", with_option(alike, "code.scalar", "fixed")),
         bundle("ours-mambo", "mambo-nmpc, mambo-1norm", mambo),
-        rollout("rollout", "the peers' model, plain roll-out", alike),
-        rollout("rollout-mambo", "mambo-1norm, plain roll-out", mambo),
         *PEERS,
     ]
 
@@ -71,8 +68,8 @@ def _plan_sets(library: Path, sets: dict[str, Inputs]) -> dict[str, Any]:
     return {name: plans(library, sets[name], follows=name == "C") for name in ("W", "C")}
 
 
-def prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries, Any]:
-    """Generate, build and try a contender; returns its row without times, libraries, and plans by set."""
+def prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries]:
+    """Generate, build and try a contender; returns its row without times, and libraries."""
     row, folder = Row(program), work / program.name
     try:
         folder.mkdir()
@@ -82,23 +79,22 @@ def prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row,
             for number, flags in enumerate(FLAGS)
         }
     except (NotHereError, BuildError) as error:
-        return replace(row, absent=str(error)), {}, None
+        return replace(row, absent=str(error)), {}
     library = libraries[program.name, FLAGS[0]]
     try:
         with ProcessPoolExecutor(1) as pool:
             tried = pool.submit(_plan_sets, library, sets).result()
     except BrokenProcessPool:
-        return replace(row, absent="crashes"), {}, None
-    planned = {name: plan for name, (plan, _) in tried.items()}
+        return replace(row, absent="crashes"), {}
     code, ram = sizes(library)
     memory = {
         "contender": program.title,
-        "largest tilt": f"{max(np.abs(plan).max() for plan in planned.values()):.4f}",
+        "largest tilt": f"{max(np.abs(plan).max() for plan, _ in tried.values()):.4f}",
         "code": f"{code:,}",
         "RAM": f"{ram:,}",
         "heap": _describe_heap(tried["W"][1]),
     }
-    return replace(row, memory=memory), libraries, planned
+    return replace(row, memory=memory), libraries
 
 
 def _describe_heap(calls: list[int]) -> str:
@@ -153,16 +149,6 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def _count_same(planned: dict[str, Any], one: str, other: str) -> str:
-    """Return the number of states in which two contenders have the same plan."""
-    if not (planned.get(one) and planned.get(other)):
-        return "not compared"
-    agree = np.concatenate(
-        [np.abs(planned[one][name] - planned[other][name]).max(axis=1) < _SAME_RAD for name in planned[one]]
-    )
-    return f"{np.count_nonzero(agree):,} of {len(agree):,}"
-
-
 def _describe_machine(rounds: int, loads: Iterable[float]) -> str:
     models = [line for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines() if "model name" in line]
     model = models[0].partition(":")[2].strip() if models else "unknown processor"
@@ -187,9 +173,8 @@ def main() -> None:
         print("generating, building, trying", file=sys.stderr)
         with ProcessPoolExecutor() as pool:
             prepared = list(pool.map(partial(prepare, sets=sets, work=work), contenders()))
-        rows = [row for row, _, _ in prepared]
-        libraries = {key: path for _, built, _ in prepared for key, path in built.items()}
-        planned = {row.program.name: plans_found for row, _, plans_found in prepared}
+        rows = [row for row, _ in prepared]
+        libraries = {key: path for _, built in prepared for key, path in built.items()}
         timer = work / "timing.so"
         line = [*host_toolchain().command, "-O2", "-shared", "-fPIC", str(BENCHMARKS / "timing.c")]
         run_tool([*line, "-o", str(timer)])
@@ -205,11 +190,7 @@ def main() -> None:
         replace(row, times={flags: ns for (name, flags), ns in timings.items() if name == row.program.name})
         for row in rows
     ]
-    agreement = {
-        "the peers' model": _count_same(planned, "ours", "rollout"),
-        "mambo-1norm": _count_same(planned, "ours-mambo", "rollout-mambo"),
-    }
-    print(write_report(rows, machine, agreement, empty, _FOLDER))
+    print(write_report(rows, machine, empty, _FOLDER))
 
 
 if __name__ == "__main__":

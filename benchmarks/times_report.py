@@ -10,7 +10,6 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from benchmarks.markdown import table
-from benchmarks.peers_setups import Peer
 from benchmarks.programs import Program
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, ORANGE, PAGE_INCHES, QUIET, THIN, style
@@ -51,39 +50,6 @@ def _range(ratios: list[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _aims_table(rows: list[Row]) -> str:
-    """Compare ratios of medians with the project's aims, over all sets unless stated otherwise.
-
-    Of several rows over one, the ratio of the fastest counts.
-    """
-    measured = {row.program.name: row for row in rows if row.times}
-    ours = [measured[OURS]]
-    peers = [row for row in measured.values() if isinstance(row.program, Peer)]
-    aims = (
-        ("ours over its plain roll-out", "0.33", ours, ["rollout"], SETS),
-        ("mambo-1norm over its plain roll-out", "0.33", [measured["ours-mambo"]], ["rollout-mambo"], SETS),
-        ("ours over DAQP in float and double, F", "at most 2", ours, ["daqp", "daqp-float64"], ("F",)),
-        ("the fastest peer over ours", "above 1", peers, [OURS], SETS),
-        (
-            "the fastest peer with the 1-norm over ours",
-            "at least 1,000",
-            [row for row in peers if row.program.cost == "1-norm"],
-            [OURS],
-            SETS,
-        ),
-    )
-    lines = []
-    for title, aim, over, names, sets in aims:
-        under = [measured[name] for name in names if name in measured]
-        if over and under:
-            line = {"ratio of medians": title, "aim": aim}
-            for flags in FLAGS:
-                ratios = [min(a.ratio(b, flags, name) for a in over) for b in under for name in sets]
-                line[f"`{flags}`"] = _range(ratios)
-            lines.append(line)
-    return table(lines)
-
-
 def _times_table(rows: list[Row], flags: str) -> str:
     ours = next(row for row in rows if row.program.name == OURS)
     lines = []
@@ -100,23 +66,19 @@ def _times_table(rows: list[Row], flags: str) -> str:
     return table(lines)
 
 
-def write_report(
-    rows: list[Row], machine: str, agreement: dict[str, str], empty: Timing, folder: Path
-) -> str:
+def write_report(rows: list[Row], machine: str, empty: Timing, folder: Path) -> str:
     """Write times.md, times.png and times.svg into `folder`; returns the Markdown."""
     folder.mkdir(parents=True, exist_ok=True)
     parts = [machine]
     for flags in FLAGS:
         parts += [f"`{flags}`, ns per update, median / 99th percentile:", _times_table(rows, flags)]
-    parts += ["Aims, from the least to the most over W, T, F and C:", _aims_table(rows)]
     parts += ["Largest tilt planned, and memory (bytes, x86-64, `-O2`):"]
     parts += [table([row.memory for row in rows if row.memory])]
-    same = "; ".join(f"{title}, {count} states" for title, count in agreement.items())
     versions: dict[str, str] = {}
     for row in rows:
         versions |= row.versions
     parts += [
-        f"Plans of roll-out and generated C agree within 1e-6 rad: {same}. Clock and call, subtracted: "
+        "Clock and call, subtracted: "
         f"{empty['C'][0]:.0f} ns, cold {empty[COLD][0]:.0f} ns. "
         f"Versions: {', '.join(f'{name} {version}' for name, version in versions.items())}."
     ]

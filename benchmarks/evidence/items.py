@@ -1,8 +1,8 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
-Not in the list are figures that take longer, and those that need another machine or package. `firmware` needs
-a clone of the Crazyflie's firmware, which the environment variable CRAZYFLIE_FIRMWARE names. `simulators`
-and `adapters` need crazyflow and RotorPy; any value of SIMULATORS says that they are installed.
+Not in the list are figures that take longer, and those that need another machine or package. `simulators` and
+`adapters` need crazyflow and RotorPy; any value of the environment variable SIMULATORS says that they are
+installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,16 +28,6 @@ from benchmarks.evidence.campaign_tables import (
     read_campaign,
     read_opponents,
 )
-from benchmarks.evidence.firmware_tables import (
-    clocks,
-    curves,
-    heights,
-    met,
-    read_firmware,
-    replays,
-    set_points,
-)
-from benchmarks.evidence.firmware_tables import conditions as firmware_conditions
 from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
@@ -279,28 +269,9 @@ ITEMS: Final = (
         read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
         tables={
             "faults": faults("mambo"),
-            "faults-1norm": faults(_ONE_NORM),
             "faults-compared": faults_compared,
         },
         pictures={"faults.png": "mambo/faults.png"},
-    ),
-    Item(
-        name="firmware",
-        commands=(f"python -m benchmarks.firmware -o {RESULTS}/firmware/flights",),
-        controllers=("crazyflie --for crazyflie", "design crazyflie --for crazyflie"),
-        paths=("benchmarks/firmware", "templates/mambo_templates/firmware/crazyflie/src", _STYLE),
-        read=read_firmware,
-        tables={
-            "firmware": curves,
-            "firmware-set-points": set_points,
-            "firmware-conditions": firmware_conditions,
-            "firmware-events": met,
-            "firmware-heights": heights,
-            "firmware-clocks": clocks,
-            "firmware-replay": replays,
-        },
-        pictures={f"firmware-{name}.png": f"flights/firmware-{name}.png" for name in ("paths", "events")},
-        variable="CRAZYFLIE_FIRMWARE",
     ),
     Item(
         name="adapters",

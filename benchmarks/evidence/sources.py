@@ -10,8 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from mambo_codegen.bundle.render import render, render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
@@ -29,7 +28,6 @@ _NAMES_OF_A_BUNDLE: Final = re.compile(
 
 
 _DESIGN: Final = "design "
-_IN_A_TARGET: Final = ("nmpc_app.h", "nmpc_app.c")
 
 
 def plain_c(source: str) -> str:
@@ -50,25 +48,14 @@ def _settings(source: str) -> Settings:
 def generated(controller: str) -> str:
     """Return update period and C of settings, without their names.
 
-    `controller` is a preset, a file, or `design DRONE`, with `--scalar TYPE`, or with `--for TARGET`: then
-    the C is that of the firmware target.
+    `controller` is a preset, a file, or `design DRONE`, with or without `--scalar TYPE`.
     """
-    source, _, target = controller.partition(" --for ")
-    source, _, scalar = source.partition(" --scalar ")
+    source, _, scalar = controller.partition(" --scalar ")
     settings = _settings(source)
     if scalar:
         settings = with_option(settings, "code.scalar", scalar)
-    files = (
-        render_target(settings, TARGETS[target], with_digest=False)
-        if target
-        else render(settings, with_digest=False)
-    )
-    names = ("nmpc.h", "nmpc.c", *(_IN_A_TARGET if target else ()))
-    flown = [
-        _NAMES_OF_A_BUNDLE.sub("", plain_c(text))
-        for path, text in sorted(files.items())
-        if path.rpartition("/")[2] in names
-    ]
+    files = render(settings, with_digest=False)
+    flown = [_NAMES_OF_A_BUNDLE.sub("", plain_c(files[name])) for name in ("nmpc.c", "nmpc.h")]
     return "\n".join([repr(settings.horizon.update_period_s), *flown])
 
 

@@ -24,8 +24,8 @@ PAGES: Final = {
 _TABLE: Final = re.compile(r"^\[(Table: [^\]]+)\]\(([^)]+\.md)\)$", re.MULTILINE)
 """A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
 
-_NOT_SEARCHED: Final = ("explanation/decisions/", "archive/")
-"""Folders for developers, and of figures that are no more those of today's C."""
+_NOT_SEARCHED: Final = "explanation/decisions/"
+"""The folder for developers."""
 
 _WIDE: Final = "evidence/"
 """The folder whose tables need the width of the table of contents."""

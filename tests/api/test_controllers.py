@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.heading import slew_heading
 from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
+from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option

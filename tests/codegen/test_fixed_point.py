@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.formats import formats
 from mambo_codegen.methods.one_norm.horizon import horizon_tables
 from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.numbers.fixed_point import LARGEST, raw
 from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_codegen.settings import presets

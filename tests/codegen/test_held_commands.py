@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 

@@ -8,10 +8,10 @@ import pytest
 from pydantic import ValidationError
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
-from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw
-from mambo_codegen.methods.limits_arithmetic import ROOT_ERROR, limits_arithmetic
-from mambo_codegen.methods.limits_constants import LATER_LIMITS, LIMITS, NEAR_SHARE
+from mambo_codegen.methods.shared.inputs import Status
+from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw
+from mambo_codegen.methods.shared.limits_arithmetic import ROOT_ERROR, limits_arithmetic
+from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, LIMITS, NEAR_SHARE
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings

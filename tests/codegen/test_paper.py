@@ -9,7 +9,7 @@ from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.paper import Array, Paper
 from mambo_codegen.methods.one_norm.predictor import Predictor
-from mambo_codegen.methods.tracker import Tracker, unknown_motion
+from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import settings_case as drawn_settings

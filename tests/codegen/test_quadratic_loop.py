@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, Array, axis_of, case_values, settings_of
 

@@ -1,11 +1,13 @@
 """The tutorials and how-tos, typed in as they stand."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.support.console import Command, faults, fits, read
 from tests.support.tools import require, require_module
+from tests.support.warm_command import serve
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted([*DOCS.glob("tutorials/*.md"), *DOCS.glob("how-to/*.md")])
@@ -62,11 +64,18 @@ NOT_RUN = {
 """The console blocks that are not run, by page: the reason, which is in the title of the block."""
 
 
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Give the folder of a mambo-nmpc that is imported already."""
+    with serve(tmp_path_factory.mktemp("warm")) as binaries:
+        yield binaries
+
+
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in NAMES]
 )
-def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: Path) -> None:
+def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: Path, warm: Path) -> None:
     """In an empty folder, in order, with the files that the page says to save."""
     for tool, package in [("bash", "bash"), ("cc", "gcc"), ("make", "make"), *TOOLS.get(name, [])]:
         require(tool, package)
@@ -74,7 +83,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: 
         require_module("optuna")
     if name in {"how-to/gymnasium.md", "how-to/rotorpy.md"}:
         require_module(Path(name).stem)
-    found = faults(read(DOCS / name), tmp_path)
+    found = faults(read(DOCS / name), tmp_path, warm)
     assert not found, "\n\n".join(found)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.check import Subject
 from mambo_sil.verify.proof import Report, prove
 from tests.support.subjects import Harm, subject
 
@@ -52,15 +53,16 @@ def runs(faults: Mapping[str, Fault], at_once: Sequence[tuple[str, ...]]) -> lis
     return [*at_once, *((name,) for name in faults if name not in together)]
 
 
-def unnoticed(settings: Settings, folder: Path, faults: Mapping[str, Fault], *others: Harm) -> list[str]:
-    """Run one proof of a controller with all faults, and return those that raise no alarm of their own.
-
-    `others` are further changes, which raise none.
-    """
-    (entry,) = {fault.entry for fault in faults.values()}
+def harmed(settings: Settings, folder: Path, faults: Mapping[str, Fault], *others: Harm) -> Subject:
+    """Write the bundle of a controller with all faults, and with `others`, which raise no alarm."""
     alarms = [fault.alarm for fault in faults.values()]
     assert len(set(alarms)) == len(alarms), "every fault has an alarm of its own"
-    its = subject(settings, folder, *(fault.harm for fault in faults.values()), *others)
+    return subject(settings, folder, *(fault.harm for fault in faults.values()), *others)
+
+
+def unnoticed(its: Subject, faults: Mapping[str, Fault]) -> list[str]:
+    """Run one proof of a controller with all faults, and return those that raise no alarm of their own."""
+    (entry,) = {fault.entry for fault in faults.values()}
     report = prove(its, entry)
     assert isinstance(report, Report), report
     raised = set()

@@ -61,8 +61,10 @@ def _commands(body: str, first: int) -> list[Command]:
     return found
 
 
-def faults(page: Page, folder: Path) -> list[str]:
+def faults(page: Page, folder: Path, *binaries: Path) -> list[str]:
     """Run the commands of a page in `folder`; return those that failed, or printed other than the page says.
+
+    `binaries` are folders in which its shell looks for commands first.
 
     A command may fail if the next one is `echo $?`, which shows its exit code.
     """
@@ -72,9 +74,9 @@ def faults(page: Page, folder: Path) -> list[str]:
             script += f"{step.text}\n__code=$?\necho\necho '{_MARK}' $__code\n(exit $__code)\n"
         else:
             script += f"cat > {step[0]} <<'END OF FILE'\n{step[1]}END OF FILE\n"
-    binaries = str(Path(sys.executable).parent)
+    places = [*map(str, binaries), str(Path(sys.executable).parent), os.environ["PATH"]]
     environment = {
-        "PATH": os.pathsep.join([binaries, os.environ["PATH"]]),
+        "PATH": os.pathsep.join(places),
         "COLUMNS": "120",
         "PYTHONUNBUFFERED": "1",
     }

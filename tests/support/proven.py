@@ -2,7 +2,8 @@
 
 What Frama-C says depends on its version, its options and the C alone. `tests/verify/proven.txt` has a line
 for each controller without an alarm: a digest of all these, the number of promises, and the test that wants
-the proof. C that has changed is proven as if there were no record; so is all C by another Frama-C.
+the proof; and a line for each controller with faults of which each raised its alarm, with their number. C
+that has changed is proven as if there were no record; so is all C by another Frama-C.
 
 make proofs   make all proofs that tests want, and write the record
 """
@@ -13,6 +14,7 @@ import inspect
 import os
 import re
 import subprocess
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -22,7 +24,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.verify import proof
 from mambo_sil.verify.check import CheckOutcome, Result, Subject, passed
-from tests.support import headings
+from tests.support import alarms, headings
 from tests.support.tools import require
 
 RECORD: Final = Path(__file__).parents[1] / "verify" / "proven.txt"
@@ -33,23 +35,40 @@ _MACHINE: Final = ("-nostdinc", "-m32", "-D__FRAMAC__", "-D__FC_MACHDEP_X86_32")
 
 def check(its: Subject) -> Result:
     """Return the result of all proofs of a controller, made now or before."""
-    anew, key = bool(os.environ.get(ANEW)), digest(its)
-    if not anew and (promises := _promises(key)) is not None:
+    key = digest(its)
+    if (promises := _recorded(key)) is not None:
         return passed(f"proven before: {RECORD.name}", {"promises": promises, "promises_proven": promises})
     result = headings.check(its)
-    if anew and result.outcome is CheckOutcome.PASSED:
-        _record(f"{key} {result.figures['promises']} {os.environ['PYTEST_CURRENT_TEST'].rpartition(' ')[0]}")
+    if result.outcome is CheckOutcome.PASSED:
+        _record(key, result.figures["promises"])
     return result
 
 
-def digest(its: Subject) -> str:
-    """Return the digest of all that a result depends on: Frama-C, its options, the C, and who judges."""
+def unnoticed(its: Subject, faults: Mapping[str, alarms.Fault]) -> list[str]:
+    """Return the faults of a controller that raise no alarm of their own, now or before."""
+    key = alarm_digest(its, faults)
+    if _recorded(key) is not None:
+        return []
+    found = alarms.unnoticed(its, faults)
+    if not found:
+        _record(key, len(faults))
+    return found
+
+
+def alarm_digest(its: Subject, faults: Mapping[str, alarms.Fault]) -> str:
+    """Return the digest of all that the alarms of a controller with faults depend on."""
+    return digest(its, inspect.getsource(alarms.unnoticed), *map(repr, faults.values()))
+
+
+def digest(its: Subject, *others: str) -> str:
+    """Return the digest of all that a result depends on: Frama-C, its options, the C, its judge."""
     parts = [
         _of_frama_c("-version").partition(" ")[0].partition("-")[0],
         *(" ".join(proof.command(its, name)) for name in method_of(its.settings).proofs),
         inspect.getsource(proof),
         *sorted(method_of(its.settings).assumed_contracts),
         _code(its),
+        *others,
     ]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
@@ -75,14 +94,18 @@ def _code(its: Subject) -> str:
     return re.sub(r"^ *#pragma .*\n", "", text, flags=re.MULTILINE)
 
 
-def _promises(key: str) -> int | None:
-    """Return the number of promises of a proof in the record, None if it is not there."""
-    lines = RECORD.read_text("utf-8").splitlines() if RECORD.is_file() else []
+def _recorded(key: str) -> int | None:
+    """Return the number in a line of the record, None if it is not there or all proofs are made anew."""
+    anew = bool(os.environ.get(ANEW))
+    lines = RECORD.read_text("utf-8").splitlines() if RECORD.is_file() and not anew else []
     return next((int(line.split()[1]) for line in lines if line.startswith(f"{key} ")), None)
 
 
-def _record(line: str) -> None:
-    """Add a line to the record, whose lines are ordered, unless it is there."""
+def _record(key: str, count: int) -> None:
+    """Add a line for the present test to the record, whose lines are ordered, if proofs are made anew."""
+    if not os.environ.get(ANEW):
+        return
+    line = f"{key} {count} {os.environ['PYTEST_CURRENT_TEST'].rpartition(' ')[0]}"
     with RECORD.open("a+", encoding="utf-8") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         file.seek(0)

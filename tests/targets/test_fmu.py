@@ -18,7 +18,7 @@ from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.heading import slew_heading
+from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings

@@ -10,7 +10,7 @@ from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.predictor import Predictor
-from mambo_codegen.methods.tracker import Tracker, unknown_motion
+from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import with_option

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.heading import slew_heading
+from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.presets import preset
 from tests.support.cases import SCALARS

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import fuzzing, rules, sanitizers
 from mambo_sil.verify.calls import NULL_SELF, ApiFunction, Outcomes, Tape, answers, calls
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
 from tests.support import proven
-from tests.support.alarms import Alarm, Fault, unnoticed
+from tests.support.alarms import Alarm, Fault, harmed
 from tests.support.height import height_case
 from tests.support.subjects import Harm, played_fault, subject
 from tests.support.tools import require
@@ -134,4 +134,6 @@ def test_it_is_proven(scalar: str, tmp_path: Path) -> None:
 def test_a_fault_raises_an_alarm(name: str, tmp_path: Path) -> None:
     """The proof says of the thrust what the header says."""
     require("frama-c", "frama-c-base")
-    assert unnoticed(height_case(LIMITED, "float32"), tmp_path, {name: UNPROVEN[name]}) == []
+    faults = {name: UNPROVEN[name]}
+    its = harmed(height_case(LIMITED, "float32"), tmp_path, faults)
+    assert proven.unnoticed(its, faults) == []

@@ -21,8 +21,8 @@ from tests.support.alarms import (
     UNSET_COMMAND,
     Alarm,
     Fault,
+    harmed,
     runs,
-    unnoticed,
 )
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
@@ -184,10 +184,9 @@ def test_a_fault_of_fixed_point_raises_an_alarm(names: tuple[str, ...], tmp_path
     """What overflows in the middle of a step is found as what a caller hands in."""
     settings = of_few_steps(of_scalar("mambo-1norm", "fixed"))
     faults = {name: FIXED_FAULTS[name] for name in names}
-    assert unnoticed(settings, tmp_path, faults, FEW_HEADINGS) == []
+    assert proven.unnoticed(harmed(settings, tmp_path, faults, FEW_HEADINGS), faults) == []
 
 
-@pytest.mark.sampled(3)
 @pytest.mark.long
 @pytest.mark.parametrize("index", [0, 1, 2, 3, 5, 6, 9, 14])
 def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
@@ -203,18 +202,12 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
-@pytest.mark.sampled(2)
-@pytest.mark.parametrize(
-    "names",
-    [
-        pytest.param(names, marks=[pytest.mark.long] * (names != ("NaN passes a range check",)))
-        for names in runs(FAULTS, AT_ONCE)
-    ],
-    ids=", ".join,
-)
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("names", runs(FAULTS, AT_ONCE), ids=", ".join)
 def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None:
     """Each is what a slip of the hand would make, and none goes through."""
-    assert unnoticed(of_few_steps(ONE_NORM), tmp_path, {name: FAULTS[name] for name in names}) == []
+    faults = {name: FAULTS[name] for name in names}
+    assert proven.unnoticed(harmed(of_few_steps(ONE_NORM), tmp_path, faults), faults) == []
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""The record of proofs: it holds for the C that was proven, and for no other."""
+"""The record of proofs and alarms: it holds for the C that Frama-C read, and for no other."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ import pytest
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.verify.check import CheckOutcome, Subject
 from tests.support import proven
+from tests.support.alarms import UNCHECKED_HEADING, Alarm, Fault
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
@@ -65,3 +66,14 @@ def test_c_that_the_record_has_is_not_proven_again(tmp_path: Path, record: Path)
         patch.setenv(proven.ANEW, "anew")
         assert proven.check(wrong).outcome is CheckOutcome.FAILED
     assert record.read_text("utf-8").count("\n") == 1
+
+
+def test_faults_that_the_record_has_are_not_tried_again(tmp_path: Path, record: Path) -> None:
+    """But another line or kind of alarm is; this one none raises."""
+    faults = {"none": Fault("refuse_nan", UNCHECKED_HEADING, Alarm("nmpc.c", "no such line", "mem_access"))}
+    wrong = harmed(tmp_path / "wrong", UNCHECKED_HEADING)
+    assert proven.unnoticed(wrong, faults) == ["none"]
+    record.write_text(f"{proven.alarm_digest(wrong, faults)} 1 some test\n", "utf-8")
+    assert proven.unnoticed(wrong, faults) == []
+    others = {"none": faults["none"]._replace(alarm=Alarm("nmpc.c", "no such line", "shift"))}
+    assert proven.unnoticed(wrong, others) == ["none"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
@@ -24,8 +24,8 @@ from tests.support.alarms import (
     UNSET_COMMAND,
     Alarm,
     Fault,
+    harmed,
     runs,
-    unnoticed,
 )
 from tests.support.quadratic import quadratic_settings
 from tests.support.subjects import Harm, subject
@@ -227,7 +227,6 @@ def test_a_check_passes(
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
-@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("chosen", OTHERS, ids=lambda chosen: " ".join(map(str, chosen)))
 def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
@@ -249,15 +248,8 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
-@pytest.mark.sampled(2)
-@pytest.mark.parametrize(
-    "names",
-    [
-        pytest.param(names, marks=[pytest.mark.long] * (names != ("a refused state is used",)))
-        for names in runs(UNPROVEN, AT_ONCE)
-    ],
-    ids=", ".join,
-)
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("names", runs(UNPROVEN, AT_ONCE), ids=", ".join)
 def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None:
     """Each is what a slip of the hand would make, and none goes through.
 
@@ -267,7 +259,7 @@ def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None
     settings, faults = quadratic_settings(), {name: UNPROVEN[name] for name in names}
     if WITH_LIMITS.isdisjoint(names):
         settings = without_limits(settings)
-    assert unnoticed(settings, tmp_path, faults) == []
+    assert proven.unnoticed(harmed(settings, tmp_path, faults), faults) == []
 
 
 @pytest.mark.sampled(2)

@@ -2,7 +2,9 @@
 
 A bundle is {relative POSIX path: text}, written as UTF-8 without change of line ends. Its manifest holds the
 generator's version and the SHA-256 of every file. A file that is not in the manifest, or whose SHA-256 has
-changed, is the user's work: it is overwritten only with `force`.
+changed, is the user's work: it is overwritten only with `force`. The settings file from which a bundle is
+made stays as it is where it is itself a file of the bundle; the manifest has the SHA-256 of its generated
+text, so that a run from other settings takes a file spelled by the user for the user's work.
 """
 
 import difflib
@@ -65,6 +67,7 @@ def write(
     directory: Path,
     target: str | None = None,
     *,
+    source: Path | None = None,
     force: bool = False,
     dry_run: bool = False,
 ) -> Changes:
@@ -72,14 +75,15 @@ def write(
 
     All new files are on the disk before the first one is renamed; the manifest is renamed last. A run killed
     between the renames leaves C files of two bundles, which do not compile together; repeating the run
-    completes the bundle. With `dry_run` nothing is written. Without `force`, raises ForeignFilesError if it
-    would overwrite the user's work, and LayoutError if the folder holds a bundle of another target.
+    completes the bundle. The file `source` has these settings and is left as it is, with `force` too. With
+    `dry_run` nothing is written. Without `force`, raises ForeignFilesError if it would overwrite the user's
+    work, and LayoutError if the folder holds a bundle of another target.
     Raises UnwritableError if the file system refuses.
     """
-    contents = _contents(files, target)
     name = echo(str(directory))
     place = Path(os.path.realpath(directory))
     try:
+        contents = _contents(files, target, place, source)
         if not force:
             _refuse_other_target(target, place, name)
         changes = _plan(contents, place, name, force=force)
@@ -94,14 +98,16 @@ def write(
         raise UnwritableError(f"{name}: cannot be written: {error.strerror}{where}") from error
 
 
-def check(files: Mapping[str, str], directory: Path, target: str | None = None) -> tuple[Drift, ...]:
-    """Return how `directory` differs from the bundle `files`, byte for byte; ignore other files.
+def check(
+    files: Mapping[str, str], directory: Path, target: str | None = None, *, source: Path | None = None
+) -> tuple[Drift, ...]:
+    """Return how `directory` differs from the bundle `files`, byte for byte; ignore other files and `source`.
 
     Raises UnwritableError if a file cannot be read.
     """
-    contents = _contents(files, target)
     drifts = []
     try:
+        contents = _contents(files, target, directory, source)
         for path, content in contents.items():
             found = _content(directory / path)
             if found is None:
@@ -115,13 +121,22 @@ def check(files: Mapping[str, str], directory: Path, target: str | None = None) 
     return (*drifts, *(Drift(path, "stale") for path in stale))
 
 
-def _contents(files: Mapping[str, str], target: str | None) -> dict[str, bytes]:
-    """Return {path: bytes} of bundle and manifest, sorted by path; raises ValueError for an unsafe path."""
+def _contents(
+    files: Mapping[str, str], target: str | None, place: Path, source: Path | None
+) -> dict[str, bytes]:
+    """Return {path: bytes} of bundle and manifest, sorted by path, with `source` as it is.
+
+    Raises ValueError for an unsafe path.
+    """
     unsafe = [path for path in files if not _is_safe(path) or path == MANIFEST]
     if unsafe:
         raise ValueError(f"not a path of a bundle: {unsafe[0]!r}")
     complete = {**files, MANIFEST: manifest(files, target)}
-    return {path: complete[path].encode() for path in sorted(complete)}
+    contents = {path: complete[path].encode() for path in sorted(complete)}
+    if source is not None:
+        own = [path for path in files if (place / path).is_file() and (place / path).samefile(source)]
+        contents |= {path: (place / path).read_bytes() for path in own}
+    return contents
 
 
 def _is_safe(path: str) -> bool:

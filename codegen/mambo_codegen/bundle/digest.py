@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.kept import keep
 from mambo_codegen.methods import Method, Step
-from mambo_codegen.methods.math import Real, rounded
+from mambo_codegen.methods.shared.math import Real, rounded
 from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.numbers.representation import InputLimits, Representation

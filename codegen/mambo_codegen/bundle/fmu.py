@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.limits_constants import LIMITS
+from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD

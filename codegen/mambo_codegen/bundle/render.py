@@ -19,13 +19,13 @@ from mambo_codegen.bundle.flags import (
     WARNING_FLAGS,
 )
 from mambo_codegen.bundle.fmu import fmu_variables
+from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import products, term
 from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.heading import TURN_RAD, TURNS_PER_RAD
-from mambo_codegen.methods.limits_context import limits_context
+from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.settings.model import Settings

@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.math import Real
-from mambo_codegen.methods.proofs import FIXED_PROOFS, with_limits
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.math import Real
+from mambo_codegen.methods.shared.proofs import FIXED_PROOFS, with_limits
 from mambo_codegen.settings.key import Refusal
 
 

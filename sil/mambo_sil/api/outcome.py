@@ -18,11 +18,11 @@ class StepOutcome:
 
     command_rad: (..., 2) roll and pitch, never beyond the tilt limit.
     status:      (...) 0, or why an input was refused, such as NaN or a position out of range
-                 (`mambo_codegen.methods.inputs.Status`).
+                 (`mambo_codegen.methods.shared.inputs.Status`).
     saturated:   (...) whether a command lies at the tilt limit; None with a 1-norm.
     cost:        (...) of the plan; None with a quadratic cost, as the next.
     plan_rad:    (..., control, 2) the moves.
-    active:      (...) the limits that act (`mambo_codegen.methods.limits_constants.ActiveLimit`), if any.
+    active:      (...) the limits that act (`mambo_codegen.methods.shared.limits.ActiveLimit`), if any.
     thrust_m_s2: (...) thrust over mass; None without `[height]` in the settings and `height`, as the next.
     yaw_rad:     (...) heading.
     """

@@ -61,6 +61,7 @@ def generate(
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render, render_target
     from mambo_codegen.settings import controller_toml
+    from mambo_codegen.settings.toml_file import PRESETS
 
     if check and (force or dry_run):
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
@@ -71,10 +72,12 @@ def generate(
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
     files = render_target(settings, wanted) if wanted else render(settings)
+    own = PRESETS.own_file(source)  # left as it is, unless an option has changed the settings
+    own = own if own and controller_toml.read(own) == settings else None
     if check:
-        _report_drifts(bundle.check(files, output, target), output, as_json=as_json)
+        _report_drifts(bundle.check(files, output, target, source=own), output, as_json=as_json)
     else:
-        changes = bundle.write(files, output, target, force=force, dry_run=dry_run)
+        changes = bundle.write(files, output, target, source=own, force=force, dry_run=dry_run)
         _report_changes(changes, settings, output, dry_run=dry_run, as_json=as_json)
 
 

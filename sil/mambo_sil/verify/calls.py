@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
-from mambo_codegen.methods.heading import slew_heading
-from mambo_codegen.methods.inputs import Status, choose
+from mambo_codegen.methods.shared.heading import slew_heading
+from mambo_codegen.methods.shared.inputs import Status, choose
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.step_rows import StepRows

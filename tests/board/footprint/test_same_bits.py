@@ -11,9 +11,9 @@ from mambo_codegen.bundle.digest import TICKS, episode_count, episode_inputs, se
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_sil.drone.plant.link import NOT_CALLED, Drops, Link, Wire
 from mambo_sil.drone.plant.randomness import BLOCK, Draws, Purpose, generators
 

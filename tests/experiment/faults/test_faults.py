@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mambo_codegen.bundle import bundle
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import (

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormMemory, OneNormStep
 from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings

@@ -11,9 +11,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.formats import OneNormFormats
+from mambo_codegen.methods.shared.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry

@@ -4,8 +4,10 @@ import math
 from dataclasses import replace
 from functools import cached_property
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.limits_constants import (
+from mambo_codegen.methods.one_norm.formats import OneNormFormats, formats
+from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.limits_constants import (
     ONE_NORM_APPROACH_1_S,
     ONE_NORM_OUTAGE_S,
     ONE_NORM_TILT,
@@ -14,8 +16,6 @@ from mambo_codegen.methods.limits_constants import (
     limits_constants,
     stored_quantities,
 )
-from mambo_codegen.methods.one_norm.formats import OneNormFormats, formats
-from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
 from mambo_codegen.settings.limits import WEIGHT_LIMIT
 
 

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.inputs import Inputs, Status, choose
-from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
-from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
 from mambo_codegen.methods.one_norm.predictor import Predictor
-from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.methods.shared.inputs import Inputs, Status, choose
+from mambo_codegen.methods.shared.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
+from mambo_codegen.methods.shared.math import Real, clamp
+from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import WEIGHTS
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, ordered_sum, sign
 from mambo_codegen.methods.one_norm.predictor import Prediction, Predictor
+from mambo_codegen.methods.shared.math import Real, ordered_sum, sign
 
 
 def evaluate(

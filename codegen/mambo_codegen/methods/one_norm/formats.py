@@ -20,15 +20,15 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.methods.limits_constants import (
+from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
+from mambo_codegen.methods.shared.limits_constants import (
     ONE_NORM_APPROACH_1_S,
     ONE_NORM_TILT,
     limits_bits,
     limits_constants,
 )
-from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
-from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
-from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
+from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import MARGIN, PRODUCT_BITS, fractional_bits, integer_bits, raw
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD

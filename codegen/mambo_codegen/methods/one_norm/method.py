@@ -6,13 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from mambo_codegen.methods.interface import Method, StepResult
-from mambo_codegen.methods.limits_constants import LATER_LIMITS, ONE_NORM_TILT
-from mambo_codegen.methods.limits_constants import refusals as limits_refusals
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.formats import refusals
-from mambo_codegen.methods.proofs import FLOAT_PROOFS
-from mambo_codegen.methods.rate_feedback import lag_refusals
+from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, ONE_NORM_TILT
+from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
+from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS
+from mambo_codegen.methods.shared.rate_feedback import lag_refusals
 from mambo_codegen.numbers.representation import WEIGHTS
 from mambo_codegen.settings.key import Refusal
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.math import Real, sign
 from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
+from mambo_codegen.methods.shared.math import Real, sign
 from mambo_codegen.settings.sections import Sections
 
 Evaluate = Callable[[Real], tuple[Real, Real]]

@@ -4,9 +4,9 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real
 from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
+from mambo_codegen.methods.shared.math import Real
 
 
 @dataclass(frozen=True)

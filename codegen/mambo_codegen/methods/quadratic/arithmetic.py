@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, clamp, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats
 from mambo_codegen.methods.quadratic.height_constants import STEEPEST_RAD
 from mambo_codegen.methods.quadratic.height_formats import FACTOR_BITS, GAIN_CHANGE
+from mambo_codegen.methods.shared.math import Real, clamp, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry

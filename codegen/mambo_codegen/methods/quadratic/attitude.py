@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from mambo_codegen.methods.inputs import Rows
-from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.shared.inputs import Rows
+from mambo_codegen.methods.shared.math import Real, clamp
 
 
 @dataclass(frozen=True)

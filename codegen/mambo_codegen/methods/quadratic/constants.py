@@ -2,14 +2,14 @@
 
 from functools import cached_property
 
-from mambo_codegen.methods.constants import Constants
-from mambo_codegen.methods.limits_constants import LimitsConstants, stored_quantities
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants, attitude_constants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats, formats
 from mambo_codegen.methods.quadratic.height_constants import HeightConstants, height_constants
 from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
-from mambo_codegen.methods.tracker_constants import TrackerConstants
+from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.limits_constants import LimitsConstants, stored_quantities
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
 
 
 class QuadraticConstants(Constants):

@@ -6,17 +6,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.inputs import Inputs, Rows, Status, choose, within
-from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, no_limits
-from mambo_codegen.methods.limits_constants import LIMITS
-from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, HeightState
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
-from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.methods.shared.inputs import Inputs, Rows, Status, choose, within
+from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory, no_limits
+from mambo_codegen.methods.shared.limits_constants import LIMITS
+from mambo_codegen.methods.shared.math import Real, clamp
+from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, THRUST
 
 REST_M_S: Final = 0.02

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.methods.limits_constants import limits_bits
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, attitude_constants
 from mambo_codegen.methods.quadratic.height_constants import height_constants
 from mambo_codegen.methods.quadratic.height_formats import (
@@ -27,8 +26,9 @@ from mambo_codegen.methods.quadratic.height_formats import (
 )
 from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
-from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
-from mambo_codegen.methods.tracker_constants import tracker_constants
+from mambo_codegen.methods.shared.limits_constants import limits_bits
+from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
+from mambo_codegen.methods.shared.tracker_constants import tracker_constants
 from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD

@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.inputs import Rows, choose
-from mambo_codegen.methods.math import Real, clamp, confine
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
@@ -19,7 +17,9 @@ from mambo_codegen.methods.quadratic.height_constants import (
     ROW_STATES,
     HeightConstants,
 )
-from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.methods.shared.inputs import Rows, choose
+from mambo_codegen.methods.shared.math import Real, clamp, confine
+from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 

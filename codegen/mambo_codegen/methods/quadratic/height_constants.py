@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, LoopValues, attitude_solution
 from mambo_codegen.methods.quadratic.law import LawSolution, axis_law
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
-from mambo_codegen.methods.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
+from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.height_section import Height
 from mambo_codegen.settings.key import Refusal

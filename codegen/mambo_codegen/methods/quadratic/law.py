@@ -22,15 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.kept import keep
-from mambo_codegen.methods.limits_constants import (
+from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attitude_loops
+from mambo_codegen.methods.shared.limits_constants import (
     LimitsConstants,
     TiltAcceleration,
     has_limits,
     limits_constants,
 )
-from mambo_codegen.methods.limits_constants import refusals as limits_refusals
-from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attitude_loops
-from mambo_codegen.methods.rate_feedback import lag_refusals
+from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
+from mambo_codegen.methods.shared.rate_feedback import lag_refusals
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Horizon, Sections

@@ -7,8 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
-from mambo_codegen.methods.limits_constants import LATER_LIMITS
-from mambo_codegen.methods.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.quadratic import formats, law
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
@@ -18,6 +16,8 @@ from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
+from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
+from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.key import Refusal
 

@@ -4,10 +4,10 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.law import STATES
+from mambo_codegen.methods.shared.math import Real, clamp
 
 ROW: Final = tuple(f"row_{state}" for state in STATES)
 """The quantity of each gain of a row."""

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray

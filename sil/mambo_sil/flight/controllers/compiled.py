@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_codegen.methods import Method, method_of
-from mambo_codegen.methods.limits_constants import LIMITS
+from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.numbers.representation import THRUST, WEIGHTS, Representation
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain

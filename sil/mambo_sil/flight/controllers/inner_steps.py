@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.math import Real, sign
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.optimizer import Evaluate, Rprop, Search
+from mambo_codegen.methods.shared.math import Real, sign
 from mambo_codegen.settings.model import Settings
 
 

@@ -1,6 +1,0 @@
-#ifndef CONSOLE_H
-#define CONSOLE_H
-
-int consolePrintf(const char *format, ...);
-
-#endif

@@ -1,8 +1,0 @@
-#ifndef DECK_H
-#define DECK_H
-
-#include <stdbool.h>
-
-bool deckGetRequiredKalmanEstimatorAttitudeReversionOff(void);
-
-#endif

@@ -1,6 +1,0 @@
-#ifndef PM_H
-#define PM_H
-
-float pmGetBatteryVoltage(void);
-
-#endif

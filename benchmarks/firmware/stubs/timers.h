@@ -1,6 +1,0 @@
-#ifndef TIMERS_H
-#define TIMERS_H
-
-#include "FreeRTOS.h"
-
-#endif

@@ -1,0 +1,129 @@
+"""The constants of one controller: what is derived from its settings, whatever its method, derived once."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mambo_codegen.methods.shared.limits_constants import LimitsConstants
+from mambo_codegen.methods.shared.rate_feedback import feedback_steps
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
+from mambo_codegen.numbers.fixed_point import Formats
+from mambo_codegen.numbers.representation import (
+    ACCELERATION,
+    COMMAND,
+    CONTACT,
+    HEIGHT,
+    STATE,
+    TARGET,
+    THRUST,
+    WEIGHTS,
+    InputLimits,
+    Representation,
+)
+from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
+from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_codegen.settings.sections import Sections
+
+
+@dataclass(frozen=True)
+class Constants(ABC):
+    """What follows from `settings`; each property is derived at its first use and cached."""
+
+    settings: Sections
+
+    @property
+    @abstractmethod
+    def step_s(self) -> float:
+        """The step of the prediction, tau."""
+
+    @abstractmethod
+    def choose_formats(self) -> Formats:
+        """Choose the formats of fixed point."""
+
+    @property
+    def weight_limits(self) -> tuple[float, ...]:
+        """The largest tracking and effort weight, in SI units; none if the C takes no weights."""
+        return ()
+
+    @property
+    @abstractmethod
+    def limiting(self) -> LimitsConstants | None:
+        """The constants of the limits of speed, braking and place, in float64; None without any."""
+
+    @cached_property
+    def tracker(self) -> TrackerConstants | None:
+        """The constants of the target tracker, in float64; None with `target.acceleration = "none"`."""
+        return tracker_constants(self.settings, self.step_s)
+
+    @property
+    def climb_tracker(self) -> TrackerConstants | None:
+        """The constants of the tracker of the target's height; None without one."""
+        return None
+
+    @cached_property
+    def feedback_steps(self) -> tuple[float, float] | None:
+        """Commands of roll and pitch per change of the angle in an update period; None without feedback."""
+        return feedback_steps(self.settings)
+
+    @property
+    def has_height(self) -> bool:
+        """Whether the controller has the height for a third axis, and commands the thrust."""
+        return self.settings.height is not None
+
+    @property
+    def state(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_state_t, in their order."""
+        return (*STATE, *HEIGHT, *CONTACT) if self.has_height else STATE
+
+    @property
+    def level_target(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_target_t but those of the height, in their order."""
+        return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
+
+    @property
+    def target(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_target_t, in their order."""
+        level = self.level_target
+        if not self.has_height:
+            return level
+        return (*level, *HEIGHT, *(THRUST if len(level) > len(TARGET) else ()))
+
+    @property
+    def command(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_command_t, in their order."""
+        return (*COMMAND, *THRUST) if self.has_height else COMMAND
+
+    @cached_property
+    def numbers(self) -> Representation:
+        """The scalar type of the C, and in fixed point the format of each quantity."""
+        scalar = self.settings.code.scalar
+        return Representation(scalar, self.choose_formats() if scalar == "fixed" else None)
+
+    @cached_property
+    def limits(self) -> InputLimits:
+        """The limits of inputs and commands, rounded to the numbers of the C."""
+        constant, ranges = self.numbers.constant, self.settings.ranges
+        return InputLimits(
+            position=constant(ranges.position_m, "position"),
+            velocity=constant(ranges.velocity_m_s, "velocity"),
+            attitude=constant(ATTITUDE_LIMIT_RAD, "angle"),
+            yaw=constant(YAW_LIMIT_RAD, "yaw"),
+            thrust_least=constant(ranges.thrust_acceleration_min_m_s2, "thrust"),
+            thrust_most=constant(ranges.thrust_acceleration_max_m_s2, "thrust"),
+            tilt=constant(self.settings.limits.tilt_rad, "angle"),
+            weights=np.array([constant(*pair) for pair in zip(self.weight_limits, WEIGHTS, strict=False)]),
+        )
+
+    @property
+    def tilt_limit_rad(self) -> float:
+        """The tilt limit in rad, as the C has it."""
+        return float(self.numbers.to_si(np.array([self.limits.tilt]), "angle")[0])
+
+    @cached_property
+    def trigonometry(self) -> Any:
+        """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` in fixed point."""
+        bits = self.numbers.bits
+        return trigonometry(self.settings.code.scalar) if bits is None else fixed_trigonometry(bits["yaw"])
