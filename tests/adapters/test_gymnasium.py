@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_nmpc import ArgumentError
 from mambo_sil.api.simulated import SimulatedDrone
 from mambo_sil.drone.vehicles import vehicle_toml

@@ -87,12 +87,6 @@ def without_limits(figure: str) -> float:
     return float(one[figure].partition(", ")[2])
 
 
-def in_firmware(controller: str, curve: str = "eight", digits: int = 2) -> str:
-    """Return a mean distance in the Crazyflie's firmware over 60 s, in cm."""
-    found = figures("firmware")["curves"][curve][controller]["iae_m_s"]
-    return shown(100 * sum(found) / len(found) / 60, digits)
-
-
 def in_crazyflow(controller: str) -> str:
     """Return the RMS error on the eight with noise of crazyflow's cf2x_L250, fitted to flights, in mm."""
     found = figures("simulators")["cf2x_L250, fitted"][controller]["eight"]["noise"]
@@ -109,7 +103,7 @@ def ratio_of_pid(index: str) -> float:
 
 FIXED = "mambo --scalar fixed"
 BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
-WORK, FIRMWARE = "docs/evidence/constant-work.md", "docs/evidence/firmware.md"
+WORK = "docs/evidence/constant-work.md"
 FIGURES = [
     Figure(BOARDS, r"float32 takes (\d+) instructions on an ARM926", lambda: instructions("mambo")),
     Figure(BOARDS, r"ARM926, and fixed point (\d+)", lambda: instructions("mambo", FIXED)),
@@ -142,10 +136,6 @@ FIGURES = [
     Figure(
         "README.md", r"mostly drift, is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"
     ),
-    Figure("README.md", r"figure of eight has (\S+) cm of mean", lambda: in_firmware("design", digits=1)),
-    Figure("README.md", r"(\S+) cm \(Mellinger\)", lambda: in_firmware("mellinger")),
-    Figure("README.md", r"(\S+) cm \(Lee\)", lambda: in_firmware("lee")),
-    Figure("README.md", r"(\S+) cm \(PID\)", lambda: in_firmware("pid")),
     Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
     Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
     Figure(
@@ -157,9 +147,6 @@ FIGURES = [
     Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
     Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),
     Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("first")["mambo"], 1)),
-    Figure(FIRMWARE, r"mean distance of \*\*(\S+) cm", lambda: in_firmware("design", digits=1)),
-    Figure(FIRMWARE, r"Mellinger's controller (\S+), Lee's", lambda: in_firmware("mellinger")),
-    Figure(FIRMWARE, r"preset `crazyflie` has (\S+) cm, Lee's", lambda: in_firmware("crazyflie", "circle")),
     Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
     Figure(
         "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)
