@@ -76,6 +76,31 @@ def times_in_float64() -> str:
     return f"{double / board('crazyflie')['instructions']['mean']:.0f}"
 
 
+def shown(value: float, digits: int = 2) -> str:
+    """Return a figure with so many digits, without zeros behind the point."""
+    return f"{value:.{digits}g}"
+
+
+def without_limits(figure: str) -> float:
+    """Return a worst figure of preset `mambo` after a step of 30 m, of eight headings, without limits."""
+    one = next(one for one in figures("limits")["rows"] if one["case"] == "state known, no limits")
+    return float(one[figure].partition(", ")[2])
+
+
+def in_crazyflow(controller: str) -> str:
+    """Return the RMS error on the eight with noise of crazyflow's cf2x_L250, fitted to flights, in mm."""
+    found = figures("simulators")["cf2x_L250, fitted"][controller]["eight"]["noise"]
+    return shown(sorted(found)[len(found) // 2])
+
+
+def ratio_of_pid(index: str) -> float:
+    """Return the median, over 1000 random drones, of the tuned PID's index divided by that of `mambo`."""
+    found = figures("opponents")["improvements"]
+    return next(
+        float(one["median"]) for one in found if (one["controller"], one["index"]) == ("mambo", index)
+    )
+
+
 FIXED = "mambo --scalar fixed"
 BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
 WORK = "docs/evidence/constant-work.md"
@@ -103,6 +128,29 @@ FIGURES = [
     Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie")),
     Figure("README.md", r"\[(\d+) instructions instead of", lambda: instructions("mambo", FIXED)),
     Figure("README.md", r"instructions instead of (\d+)\]", lambda: instructions("mambo")),
+    Figure("README.md", r"the paper's PD (\d+) cm, this MPC", lambda: shown(figures("space")["pd"])),
+    Figure("README.md", r"altitude loop (\d+) cm", lambda: shown(figures("space")["preset"])),
+    Figure("README.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
+    Figure("README.md", r"three axes (\S+) cm", lambda: shown(figures("space")["third-axis"])),
+    Figure("README.md", r"PID has (\S+) times", lambda: f"{ratio_of_pid('seen_iae_m_s'):.1f}"),
+    Figure(
+        "README.md", r"mostly drift, is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"
+    ),
+    Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
+    Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
+    Figure(
+        "README.md",
+        r"(\S+) mm with Mellinger",
+        lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
+    ),
+    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("first")["pd"])),
+    Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
+    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),
+    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("first")["mambo"], 1)),
+    Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
+    Figure(
+        "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)
+    ),
     Figure(
         "docs/reference/c-api.md",
         r"quadratic, (\d+ to \d+) instructions",
