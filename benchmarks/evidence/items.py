@@ -27,6 +27,7 @@ from benchmarks.evidence.campaign_tables import (
     opponents_ratios,
     read_campaign,
     read_opponents,
+    read_quantiles,
 )
 from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
@@ -81,14 +82,14 @@ def _regress(item: str, suite: str, *sources: str) -> tuple[str, ...]:
 
 
 def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], str]]) -> Item:
-    """Return the item of a campaign, NAME.toml beside this file; the first one has pictures."""
+    """Return the item of a campaign, NAME.toml beside this file; the first has a picture and more tables."""
     drawn = name == "campaign"
     return Item(
         name=name,
         commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
         controllers=_FLOWN,
         paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/{name}.toml", *((_STYLE,) if drawn else ())),
-        read=read_campaign,
+        read=read_campaign if drawn else read_quantiles,
         tables=tables,
         pictures={f"{name}.png": "campaign/campaign.png"} if drawn else {},
     )

@@ -1,5 +1,6 @@
 """Tables and pictures of the manual are those of this code, and README says what they say."""
 
+import json
 import re
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from benchmarks.evidence.item import (
     differences,
     make,
     read_stamp,
+    record_lines,
     restamp,
     run,
 )
@@ -60,8 +62,9 @@ def test_a_release_has_figures_as_new_as_its_code(item: Item) -> None:
 
 @pytest.mark.parametrize("item", ITEMS, ids=NAMES)
 def test_tables_are_those_of_the_figures(item: Item) -> None:
-    """No table was edited by hand, and all commands of the item are in its stamp."""
+    """No table was edited by hand; the stamp has all commands of the item, and a line a record."""
     stamp = read_stamp(item)
+    assert item.stamp.read_text("utf-8") == record_lines(stamp) + "\n"
     assert stamp["commands"] == list(item.commands)
     for name, text in item.texts(stamp["figures"]).items():
         assert (DATA / name).read_text("utf-8") == text, f"{name}: run python -m benchmarks.evidence"
@@ -112,6 +115,24 @@ def test_a_changed_file_changes_the_id_of_its_folder(tmp_path: Path, monkeypatch
     file.write_text("X = 1\n", "utf-8")
     assert object_ids(["folder", "other.py"]) == first
     assert sources.git("ls-files") == ""
+
+
+def test_a_record_is_a_line() -> None:
+    """Of figures; of what stands beside them each entry is one, so that two changes seldom meet in a line."""
+    stamp = {"paths": {"a": "1", "b": "2"}, "figures": {"x": [{"y": [1, 2], "z": {"w": 0.1}}, {"y": []}]}}
+    assert json.loads(record_lines(stamp)) == stamp
+    assert record_lines(stamp).splitlines() == [
+        *("{", ' "paths": {', '  "a": "1",', '  "b": "2"', " },"),
+        *(
+            ' "figures": {',
+            '  "x": [',
+            '   {"y": [1, 2], "z": {"w": 0.1}},',
+            '   {"y": []}',
+            "  ]",
+            " }",
+            "}",
+        ),
+    ]
 
 
 def test_restamping_runs_nothing_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
