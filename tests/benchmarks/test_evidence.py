@@ -26,7 +26,7 @@ from benchmarks.evidence.item import (
 )
 from benchmarks.evidence.items import ITEMS
 from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
-from benchmarks.ours import ONE_NORM
+from benchmarks.peers.ours import ONE_NORM
 from mambo_codegen import __version__
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -139,18 +139,18 @@ def test_restamping_runs_nothing_and_says_so(tmp_path: Path, monkeypatch: pytest
     """Figures and the commit at which they were made stay; what has changed since is listed."""
     require("git", "git")
     monkeypatch.setattr(evidence, "DATA", tmp_path)
-    made = Item("made", (), ("mambo",), ("benchmarks/spread.py",), lambda _: {"x": 1}, {})
+    made = Item("made", (), ("mambo",), ("benchmarks/flights/spread.py",), lambda _: {"x": 1}, {})
     assert changes(made) == ["everything: it was never made"]
     said: list[str] = []
     make(made, said.append)
     stamp = read_stamp(made)
     assert (changes(made), stamp["restamped"]) == ([], [])
     now = replace(made, paths=("benchmarks/markdown.py",), commands=("python -c 'raise SystemExit(2)'",))
-    assert changes(now) == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    assert changes(now) == ["benchmarks/flights/spread.py", "benchmarks/markdown.py"]
     restamp(now, said.append)
     after = read_stamp(now)
     assert changes(now) == []
-    assert after["restamped"] == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    assert after["restamped"] == ["benchmarks/flights/spread.py", "benchmarks/markdown.py"]
     assert [after[key] for key in ("figures", "commit")] == [stamp[key] for key in ("figures", "commit")]
     assert "restamped, nothing was run; the figures are those of commit" in said[-1]
 
