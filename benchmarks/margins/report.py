@@ -112,8 +112,6 @@ def rank(first: FloatArray, second: FloatArray) -> float:
     return float(spearmanr(*values).statistic)
 
 
-DRAWS: Final = ("noise_scale", "motor_lag_s")
-
 CASES: Final = (
     ("default", "mambo"),
     ("default", "no-feedback"),
