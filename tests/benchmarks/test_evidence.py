@@ -252,29 +252,6 @@ def test_readme_says_what_the_evidence_says() -> None:
     assert unfounded(text) == []
 
 
-def test_readme_says_what_the_crazyflie_takes() -> None:
-    """Flash, RAM, time and instructions of preset mambo, and those in fixed point on the Mambo."""
-    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    takes = r"\*\*([\d.]+) KB of flash, (\d+) bytes of RAM and (\d+) to (\d+) us a step\*\*"
-    found = re.search(rf"{takes}, modelled from (\d+) instructions", text)
-    assert found is not None, "README no longer says it in these words: change this test with it"
-    footprints = read_stamp(next(item for item in ITEMS if item.name == "footprint"))["figures"]
-    board = next(one for one in footprints["mambo"] if one["name"] == "crazyflie")
-    low_us, high_us = (1e6 * time_s for time_s in board["time_s"])
-    assert found.groups() == (
-        f"{board['flash_bytes'] / 1000:.1f}",
-        str(board["ram_bytes"]),
-        f"{low_us:.0f}",
-        f"{high_us:.0f}",
-        f"{board['instructions']['mean']:.0f}",
-    )
-    counts = [
-        next(f"{one['instructions']['mean']:.0f}" for one in footprints[name] if one["name"] == "mambo")
-        for name in ("mambo --scalar fixed", "mambo")
-    ]
-    assert f"[{counts[0]} instructions instead of {counts[1]}]" in text
-
-
 def test_a_wrong_figure_in_readme_is_found() -> None:
     """A digit, a row under another name, a figure of nobody; fewer digits are none."""
     head = "| | IAE | ISE |\n|---|---|---|\n"
