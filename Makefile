@@ -116,13 +116,13 @@ evidence: $(SETUP)
 	$(BIN)/python -m benchmarks.evidence
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.flights
-	$(BIN)/python -m benchmarks.commands
-	$(BIN)/python -m benchmarks.times
-	$(BIN)/python -m benchmarks.quadratic_times
+	$(BIN)/python -m benchmarks.speed.flight_times
+	$(BIN)/python -m benchmarks.speed.command_times
+	$(BIN)/python -m benchmarks.peers.times
+	$(BIN)/python -m benchmarks.peers.quadratic_times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.peers
+	$(BIN)/python -m benchmarks.peers.footprints
 
 # The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
 # Of DAQP the C is wanted, which only the source distribution has.
