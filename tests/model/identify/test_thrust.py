@@ -86,6 +86,14 @@ def test_hover_alone_is_refused(gusts_m_s2: float) -> None:
     assert (result.gain, result.lag_s, result.battery_sag_1_s) == (None, None, None)
 
 
+def test_hover_with_a_noisy_height_is_told_to_fly_steps() -> None:
+    """The noise changes the thrust, by 3 % and more, and moves nothing."""
+    result = found(lift(replace(TRUTH, step_m=0.0, noise_m=0.01, gusts_m_s2=0.1)))
+    assert result.verdict == "refused"
+    assert "explains" in result.reasons[0]
+    assert "fly steps of height" in result.reasons[0]
+
+
 def test_a_refusal_does_not_advise_the_steps_that_were_flown() -> None:
     """The thrust of another flight: the message names the columns instead."""
     other = lift(replace(TRUTH, step_s=2.1), 2)

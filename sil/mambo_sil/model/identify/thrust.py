@@ -26,21 +26,12 @@ from mambo_sil.model.identify.response import (
     NORMAL_95,
     WIDENING,
     Interval,
-    filter_command,
     newey_west,
 )
-from mambo_sil.model.identify.segments import PERIOD_S, Segment
+from mambo_sil.model.identify.segments import Segment
+from mambo_sil.model.identify.thrust_windows import SIZE, WINDOW_S, Windows, cut_windows
 from mambo_sil.results.number_format import three_digits
 
-WINDOW_S: Final = 1.2
-_SIZE: Final = round(WINDOW_S / PERIOD_S)
-_STRIDE: Final = _SIZE // 2
-"""Samples of a window, and from one to the next: they overlap, so that none misses a step of the height."""
-_TIME_S: Final = PERIOD_S * np.arange(_SIZE)
-_CURVES: Final = np.linalg.qr(np.vander(_TIME_S, 3, increasing=True))[0]
-"""Constant, line and parabola (m, 3), orthonormal."""
-_CURVATURE: Final = _CURVES[:, 2] / (_CURVES[:, 2] @ (0.5 * _TIME_S * _TIME_S))
-"""Weights (m,) that give the second derivative of a parabola."""
 LEAST_S, GOOD_S = 8.0, 14.0
 """Time in windows below which the thrust is refused, and weak."""
 _HOVER_CORRELATION: Final = 13
@@ -68,24 +59,9 @@ LAGS_S: Final = (0.005, 0.5)
 """Bounds on a plausible sum of lag and dead time."""
 STEP_M: Final = 0.12
 """Range of the height from which on it has been flown up and down."""
+STEPS: Final = "fly steps of height, as 0.25 m up and down every 1.5 s, for 20 s"
 WEIGHTS_G, GOOD_WEIGHTS_G = (0.5, 2.0), (0.85, 1.15)
 """Bounds on slope times hover command over g, and on that of a thrust in proportion to its command."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Windows:
-    """The windows (n, m) of one stretch; rates and heights are without constants, lines and parabolas."""
-
-    rates: FloatArray
-    """Double integral of the command, and integral of the height, negative (2, n, m)."""
-    height_m: FloatArray
-    command: FloatArray
-    rate_curvatures: FloatArray
-    """(2, n)."""
-    height_curvature: FloatArray
-    """(n,)."""
-    middle_s: FloatArray
-    """Middle of each window (n,), from the beginning of the log on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,21 +82,20 @@ def fit_thrust(segments: Sequence[Segment]) -> ThrustResult | None:
     shown = [each for each in segments if each.height_m is not None and each.thrust is not None]
     if not shown:
         return None
-    windows = _windows(shown, _STARTS[0])
+    windows = cut_windows(shown, _STARTS[0])
     flown_s = 0.5 * WINDOW_S * sum(len(each.middle_s) for each in windows)
     if flown_s < LEAST_S:
         return _refused(f"{flown_s:.0f} s of flight; {LEAST_S:.0f} s are needed", np.nan)
     hover_command, change = _changes(windows)
+    heights_m = [each.height_m[each.counted] for each in shown if each.height_m is not None]
+    moved_m = max(float(np.ptp(each)) for each in heights_m)
     if change < LEAST_CHANGE:
-        moved_m = max(
-            float(np.ptp(each.height_m[each.counted])) for each in shown if each.height_m is not None
-        )
         return _refused(_calm(hover_command, change, moved_m), change)
     fit = _fit(shown)
     r2, lag = _held_out_r2(shown), _lag(shown, fit)
-    hover, sag = _hover(_windows(shown, fit.logs), fit)
+    hover, sag = _hover(cut_windows(shown, fit.logs), fit)
     weight_g = float(fit.values[0]) * hover.value / GRAVITY_M_S2
-    if why := _refusal(change, r2, weight_g, lag):
+    if why := _refusal(moved_m, r2, weight_g, lag):
         return _refused(why, change, r2)
     weak = _weaknesses(change, r2, weight_g, lag, flown_s)
     gain = GRAVITY_M_S2 / hover.value
@@ -154,19 +129,18 @@ def _calm(hover_command: float, change: float, moved_m: float) -> str:
     )
     if moved_m >= STEP_M:
         return f"{why}: the height moved by {moved_m:.2f} m; fly higher or quicker steps of height"
-    return (
-        f"{why}: this log shows the command of hover, {three_digits(hover_command)}, and no lag; fly steps "
-        "of height, as 0.25 m up and down every 1.5 s, for 20 s"
-    )
+    return f"{why}: this log shows the command of hover, {three_digits(hover_command)}, and no lag; {STEPS}"
 
 
-def _refusal(change: float, r2: float, weight_g: float, lag: Interval) -> str:
+def _refusal(moved_m: float, r2: float, weight_g: float, lag: Interval) -> str:
     """Return why a fit is no use, or nothing."""
     if r2 < LEAST_R2 or weight_g <= 0.0:
+        why = f"the thrust explains {max(r2, 0.0):.2f} of the height held out, {LEAST_R2} is needed: "
+        if moved_m < STEP_M:
+            return f"{why}{STEPS}"
         return (
-            f"the thrust changes by {change:.1%} of hover, and explains {max(r2, 0.0):.2f} of the height "
-            f"held out, {LEAST_R2} is needed: gusts or noise are as large, or the columns are not the height "
-            "and the thrust that was sent, on one clock"
+            f"{why}gusts or noise are as large as its effect, or the columns are not the height and the "
+            "thrust that was sent, on one clock"
         )
     if not WEIGHTS_G[0] <= weight_g <= WEIGHTS_G[1]:
         return f"the weight would be {weight_g:.2f} g: check the units of height and time"
@@ -206,7 +180,7 @@ def _fit(segments: Sequence[Segment], every: slice = slice(None)) -> _Fit:
     """Return the best fit to some of the windows of each stretch."""
 
     def solve(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        windows = _windows(segments, logs)
+        windows = cut_windows(segments, logs)
         rates = np.concatenate([each.rates[:, every].reshape(2, -1) for each in windows], axis=1).T
         heights = np.concatenate([each.height_m[every].ravel() for each in windows])
         values = np.linalg.lstsq(rates, heights, rcond=None)[0]
@@ -225,7 +199,7 @@ def _held_out_r2(segments: Sequence[Segment]) -> float:
     fit = _fit(segments, slice(0, None, 4))
     held_out = [
         (each.height_m[2::4], each.height_m[2::4] - _modelled(each.rates[:, 2::4], fit.values))
-        for each in _windows(segments, fit.logs)
+        for each in cut_windows(segments, fit.logs)
     ]
     left, whole = (sum(float(np.sum(each[place] ** 2)) for each in held_out) for place in (1, 0))
     return 1.0 - left / max(whole, 1e-300)
@@ -238,23 +212,23 @@ def _modelled(rates: FloatArray, values: FloatArray) -> FloatArray:
 
 def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
     """Return the sum of lag and dead time, with an interval as those of the angles."""
-    windows = _windows(segments, fit.logs)
+    windows = cut_windows(segments, fit.logs)
     columns = [[each.rates[0], each.rates[1]] for each in windows]
     for index in range(2):
         step = np.zeros(2)
         step[index] = _STEP
-        after, before = (_windows(segments, fit.logs + sign * step) for sign in (1.0, -1.0))
+        after, before = (cut_windows(segments, fit.logs + sign * step) for sign in (1.0, -1.0))
         for found, late, early in zip(columns, after, before, strict=True):
             found.append(_modelled(late.rates - early.rates, fit.values) / (2.0 * _STEP))
     slopes = [np.stack(each, axis=-1).reshape(-1, 4) for each in columns]
     errors = [(each.height_m - _modelled(each.rates, fit.values)).ravel() for each in windows]
-    covariance = newey_west(slopes, errors, 2 * _SIZE)[2:, 2:]
+    covariance = newey_west(slopes, errors, 2 * SIZE)[2:, 2:]
     times_s = fit.times_s
     variance = max(float(times_s @ covariance @ times_s), 0.0)
     return Interval(float(times_s.sum()), NORMAL_95 * WIDENING * variance**0.5 + SURPLUS_LAG_S)
 
 
-def _hover(windows: Sequence[_Windows], fit: _Fit) -> tuple[Interval, Interval]:
+def _hover(windows: Sequence[Windows], fit: _Fit) -> tuple[Interval, Interval]:
     """Return the hover command in the middle of the logs, and its rise over it per second: the sag."""
     middle_s = float(np.mean(np.concatenate([each.middle_s for each in windows])))
     lines = [np.column_stack([np.ones(len(each.middle_s)), each.middle_s - middle_s]) for each in windows]
@@ -270,7 +244,7 @@ def _hover(windows: Sequence[_Windows], fit: _Fit) -> tuple[Interval, Interval]:
     return Interval(hover, abs(hover) * within[0]), Interval(rise / hover, SAG_WIDENING * within[1])
 
 
-def _changes(windows: Sequence[_Windows]) -> tuple[float, float]:
+def _changes(windows: Sequence[Windows]) -> tuple[float, float]:
     """Return the mean of the command, and the rms of its changes in windows over that.
 
     The changes are those in the windows that have the largest, `LEAST_S` of them; three digits.
@@ -279,39 +253,3 @@ def _changes(windows: Sequence[_Windows]) -> tuple[float, float]:
     power = np.sort(command.var(axis=1))[-round(LEAST_S / (0.5 * WINDOW_S)) :]
     mean = float(command.mean())
     return mean, round(float(np.sqrt(power.mean())) / mean, 3) if mean > 0.0 else 0.0
-
-
-def _windows(segments: Sequence[Segment], logs: FloatArray) -> list[_Windows]:
-    """Return the windows of all stretches, with the command behind a lag and a dead time."""
-    lag_s, delay_s = np.exp(logs).tolist()
-    return [_cut(each, _vertical(each, lag_s, delay_s)) for each in segments]
-
-
-def _vertical(segment: Segment, lag_s: float, delay_s: float) -> FloatArray:
-    """Return the command (k,) of a stretch behind a lag and a dead time, times its vertical share."""
-    assert segment.thrust is not None
-    keep = np.exp(-PERIOD_S / lag_s)
-    late = segment.thrust.means(segment.time_s - delay_s)
-    lagged = filter_command(np.array([1.0 - keep]), np.array([1.0, -keep]), late)
-    return np.asarray(lagged * np.cos(segment.tilt_rad[0]) * np.cos(segment.tilt_rad[1]))
-
-
-def _cut(segment: Segment, command: FloatArray) -> _Windows:
-    """Return the windows of a stretch with a vertical command (k,).
-
-    Integrals from the beginning of the stretch on differ from those of a window by a line, which is removed.
-    """
-    assert segment.height_m is not None
-    height_m = segment.height_m - segment.height_m[0]
-    starts = np.arange(int(np.argmax(segment.counted)), len(command) - _SIZE + 1, _STRIDE)
-    whole = np.stack([_integral(_integral(command)), -_integral(height_m), height_m, command])
-    pieces = whole[:, starts[:, np.newaxis] + np.arange(_SIZE)]
-    left = pieces - (pieces @ _CURVES) @ _CURVES.T
-    curvatures = pieces @ _CURVATURE
-    middle_s = segment.time_s[starts] + 0.5 * WINDOW_S - segment.begun_s
-    return _Windows(left[:2], left[2], pieces[3], curvatures[:2], curvatures[2], middle_s)
-
-
-def _integral(values: FloatArray) -> FloatArray:
-    """Return the integral (k,) of samples (k,), which change evenly in between."""
-    return PERIOD_S * np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))])
