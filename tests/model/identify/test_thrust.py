@@ -134,6 +134,14 @@ def test_a_swing_that_is_too_slow_does_not_show_the_lag() -> None:
     assert result.verdict != "good", result
 
 
+@pytest.mark.parametrize("step_s", [1.2, 2.4])
+def test_steps_in_time_with_the_windows_are_found(step_s: float) -> None:
+    """Those that are fitted and those that are held out have some of them each."""
+    result = found(lift(replace(TRUTH, step_s=step_s)))
+    assert result.verdict == "good", result.reasons
+    assert result.held_out_r2 > 0.9
+
+
 def test_level_flight_before_the_steps_does_not_dilute_them() -> None:
     """What is judged is the liveliest part."""
     truth = replace(TRUTH, level_s=44.0, duration_s=64.0)

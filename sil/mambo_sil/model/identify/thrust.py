@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
@@ -36,6 +37,8 @@ LEAST_S, GOOD_S = 8.0, 14.0
 """Time in windows below which the thrust is refused, and weak."""
 _HOVER_CORRELATION: Final = 13
 """Windows over which the hover commands are taken as correlated: 8 s, because gusts last for seconds."""
+_BLOCK: Final = 8
+"""Windows that are fitted, or held out, together: 5 s."""
 
 _STARTS: Final = np.log([[0.05, 0.02], [0.15, 0.005]])
 _LOW, _HIGH = np.log([0.003, 0.0005]), np.log([0.5, 0.2])
@@ -145,7 +148,8 @@ def _refusal(moved_m: float, r2: float, weight_g: float, lag: Interval) -> str:
     if not WEIGHTS_G[0] <= weight_g <= WEIGHTS_G[1]:
         return f"the weight would be {weight_g:.2f} g: check the units of height and time"
     if not LAGS_S[0] < lag.value < LAGS_S[1]:
-        return f"the lag would be {1e3 * lag.value:.0f} ms: are height and thrust on one clock?"
+        why = f"the lag would be {1e3 * lag.value:.0f} ms"
+        return f"{why}: if height and thrust are on one clock, fly quicker steps"
     if lag.within > UNKNOWN_LAG_S:
         return (
             f"the lag is known within {1e3 * lag.within:.0f} ms, {1e3 * UNKNOWN_LAG_S:.0f} ms are needed; "
@@ -176,15 +180,17 @@ def _weaknesses(change: float, r2: float, weight_g: float, lag: Interval, flown_
     return found
 
 
-def _fit(segments: Sequence[Segment], every: slice = slice(None)) -> _Fit:
-    """Return the best fit to some of the windows of each stretch."""
+def _fit(segments: Sequence[Segment], *, half: bool = False) -> _Fit:
+    """Return the best fit to all windows, or to every second block of them."""
 
     def solve(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        windows = cut_windows(segments, logs)
-        rates = np.concatenate([each.rates[:, every].reshape(2, -1) for each in windows], axis=1).T
-        heights = np.concatenate([each.height_m[every].ravel() for each in windows])
-        values = np.linalg.lstsq(rates, heights, rcond=None)[0]
-        return values, heights - rates @ values
+        rates, heights_m = _stack(cut_windows(segments, logs))
+        if half:
+            fitted = _blocks(len(heights_m)) == 0
+            rates, heights_m = rates[:, fitted], heights_m[fitted]
+        slopes, changes = rates.reshape(2, -1).T, heights_m.ravel()
+        values = np.linalg.lstsq(slopes, changes, rcond=None)[0]
+        return values, changes - slopes @ values
 
     found = [
         least_squares(lambda logs: solve(logs)[1], start, bounds=(_LOW, _HIGH), x_scale=0.3, diff_step=1e-3)
@@ -195,14 +201,26 @@ def _fit(segments: Sequence[Segment], every: slice = slice(None)) -> _Fit:
 
 
 def _held_out_r2(segments: Sequence[Segment]) -> float:
-    """Return the R2 in every fourth window of a fit to those in between, without overlap."""
-    fit = _fit(segments, slice(0, None, 4))
-    held_out = [
-        (each.height_m[2::4], each.height_m[2::4] - _modelled(each.rates[:, 2::4], fit.values))
-        for each in cut_windows(segments, fit.logs)
-    ]
-    left, whole = (sum(float(np.sum(each[place] ** 2)) for each in held_out) for place in (1, 0))
-    return 1.0 - left / max(whole, 1e-300)
+    """Return the R2 in every second block of windows of a fit to the others."""
+    fit = _fit(segments, half=True)
+    rates, heights_m = _stack(cut_windows(segments, fit.logs))
+    held_out = _blocks(len(heights_m)) == 1
+    left = heights_m[held_out] - _modelled(rates[:, held_out], fit.values)
+    return 1.0 - float(np.sum(left**2) / np.sum(heights_m[held_out] ** 2))
+
+
+def _stack(windows: Sequence[Windows]) -> tuple[FloatArray, FloatArray]:
+    """Return the rates (2, n, m) and heights (n, m) in the windows of all stretches."""
+    rates = np.concatenate([each.rates for each in windows], axis=1)
+    return rates, np.concatenate([each.height_m for each in windows])
+
+
+def _blocks(count: int) -> NDArray[np.int64]:
+    """Return for each window (count,) 0 if its block is fitted, 1 if it is held out.
+
+    A block lasts longer than a step: single windows, taken by turns, could miss all steps.
+    """
+    return np.arange(count) // _BLOCK % 2
 
 
 def _modelled(rates: FloatArray, values: FloatArray) -> FloatArray:
