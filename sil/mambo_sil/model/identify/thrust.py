@@ -190,7 +190,7 @@ def _fit(segments: Sequence[Segment], *, half: bool = False) -> _Fit:
             rates, heights_m = rates[:, fitted], heights_m[fitted]
         slopes, changes = rates.reshape(2, -1).T, heights_m.ravel()
         values = np.linalg.lstsq(slopes, changes, rcond=None)[0]
-        return values, changes - slopes @ values
+        return np.asarray(values), np.asarray(changes - slopes @ values)
 
     found = [
         least_squares(lambda logs: solve(logs)[1], start, bounds=(_LOW, _HIGH), x_scale=0.3, diff_step=1e-3)
