@@ -1,0 +1,104 @@
+"""Whether a log is one of a controller: the errors of a replay against the motion of the logged commands."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.replay.log_replay import LogReplay
+
+SAME: Final = 0.013
+"""Largest error, as a share of the change from one command to the next, of the controller that flew."""
+OTHER: Final = 0.017
+"""Least error of another controller."""
+OTHER_OF_BLOCKS: Final = 1.0
+"""The same where the log does not say which inputs a step read: a replay that is no better than holding the
+last command."""
+SMALL_RAD: Final = 1e-5
+"""Error that counts as none, because rounding and what no log shows leave as much."""
+CALM_RAD: Final = 1e-3
+"""Standard deviation of a command up to which an axis is at rest, and says nothing."""
+LEAST_UPDATES: Final = 300
+"""Least number of updates to judge by."""
+MOST_LOST: Final = 0.3
+"""Largest share of lost updates of which the rest tells controllers apart."""
+
+
+class Verdict(StrEnum):
+    """Whether a log is one of a controller."""
+
+    YES = "yes"
+    NO = "no"
+    CANNOT_TELL = "cannot tell"
+
+
+@dataclass(frozen=True)
+class AxisErrors:
+    """How a replay differs from a log along one axis, at the updates that are judged.
+
+    share:     the error over the change from one command to the next: half of the motion has less.
+    error_rad: the error; half of the motion has less.
+    moves:     whether the command moves.
+    """
+
+    share: float
+    error_rad: float
+    moves: bool
+
+    @property
+    def is_same(self) -> bool:
+        """Whether the errors are those of the controller that flew."""
+        return self.error_rad <= SMALL_RAD or self.share <= SAME
+
+    def is_other(self, least: float) -> bool:
+        """Whether they are those of another one."""
+        return self.error_rad > SMALL_RAD and self.share >= least
+
+
+def errors_of(replay: LogReplay) -> tuple[AxisErrors, AxisErrors]:
+    """Return the errors of roll and pitch; NaN, and no motion, if no update can be judged."""
+    change_rad = np.abs(np.diff(replay.logged_rad, axis=0, prepend=np.nan))
+    error_rad = np.abs(replay.replayed_rad - replay.logged_rad)
+    judged = replay.settled & np.isfinite(change_rad[:, 0])
+    roll, pitch = (
+        _axis(error_rad[judged, k], change_rad[judged, k], replay.logged_rad[judged, k]) for k in range(2)
+    )
+    return roll, pitch
+
+
+def _axis(error_rad: FloatArray, change_rad: FloatArray, logged_rad: FloatArray) -> AxisErrors:
+    if not change_rad.any():
+        return AxisErrors(np.nan, float(np.median(error_rad)) if len(error_rad) else np.nan, moves=False)
+    moving = change_rad > 0.0
+    error_rad, weight = error_rad[moving], change_rad[moving]
+    return AxisErrors(
+        _median(error_rad / weight, weight), _median(error_rad, weight), bool(logged_rad.std() > CALM_RAD)
+    )
+
+
+def _median(values: FloatArray, weight: FloatArray) -> float:
+    """Return the median of values (k,), each counted with its weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[Verdict, str]:
+    """Return the verdict, and in words what is missing for one."""
+    judged, has_most = int(replay.settled.sum()), replay.share_lost <= MOST_LOST
+    least = OTHER if replay.is_exact and has_most else OTHER_OF_BLOCKS
+    if judged >= LEAST_UPDATES and any(axis.is_other(least) for axis in axes):
+        return Verdict.NO, ""
+    moves, is_same = any(axis.moves for axis in axes), all(axis.is_same for axis in axes)
+    if judged >= LEAST_UPDATES and moves and is_same and has_most:
+        return Verdict.YES, ""
+    reasons = (
+        (judged < LEAST_UPDATES, f"{judged} updates can be judged, and {LEAST_UPDATES} must: log longer"),
+        (not has_most or replay.resampled, "the log lacks most updates: log every one"),
+        (not moves, "the commands hardly move: log a flight along a curve"),
+        (not replay.is_exact, "which inputs a step read is not in its row: log those of the step"),
+    )
+    missing = "too many rows are lost for so calm a flight: log one along a curve"
+    return Verdict.CANNOT_TELL, next((reason for holds, reason in reasons if holds), missing)
