@@ -1,7 +1,7 @@
 """Read a flight log for a replay: what it says of each update of the controller, with lost rows filled."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -39,6 +39,8 @@ HEIGHT_STATE: Final = (HEIGHT, "vz_m_s")
 TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
 _ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
 """Signals that are read only where the controller needs them."""
+APP_GROUP: Final = "nmpc."
+"""The group of the app's logs, if the prefix of its names is that by default."""
 _APP: Final = {
     "x_m": Column("nmpc.x"),
     "y_m": Column("nmpc.y", -1.0),
@@ -87,7 +89,7 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     name: (
         *(column for column in columns if "." not in column.name),
         *((_APP[name],) if name in _APP else ()),
-        *(column for column in columns if "." in column.name),
+        *(column for column in columns if "." in column.name and column != _APP.get(name)),
     )
     for name, columns in _OTHER.items()
 }
@@ -150,7 +152,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
     wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if lifts else ()
     measured = (*STATE, *HEIGHT_STATE) if lifts else STATE
-    log = _read(path, columns, (*measured, *wanted))
+    log = _read(path, columns, (*measured, *wanted), settings.code.prefix)
     period_s = settings.horizon.update_period_s
     time_s, at = _updates(log, period_s)
     if len(time_s) < 2:
@@ -194,12 +196,21 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     )
 
 
-def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...]) -> FlightLog:
+def _own(name: str, prefix: str) -> str:
+    """Return the name of a column of an app whose names have `prefix`."""
+    return f"{prefix}.{name.removeprefix(APP_GROUP)}" if name.startswith(APP_GROUP) else name
+
+
+def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], prefix: str) -> FlightLog:
     """Return the log, which has the signals `wanted`; raises LogError."""
     is_ulog = path.suffix.lower() == ".ulg"
     if is_ulog and columns:
         raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
-    known = {name: each for name, each in SIGNALS.items() if name in wanted or name not in _ASKED}
+    known = {
+        name: tuple(replace(one, name=_own(one.name, prefix)) for one in each)
+        for name, each in SIGNALS.items()
+        if name in wanted or name not in _ASKED
+    }
     log = read_ulog(path) if is_ulog else read_csv(path, columns, known)
     missing = [name for name in wanted if name not in log.signals]
     if missing and is_ulog:
@@ -210,7 +221,7 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...]) ->
             )
         )
     if missing:
-        names = ", ".join(column.name for column in SIGNALS[missing[0]])
+        names = ", ".join(column.name for column in known[missing[0]])
         raise LogError(
             (f"{log.name}: has no column for {missing[0]} ({names}); name it: --columns {missing[0]}=COLUMN",)
         )
@@ -231,12 +242,16 @@ def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, Callable[[Flo
         return begin_s + period_s * np.arange(1 + max(int((end_s - begin_s) / period_s), -1)), None
     if UPDATE in log.signals:
         counted = log.signals[UPDATE]
-        row_s, steps = counted.time_s, np.diff(counted.value) % UPDATES
-    else:
-        steps = np.maximum(np.round(np.diff(row_s) / period_s), 1.0)
-    number = np.append(0.0, np.cumsum(steps))
-    first = np.append(True, steps > 0.0)
-    row_s, number = row_s[first], number[first]
+        counts = np.append(0, np.cumsum(np.diff(counted.value) % UPDATES)).astype(np.int64)
+        first = np.diff(counts, prepend=-1) > 0
+
+        def counted_at(time_s: FloatArray) -> IntArray:
+            """Return the numbers of the updates counted last before times, -1 before the first."""
+            place = np.searchsorted(counted.time_s, time_s, side="right") - 1
+            return np.where(place < 0, -1, counts[place])
+
+        return np.interp(np.arange(counts[-1] + 1), counts[first], counted.time_s[first]), counted_at
+    number = np.append(0.0, np.cumsum(np.maximum(np.round(np.diff(row_s) / period_s), 1.0)))
 
     def at(time_s: FloatArray) -> IntArray:
         """Return the numbers of the updates nearest to times."""

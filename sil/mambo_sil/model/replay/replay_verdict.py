@@ -13,14 +13,13 @@ SAME: Final = 0.013
 """Largest error, as a share of the change from one command to the next, of the controller that flew."""
 OTHER: Final = 0.017
 """Least error of another controller."""
-OTHER_OF_BLOCKS: Final = 1.0
-"""The same where the log does not say which inputs a step read: a replay that is no better than holding the
-last command."""
+FAR: Final = 0.5
+"""The same where the log does not say which inputs a step read, over the standard deviation of the command."""
 SMALL_RAD: Final = 1e-5
 """Error that counts as none, because rounding and what no log shows leave as much."""
 CALM_RAD: Final = 1e-3
 """Standard deviation of a command up to which an axis is at rest, and says nothing."""
-LEAST_UPDATES: Final = 300
+LEAST_UPDATES: Final = 150
 """Least number of updates to judge by."""
 MOST_LOST: Final = 0.3
 """Largest share of lost updates of which the rest tells controllers apart."""
@@ -38,23 +37,30 @@ class Verdict(StrEnum):
 class AxisErrors:
     """How a replay differs from a log along one axis, at the updates that are judged.
 
-    share:     the error over the change from one command to the next: half of the motion has less.
-    error_rad: the error; half of the motion has less.
-    moves:     whether the command moves.
+    share:      the error over the change from one command to the next: half of the motion has less.
+    error_rad:  the error; half of the motion has less.
+    spread_rad: standard deviation of the logged command.
     """
 
     share: float
     error_rad: float
-    moves: bool
+    spread_rad: float
+
+    @property
+    def moves(self) -> bool:
+        """Whether the command moves enough to say something."""
+        return self.spread_rad > CALM_RAD
 
     @property
     def is_same(self) -> bool:
         """Whether the errors are those of the controller that flew."""
         return self.error_rad <= SMALL_RAD or self.share <= SAME
 
-    def is_other(self, least: float) -> bool:
-        """Whether they are those of another one."""
-        return self.error_rad > SMALL_RAD and self.share >= least
+    def is_other(self, *, exact: bool) -> bool:
+        """Whether they are those of another one; `exact` says whether the log has the inputs of each step."""
+        if not exact:
+            return self.moves and self.error_rad >= FAR * self.spread_rad
+        return self.error_rad > SMALL_RAD and self.share >= OTHER
 
 
 def errors_of(replay: LogReplay) -> tuple[AxisErrors, AxisErrors]:
@@ -70,11 +76,11 @@ def errors_of(replay: LogReplay) -> tuple[AxisErrors, AxisErrors]:
 
 def _axis(error_rad: FloatArray, change_rad: FloatArray, logged_rad: FloatArray) -> AxisErrors:
     if not change_rad.any():
-        return AxisErrors(np.nan, float(np.median(error_rad)) if len(error_rad) else np.nan, moves=False)
+        return AxisErrors(np.nan, float(np.median(error_rad)) if len(error_rad) else np.nan, 0.0)
     moving = change_rad > 0.0
     error_rad, weight = error_rad[moving], change_rad[moving]
     return AxisErrors(
-        _median(error_rad / weight, weight), _median(error_rad, weight), bool(logged_rad.std() > CALM_RAD)
+        _median(error_rad / weight, weight), _median(error_rad, weight), float(logged_rad.std())
     )
 
 
@@ -88,8 +94,11 @@ def _median(values: FloatArray, weight: FloatArray) -> float:
 def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[Verdict, str]:
     """Return the verdict, and in words what is missing for one."""
     judged, has_most = int(replay.settled.sum()), replay.share_lost <= MOST_LOST
-    least = OTHER if replay.is_exact and has_most else OTHER_OF_BLOCKS
-    if judged >= LEAST_UPDATES and any(axis.is_other(least) for axis in axes):
+    exact = replay.is_exact and has_most
+    is_equal = bool((replay.replayed_rad == replay.logged_rad).all())
+    if is_equal and replay.logged_rad.std(axis=0).max() > CALM_RAD:
+        return Verdict.YES, ""
+    if judged >= LEAST_UPDATES and any(axis.is_other(exact=exact) for axis in axes):
         return Verdict.NO, ""
     moves, is_same = any(axis.moves for axis in axes), all(axis.is_same for axis in axes)
     if judged >= LEAST_UPDATES and moves and is_same and has_most:
