@@ -36,8 +36,8 @@ class LogReplaySummary(ReportedSummary):
     """Gaps that are too long to fill: behind each the controller begins anew."""
     judged: int
     """Steps `SETTLING_S` or more after a beginning of the controller; what follows is of these."""
-    share: tuple[Number, Number]
-    """Error over the change from one command to the next: half of the motion has less."""
+    miss: tuple[Number, Number]
+    """Change of the error over that of the logged command: half of the motion has less."""
     error_rad: tuple[Number, Number]
     """Error: half of the motion has less."""
     rms_rad: tuple[Number, Number]
@@ -92,7 +92,7 @@ def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogRep
         lost=replay.lost,
         gaps=replay.gaps,
         judged=int(replay.settled.sum()),
-        share=(axes[0].share, axes[1].share),
+        miss=(axes[0].miss, axes[1].miss),
         error_rad=(axes[0].error_rad, axes[1].error_rad),
         rms_rad=rms_rad,
         largest_rad=largest_rad,
@@ -124,16 +124,16 @@ def _of(difference_rad: FloatArray, time_s: FloatArray) -> tuple[Pair, Pair, Pai
 
 def finding(summary: LogReplaySummary) -> str:
     """Say in one line whether the log is one of this controller."""
-    share = f"{100.0 * max(summary.share):.2g} % of the logged command's motion"
+    miss = f"{100.0 * max(summary.miss):.2g} % of the logged command's motion"
     match summary.verdict:
         case Verdict.CANNOT_TELL:
             return f"CANNOT TELL whether it was this controller: {summary.missing}"
         case Verdict.NO:
             limit = f"and should {100.0 * SAME:g} % at most"
-            return f"NOT THIS CONTROLLER, or not its inputs: it misses {share}, {limit}"
+            return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
     if summary.equal_steps == summary.steps:
         return f"all {summary.steps} commands of the log are those of this controller, bit for bit"
-    return f"the commands of the log are those of this controller: it misses {share}"
+    return f"the commands of the log are those of this controller: it misses {miss}"
 
 
 def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
@@ -148,9 +148,9 @@ def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
     if summary.lost:
         behind = f"; it begins anew behind {summary.gaps} long gaps" if summary.gaps else ""
         lines.append(("lost", f"{summary.lost} of {summary.lost + summary.steps} updates{behind}"))
-    for axis, share, error_rad, rms_rad, largest_rad, at_s in zip(
+    for axis, miss, error_rad, rms_rad, largest_rad, at_s in zip(
         AXES,
-        summary.share,
+        summary.miss,
         summary.error_rad,
         summary.rms_rad,
         summary.largest_rad,
@@ -160,7 +160,7 @@ def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
         lines.append(
             (
                 axis,
-                f"misses {100.0 * share:.2g} % of the motion; difference {error_rad:.2g} rad in the middle, "
+                f"misses {100.0 * miss:.2g} % of the motion; difference {error_rad:.2g} rad in the middle, "
                 f"{rms_rad:.2g} rad rms, {largest_rad:.2g} rad at {at_s:.2f} s",
             )
         )

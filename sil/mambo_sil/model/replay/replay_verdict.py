@@ -9,12 +9,12 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.replay.log_replay import LogReplay
 
-SAME: Final = 0.013
-"""Largest error, as a share of the change from one command to the next, of the controller that flew."""
-OTHER: Final = 0.017
-"""Least error of another controller."""
+SAME: Final = 0.005
+"""Largest miss of the controller that flew: the change of its error over the change of the logged command."""
+OTHER: Final = 0.01
+"""Least miss of another controller."""
 FAR: Final = 0.5
-"""The same where the log does not say which inputs a step read, over the standard deviation of the command."""
+"""The same where the log does not say which inputs a step read, over the command's standard deviation."""
 SMALL_RAD: Final = 1e-5
 """Error that counts as none, because rounding and what no log shows leave as much."""
 CALM_RAD: Final = 1e-3
@@ -37,12 +37,13 @@ class Verdict(StrEnum):
 class AxisErrors:
     """How a replay differs from a log along one axis, at the updates that are judged.
 
-    share:      the error over the change from one command to the next: half of the motion has less.
+    miss:       change of the error over the change from one command to the next; half of the motion has
+                less. What the estimates of the controller lack behind a gap fades slowly, and changes little.
     error_rad:  the error; half of the motion has less.
     spread_rad: standard deviation of the logged command.
     """
 
-    share: float
+    miss: float
     error_rad: float
     spread_rad: float
 
@@ -54,33 +55,37 @@ class AxisErrors:
     @property
     def is_same(self) -> bool:
         """Whether the errors are those of the controller that flew."""
-        return self.error_rad <= SMALL_RAD or self.share <= SAME
+        return self.error_rad <= SMALL_RAD or self.miss <= SAME
 
     def is_other(self, *, exact: bool) -> bool:
         """Whether they are those of another one; `exact` says whether the log has the inputs of each step."""
         if not exact:
             return self.moves and self.error_rad >= FAR * self.spread_rad
-        return self.error_rad > SMALL_RAD and self.share >= OTHER
+        return self.error_rad > SMALL_RAD and self.miss >= OTHER
 
 
 def errors_of(replay: LogReplay) -> tuple[AxisErrors, AxisErrors]:
     """Return the errors of roll and pitch; NaN, and no motion, if no update can be judged."""
+    error_rad = replay.replayed_rad - replay.logged_rad
+    jump_rad = np.abs(np.diff(error_rad, axis=0, prepend=np.nan))
     change_rad = np.abs(np.diff(replay.logged_rad, axis=0, prepend=np.nan))
-    error_rad = np.abs(replay.replayed_rad - replay.logged_rad)
     judged = replay.settled & np.isfinite(change_rad[:, 0])
-    roll, pitch = (
-        _axis(error_rad[judged, k], change_rad[judged, k], replay.logged_rad[judged, k]) for k in range(2)
-    )
+    columns = (np.abs(error_rad), jump_rad, change_rad, replay.logged_rad)
+    roll, pitch = (_axis(*(values[judged, k] for values in columns)) for k in range(2))
     return roll, pitch
 
 
-def _axis(error_rad: FloatArray, change_rad: FloatArray, logged_rad: FloatArray) -> AxisErrors:
+def _axis(
+    error_rad: FloatArray, jump_rad: FloatArray, change_rad: FloatArray, logged_rad: FloatArray
+) -> AxisErrors:
     if not change_rad.any():
         return AxisErrors(np.nan, float(np.median(error_rad)) if len(error_rad) else np.nan, 0.0)
     moving = change_rad > 0.0
-    error_rad, weight = error_rad[moving], change_rad[moving]
+    weight = change_rad[moving]
     return AxisErrors(
-        _median(error_rad / weight, weight), _median(error_rad, weight), float(logged_rad.std())
+        _median(jump_rad[moving] / weight, weight),
+        _median(error_rad[moving], weight),
+        float(logged_rad.std()),
     )
 
 
