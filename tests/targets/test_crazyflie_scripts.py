@@ -253,7 +253,7 @@ def test_ctrl_c_lands(
     assert landing - begun == pytest.approx(5.0, abs=0.1)
     assert stopped - landing == pytest.approx(3.0, abs=0.1)
     assert "Stopped by Ctrl-C" in capsys.readouterr().err
-    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.status,")
+    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.step,nmpc.x,")
 
 
 def test_a_second_ctrl_c_stops_the_motors(scripts: dict[str, ModuleType], drone: Drone) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.replay.log_replay import LogReplay
 
-SAME: Final = 0.005
+SAME: Final = 0.008
 """Largest miss of the controller that flew: the change of its error over the change of the logged command."""
-OTHER: Final = 0.01
+OTHER: Final = 0.013
 """Least miss of another controller."""
 FAR: Final = 0.5
 """The same where the log does not say which inputs a step read, over the command's standard deviation."""
