@@ -308,6 +308,16 @@ def test_the_log_has_all_variables(scripts: dict[str, ModuleType]) -> None:
     assert "" not in rows[50].split(",")
 
 
+def test_the_clock_of_the_logs_may_begin_again(scripts: dict[str, ModuleType], drone: Drone) -> None:
+    """After 24 bits of ms: the rows stay in order."""
+    drone.first_tick = 2**24 - 5000
+    assert run(scripts, "hover", "--log", "hover.csv") == 0
+    _, *rows = Path("hover.csv").read_text("utf-8").splitlines()
+    ticks = np.array([int(row.split(",")[0]) for row in rows])
+    assert (np.diff(ticks) > 0).all()
+    assert ticks[0] < 2**24 < ticks[-1] < 2**24 + 60_000
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

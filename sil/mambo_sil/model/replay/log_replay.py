@@ -40,6 +40,8 @@ class LogReplay:
     """Whether the controller has not begun anew in the last `SETTLING_S` (k,)."""
     lost: int
     """Updates that the log has lost."""
+    filled: int
+    """Those of them that are filled."""
     gaps: int
     """Gaps behind which the controller began anew."""
     is_exact: bool
@@ -49,9 +51,9 @@ class LogReplay:
     remarks: tuple[str, ...]
 
     @property
-    def share_lost(self) -> float:
-        """Share of the updates that the log has lost."""
-        return self.lost / (self.lost + len(self.time_s))
+    def share_filled(self) -> float:
+        """Share of the replayed updates that the log has lost."""
+        return self.filled / (self.filled + len(self.time_s))
 
 
 def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) -> LogReplay:
@@ -88,6 +90,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         status=status[there],
         settled=_settled(inputs)[there],
         lost=int((~there).sum()),
+        filled=sum(int((~there[first:end]).sum()) for first, end, _ in blocks),
         gaps=inputs.gaps,
         is_exact=inputs.is_exact,
         resampled=inputs.resampled,

@@ -21,8 +21,8 @@ CALM_RAD: Final = 1e-3
 """Standard deviation of a command up to which an axis is at rest, and says nothing."""
 LEAST_UPDATES: Final = 150
 """Least number of updates to judge by."""
-MOST_LOST: Final = 0.3
-"""Largest share of lost updates of which the rest tells controllers apart."""
+MOST_FILLED: Final = 0.3
+"""Largest share of filled updates among which the others tell controllers apart."""
 
 
 class Verdict(StrEnum):
@@ -98,7 +98,7 @@ def _median(values: FloatArray, weight: FloatArray) -> float:
 
 def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[Verdict, str]:
     """Return the verdict, and in words what is missing for one."""
-    judged, has_most = int(replay.settled.sum()), replay.share_lost <= MOST_LOST
+    judged, has_most = int(replay.settled.sum()), replay.share_filled <= MOST_FILLED
     exact = replay.is_exact and has_most
     is_equal = bool((replay.replayed_rad == replay.logged_rad).all())
     if is_equal and replay.logged_rad.std(axis=0).max() > CALM_RAD:
