@@ -23,8 +23,9 @@ from mambo_sil.flight.trajectories import Circle
 from tests.support.command import run
 from tests.support.crazyflie import (
     FIRMWARE_FLAGS,
+    HOST,
     LIBRARY,
-    STUBS,
+    STAND_INS,
     TURNED,
     Built,
     Crazyflie,
@@ -42,6 +43,8 @@ from tests.support.shell import shell
 from tests.support.tools import require
 
 SETTINGS = presets.preset("crazyflie")
+LIBC = Path(__file__).parent / "crazyflie_libc"
+"""Headers of a C library, which a compiler for Arm may lack."""
 ARM = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fconserve-stack")
 LARGEST_STACK_BYTES = 400
 
@@ -347,7 +350,7 @@ def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path)
     for source in sorted((folder / "src").glob("*.c")):
         shell(
             *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding"),
-            *(f"-I{STUBS}", "-c", source, "-o", folder / "object.o"),
+            *(f"-I{LIBC}", f"-I{STAND_INS}", "-c", source, "-o", folder / "object.o"),
         )
 
 
@@ -361,7 +364,7 @@ def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
     for name in ("nmpc", "nmpc_app"):
         shell(
             *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding", "-fcallgraph-info=su"),
-            *(f"-I{STUBS}", "-c", folder / "src" / f"{name}.c", "-o", folder / f"{name}.o"),
+            *(f"-I{LIBC}", f"-I{STAND_INS}", "-c", folder / "src" / f"{name}.c", "-o", folder / f"{name}.o"),
         )
         graph = (folder / f"{name}.ci").read_text("utf-8")
         for title, label in re.findall(r'node: { title: "([^"]*)" label: "([^"]*)"', graph):
@@ -428,7 +431,7 @@ def test_a_file_of_the_user_s_own_stays_and_is_called(tmp_path: Path) -> None:
     run("generate", str(tmp_path / "other.toml"), *generate[2:])
     run("generate", str(tmp_path / "other.toml"), *generate[2:], "--check")
     assert user.read_text("utf-8") == USER_C
-    sources = [*(folder / "src").glob("*.c"), STUBS / "host.c"]
+    sources = [*(folder / "src").glob("*.c"), HOST]
     objects = [compile_host(source, folder / f"{source.stem}.o", "-ffp-contract=off") for source in sources]
     app = Crazyflie(link(objects, folder / "app.so"))
     app.modes("modeAbs")
