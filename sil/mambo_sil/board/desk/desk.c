@@ -17,6 +17,7 @@
 #include "set_points.h"
 #include "supervisor.h"
 #include "task.h"
+#include "worker.h"
 
 #define START_MS 10000U
 #define FLOW_MS 10U
@@ -80,6 +81,13 @@ static double normal(void) { return sqrt(-2.0 * log(1.0 - uniform())) * cos(2.0 
 uint32_t xTaskGetTickCount(void) { return now_ms; }
 bool supervisorIsFlying(void) { return (supervised == FLYING) || (supervised == LEVELLING_OUT); }
 float powerDistributionGetMaxThrust(void) { return 0.48f; }
+enum trajectory_state crtpCommanderHighLevelGetPlannerState(void) { return set_points_state(); }
+
+int workerSchedule(void (*function)(void *), void *argument)
+{
+    function(argument);
+    return 0;
+}
 
 int consolePrintf(const char *format, ...)
 {

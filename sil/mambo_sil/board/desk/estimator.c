@@ -249,7 +249,9 @@ static void update(estimator_t *filter, const double slope[ESTIMATOR_STATES], do
         filter->position_m[k] += correction[POSITION + k];
         filter->velocity_m_s[k] += correction[VELOCITY + k];
     }
-    turn(filter->attitude, &correction[ANGLE]);
+    if (isfinite(innovation)) { /* the firmware moves no error into the attitude that is not a number */
+        turn(filter->attitude, &correction[ANGLE]);
+    }
 }
 
 void estimator_see_position(estimator_t *filter, const double position_m[3])

@@ -12,11 +12,9 @@ typedef struct {
     double value, slope, curvature, jerk;
 } motion_t;
 
-typedef enum { IDLE, PLANNED, LANDING } plan_kind_t;
-
 static setpoint_t current;
 static bool is_by_radio;
-static plan_kind_t plan;
+static enum trajectory_state plan;
 static double coefficients[AXES][DEGREE + 1]; /* by the time in durations */
 static double duration_s;
 static uint32_t begun_ms;
@@ -27,7 +25,7 @@ void set_points_start(void)
 {
     memset(&current, 0, sizeof current);
     is_by_radio = false;
-    plan = IDLE;
+    plan = TRAJECTORY_STATE_IDLE;
 }
 
 void set_points_send(const setpoint_t *setpoint, uint32_t now_ms)
@@ -35,10 +33,11 @@ void set_points_send(const setpoint_t *setpoint, uint32_t now_ms)
     current = *setpoint;
     current.timestamp = now_ms;
     is_by_radio = true;
-    plan = IDLE;
+    plan = TRAJECTORY_STATE_IDLE;
 }
 
 void set_points_yield(void) { is_by_radio = false; }
+enum trajectory_state set_points_state(void) { return plan; }
 
 static motion_t evaluate(const double c[DEGREE + 1], double share)
 {
@@ -84,7 +83,7 @@ void set_points_plan(const double position_m[3], double yaw_rad, double wanted_s
     for (int axis = 0; axis < AXES; axis++) {
         const motion_t rest = { last_m[axis], last_m_s[axis], 0.0, 0.0 };
 
-        from[axis] = (plan == IDLE) ? rest : at(axis, now_ms);
+        from[axis] = (plan == TRAJECTORY_STATE_IDLE) ? rest : at(axis, now_ms);
     }
     duration_s = wanted_s;
     begun_ms = now_ms;
@@ -93,7 +92,7 @@ void set_points_plan(const double position_m[3], double yaw_rad, double wanted_s
 
         connect(coefficients[axis], from[axis], (axis < 3) ? position_m[axis] : (from[axis].value + turned_rad));
     }
-    plan = lands ? LANDING : PLANNED;
+    plan = lands ? TRAJECTORY_STATE_LANDING : TRAJECTORY_STATE_FLYING;
 }
 
 void set_points_lift(double z_m, double yaw_rad, double wanted_s, bool lands, uint32_t now_ms)
@@ -103,7 +102,7 @@ void set_points_lift(double z_m, double yaw_rad, double wanted_s, bool lands, ui
     for (int axis = 0; axis < AXES; axis++) {
         last_m_s[axis] = 0.0; /* such a plan begins at rest */
     }
-    plan = IDLE;
+    plan = TRAJECTORY_STATE_IDLE;
     set_points_plan(place_m, yaw_rad, wanted_s, lands, now_ms);
 }
 
@@ -124,22 +123,22 @@ static void follow_plan(uint32_t now_ms)
     current.acceleration = (vector_t){ now_ms, (float)motion[0].curvature, (float)motion[1].curvature, (float)motion[2].curvature };
     current.attitude.yaw = (float)(DEG_PER_RAD * motion[3].value);
     current.attitudeRate.yaw = (float)(DEG_PER_RAD * motion[3].slope);
-    if ((plan == LANDING) && (0.001 * (double)(now_ms - begun_ms) >= duration_s)) {
-        plan = IDLE;
+    if ((plan == TRAJECTORY_STATE_LANDING) && (0.001 * (double)(now_ms - begun_ms) >= duration_s)) {
+        plan = TRAJECTORY_STATE_IDLE;
     }
 }
 
 void set_points_now(setpoint_t *setpoint, const state_t *state, uint32_t now_ms)
 {
     if (!is_by_radio && ((now_ms % PLAN_PERIOD_MS) == 0U)) {
-        if (plan == IDLE) {
+        if (plan == TRAJECTORY_STATE_IDLE) {
             memset(&current, 0, sizeof current); /* the motors stop */
             current.timestamp = now_ms;
         } else {
             follow_plan(now_ms);
         }
     }
-    if (plan == IDLE) {
+    if (plan == TRAJECTORY_STATE_IDLE) {
         last_m[0] = state->position.x;
         last_m[1] = state->position.y;
         last_m[2] = state->position.z;

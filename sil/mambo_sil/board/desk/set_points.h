@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 
+#include "crtp_commander_high_level.h"
 #include "stabilizer_types.h"
 
 /* Forget all set-points. */
@@ -23,6 +24,9 @@ void set_points_plan(const double position_m[3], double yaw_rad, double duration
 
 /* Plan a take-off or a landing: a flight up or down. */
 void set_points_lift(double z_m, double yaw_rad, double duration_s, bool lands, uint32_t now_ms);
+
+/* What the high-level commander does. */
+enum trajectory_state set_points_state(void);
 
 /* Write the present set-point. */
 void set_points_now(setpoint_t *setpoint, const state_t *state, uint32_t now_ms);
