@@ -233,9 +233,9 @@ def test_lost_positions_are_counted_and_end_level(built: Built) -> None:
     app.aim(np.array([0.5, 0.5, 0.0, 0.0, 0.0, 0.0]))
     flown_since(app, np.zeros(7), 3)
     before = app.logged("refused")
-    outage = flown_since(app, np.full(7, np.nan), 300)
+    outage = flown_since(app, np.full(7, np.nan), 200)
     assert app.logged("status") == 2
-    assert app.logged("refused") == before + 300
+    assert app.logged("refused") == before + 200
     assert 0.0 not in outage[0]
     assert outage[-1] == (0.0, 0.0)
     assert flown_since(app, np.zeros(7), 1)[0] != (0.0, 0.0)
@@ -295,11 +295,6 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
     assert costs[2] == costs[0]
 
 
-def parameters(app: Crazyflie) -> tuple[float, ...]:
-    """Return the limits of speed and tilt that the app shows."""
-    return app.parameter("speed"), app.parameter("tilt")
-
-
 def test_limits_are_parameters(tmp_path: Path) -> None:
     """A fence in the firmware's frame, y to the left, acts at the next update; a bad one changes nothing."""
     limited = build(folder_of(with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
@@ -310,13 +305,12 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
     app.aim(np.array([0.0, -1.5, 0.0, 0.0, 0.0, 0.0]))
     here = np.zeros(7)
     app.update(here)
-    assert parameters(app) == pytest.approx((2.0, SETTINGS.limits.tilt_rad)), "at most what was generated"
+    assert (app.parameter("speed"), app.parameter("tilt")) == (100.0, 100.0), "what the pilot wrote stays"
+    assert app.logged("badLimits") == 0
     app.set_parameter("tilt", 0.1)
-    app.set_parameter("braking", 0.5)
     assert max(np.abs(flown_since(app, here, 30)[-1])) <= math.degrees(0.1) + 1e-4
     app.set_parameter("tilt", math.nan)
     app.update(here)
-    assert parameters(app)[1] == pytest.approx(SETTINGS.limits.tilt_rad)
     assert app.logged("limits") & 4 == 0
     for name, value in (("xMin", -1.0), ("xMax", 1.0), ("yMin", -3.0), ("yMax", 1.0)):
         app.set_parameter(name, value)
@@ -328,6 +322,13 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
     app.set_parameter("yMax", -4.0)
     app.update(here)
     assert app.logged("limits") & 4 == 0, "less than yMin: refused"
+    assert app.logged("badLimits") == 1 << 6
+    assert "limits refused" in app.console
+    app.set_parameter("speed", 0.0)
+    app.set_parameter("yMax", 1.0)
+    app.update(here)
+    assert app.logged("badLimits") == 1, "each limit by itself"
+    assert app.logged("limits") & 4 == 4
 
 
 SUBJECTS = {

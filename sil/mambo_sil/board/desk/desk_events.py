@@ -48,7 +48,7 @@ class DeskTrace:
 
 
 class _Course:
-    """The target of a flight every 10 ms, in the firmware's frame, and the set-points of it that a radio sends."""
+    """The target every 10 ms, in the firmware's frame, and the set-points of it that a radio sends."""
 
     def __init__(self, file: EventsFile, seed: int) -> None:
         curve = CURVES[file.trajectory](file.size_m, file.rate_rad_s)
@@ -63,7 +63,8 @@ class _Course:
 
     def motion(self, time_s: float) -> Motion:
         """Return the target's motion at a time, (3, 3)."""
-        return self._motions[round(1000.0 * max(time_s, 0.0)) // SAMPLE_MS]
+        motion: Motion = self._motions[round(1000.0 * max(time_s, 0.0)) // SAMPLE_MS]
+        return motion
 
     def packet(self, time_s: float) -> Motion:
         """Return the set-point that comes at a time."""
@@ -104,7 +105,7 @@ class _Flight:
     def send(self, now_ms: int) -> None:
         """Send a set-point if one is due."""
         if self._sends and now_ms >= self._due_ms:
-            self.desk.full_state(*self._course.packet(0.001 * now_ms), 0.0)
+            self.desk.full_state(self._course.packet(0.001 * now_ms))
             self._due_ms += self._period_ms
 
     def happen(self, event: EventSection) -> None:

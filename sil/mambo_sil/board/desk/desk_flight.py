@@ -92,7 +92,8 @@ class Desk:
         self._c.desk_state(self._state)
         of = self._state
         parts = (of.position_m, of.velocity_m_s, of.angles_rad, of.motors)
-        return DeskState(*(np.array(list(part)) for part in parts), float(of.touch_m_s))
+        position, velocity, angles, motors = (np.array(list(part)) for part in parts)
+        return DeskState(position, velocity, angles, motors, float(of.touch_m_s))
 
     @property
     def console(self) -> str:
@@ -109,11 +110,9 @@ class Desk:
         if not self._c.desk_set(name.encode(), value):
             raise FlightError(f"{name} is not a parameter of this app")
 
-    def full_state(
-        self, position_m: FloatArray, velocity_m_s: FloatArray, acceleration_m_s2: FloatArray, yaw_rad: float
-    ) -> None:
-        """Send position, velocity and acceleration (3,), rounded to millimetres as cflib does."""
-        sent = (self._vector(_millimetres(part)) for part in (position_m, velocity_m_s, acceleration_m_s2))
+    def full_state(self, motion: FloatArray, yaw_rad: float = 0.0) -> None:
+        """Send position, velocity and acceleration, (3, 3), rounded to millimetres as cflib does."""
+        sent = (self._vector(_millimetres(part)) for part in motion)
         self._c.desk_full_state(*sent, yaw_rad)
 
     def stop(self) -> None:

@@ -86,8 +86,16 @@ class EventSection(FileSection):
 
     at_s: float = Field(ge=0.0, le=LONGEST_S)
     do: Literal[
-        *("sensors-off", "sensors-on", "jump", "nan", "kick", "set", "radio-off", "radio-on"),
-        *("go-to", "land"),
+        "sensors-off",
+        "sensors-on",
+        "jump",
+        "nan",
+        "kick",
+        "set",
+        "radio-off",
+        "radio-on",
+        "go-to",
+        "land",
     ]
     name: str = ""
     """Parameter of the app to set, such as "tilt"."""
