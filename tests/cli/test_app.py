@@ -45,9 +45,7 @@ def test_a_broken_bound_fails() -> None:
 def test_what_cannot_be_flown_is_named(arguments: tuple[str, ...], message: str) -> None:
     """In one line."""
     Path("wrong.toml").write_text("heigt_m = 1.0\n", "utf-8")
-    Path("late.toml").write_text(
-        'duration_s = 1.0\n[[event]]\nat_s = 0.5\ndo = "set"\nname = "tild"\n', "utf-8"
-    )
+    Path("late.toml").write_text('[[event]]\nat_s = 0.5\ndo = "set"\nname = "tild"\n', "utf-8")
     _, error = run("fly", "crazyflie", "--app", "crazyflie", *arguments, code=2)
     assert message in unwrapped(error)
     assert not Path("flight").exists()

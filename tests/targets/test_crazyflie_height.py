@@ -147,7 +147,7 @@ def test_a_set_point_without_a_height_is_the_firmwares(lifting: Built) -> None:
 
 
 def test_a_lost_drone_descends_by_the_thrust_that_carried_it(lifting: Built) -> None:
-    """It flies on by its own thrust; then it descends by 3 % less than what the PID controller gave before."""
+    """It flies on by its own thrust; then it descends by 3 % less than the PID controller gave."""
     app = hovering(lifting)
     app.output.thrust = 40000.0
     for k in range(80):

@@ -200,7 +200,7 @@ def test_a_lost_position_is_told_and_ends_on_the_floor(built: Built) -> None:
     assert app.logged("lost") == 1
     assert "position lost" in app.console
     measured_for(app, 1800, measuring=False)
-    assert (app.logged("lost"), app.flown.mode.z) == (1, app.host.modeAbs)
+    assert (app.logged("lost"), app.flown.mode.z) == (1, app.host.modeDisable)
     measured_for(app, 300, measuring=False)
     assert app.logged("lost") == 2
     assert (app.flown.attitude.roll, app.flown.attitude.pitch) == (0.0, 0.0)
