@@ -2,6 +2,7 @@
 # make check      style, types, and the tests that need no compiler: what to run while editing
 # make test       set up everything, check style and types, run the tests; with CI=true also the long ones
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
+# make lowest     the tests that need no compiler, and those of a few commands, with the least versions of the dependencies
 # make thorough   the same with every case of the tests of which CI runs a sample
 # make proofs     make all proofs with Frama-C anew; CI makes only those that are not in tests/verify/proven.txt
 # make tools      install the compilers and emulators that the tests want, or say which
@@ -41,7 +42,14 @@ CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/r
     $(filter-out %/test_generations.py %/test_quadratic_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/drone/plant tests/drone/sensors
 
-.PHONY: fly check test thorough proofs tools generated docs evidence bench bench-peers clean
+# Beside them, with the least versions: the text of the bundles, the commands that derive, generate, fly and judge, and the
+# disassembler and emulator. It leaves out what compares bits of C and reference in every build, and what wants optional packages.
+LOWEST = build/lowest
+LOWEST_TESTED = $(filter-out tests/test_house.py tests/drone/plant,$(CHECKED)) tests/templates/test_generated.py tests/templates/test_parity.py \
+    tests/cli/test_design.py tests/cli/test_fly.py tests/cli/test_identify.py \
+    tests/experiment/margins/test_command.py tests/verify/test_bits.py tests/board/footprint/test_counts.py
+
+.PHONY: fly check test lowest thorough proofs tools generated docs evidence bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -55,6 +63,16 @@ check: $(SETUP_TEST)
 test: tools $(SETUP_TEST)
 	$(STYLE_AND_TYPES)
 	$(BIN)/python -m pytest -n auto --dist worksteal $(MARKED)
+	$(if $(filter true,$(CI)),$(MAKE) lowest)
+
+# Packages of that age use what newer ones deprecate.
+lowest:
+	$(PYTHON) -m venv --clear $(LOWEST)
+	sed -n 's/^ *"\([a-z0-9]*\)>=\([0-9.]*\)",$$/\1==\2/p' pyproject.toml > $(LOWEST)/least.txt
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint $(LOWEST)/least.txt \
+	    --editable . hypothesis jsonschema pytest pytest-xdist
+	@CI= PATH="$(CURDIR)/$(LOWEST)/bin:$$PATH" $(LOWEST)/bin/python -m pytest -q -n auto -W ignore::DeprecationWarning \
+	    $(LOWEST_TESTED)
 
 # All cases of the tests that CI samples too, and all proofs.
 thorough: MARKED = -m "thorough or not thorough"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mambo_sil.api.frames import FrameName, vectors_to_ned
-from mambo_sil.arguments import as_numbers, require_choice, require_number
+from mambo_sil.arguments import as_numbers, require, require_choice, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.names import CURVE_NAMES, CurveName
 from mambo_sil.flight.trajectories import (
@@ -30,6 +30,7 @@ from mambo_sil.flight.trajectories import (
     Trajectory,
     Waypoints,
     is_spatial,
+    is_trajectory,
     vertical_of,
 )
 
@@ -74,15 +75,20 @@ def sample(
     """Return where a curve is at times (...), with velocity and acceleration, in a frame by name.
 
     height_m: height of a curve that has none. x of the curve points north, or ahead with "NWU".
-    Raises ArgumentError for another frame, and for times that are no numbers.
+    Raises ArgumentError for what is no curve, for another frame, for times that are no finite numbers, and
+    for a curve that is not finite at one of them.
     """
+    require(is_trajectory(trajectory), "trajectory", trajectory, "have the methods target and acceleration")
     times_s = as_numbers("time_s", time_s)
+    require(bool(np.isfinite(times_s).all()), "time_s", time_s, "be finite")
     require_number("height_m", height_m, -1000.0, 1000.0)
     target, acceleration = trajectory.target(times_s), trajectory.acceleration(times_s)
     vertical = vertical_of(trajectory, times_s)
     if not is_spatial(trajectory):
         vertical = np.broadcast_to([height_m, 0.0, 0.0], vertical.shape)
     level = target[..., :2], target[..., 2:], acceleration
+    finite = all(bool(np.isfinite(part).all()) for part in (*level, vertical))
+    require(finite, "trajectory", trajectory, "be finite at these times")
     return CurvePoint(
         *(
             vectors_to_ned(frame, np.concatenate([plane, -vertical[..., axis : axis + 1]], axis=-1))

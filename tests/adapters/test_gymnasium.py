@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_nmpc import ArgumentError
 from mambo_sil.api.simulated import SimulatedDrone
 from mambo_sil.drone.vehicles import vehicle_toml
@@ -82,6 +83,32 @@ def test_a_crash_ends_the_episode() -> None:
     reward, info = next((reward, info) for _, reward, terminated, _, info in steps if terminated)
     assert reward == -10.0 - info["distance_m"]
     assert "status" not in info
+
+
+def test_an_action_of_nan_ends_no_flight_of_the_c_and_is_a_crash_of_a_policy() -> None:
+    """The C refuses a target of NaN and holds its command; an attitude of NaN costs 10, no lost drone."""
+    environment = make(action="target")
+    environment.reset(seed=3)
+    _, reward, terminated, _, info = environment.step(np.array([np.nan, 0.2]))
+    assert not terminated
+    assert info["status"] == int(Status.BAD_TARGET)
+    assert reward == -info["distance_m"]
+    environment = make(action="attitude")
+    environment.reset(seed=3)
+    seen, reward, terminated, _, info = environment.step(np.array([0.1, np.nan]))
+    assert terminated
+    assert reward == -10.0 - info["distance_m"]
+    assert info["distance_m"] < 0.5
+    assert np.isfinite(seen).all()
+
+
+def test_an_action_of_another_shape_is_refused_by_name() -> None:
+    """Not by the name of what is made of it."""
+    environment = make(action="attitude").unwrapped
+    environment.reset(seed=3)
+    for wrong in (0.1, [0.1, 0.2, 0.3], [[0.1, 0.2]]):
+        with pytest.raises(ArgumentError, match=r"action: has shape .*; it must be \(2,\)"):
+            environment.step(wrong)
 
 
 def test_wrong_arguments_are_refused() -> None:

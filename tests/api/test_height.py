@@ -41,6 +41,12 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleratio
             assert (found.status == 0).all()
         assert (ours.set_thrust([10.0, np.nan]) == theirs.set_thrust([10.0, np.nan])).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
+        for thrusts in ([10.0, expected.thrust_m_s2[1]], [10.5, 9.0]):  # told, commanded, told
+            assert (ours.set_command((0.05, -0.1)) == 0).all()
+            theirs.set_command(np.column_stack([[[0.05, -0.1]] * 2, thrusts]))
+            assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
+            ours.set_thrust([10.5, 9.0])
+            theirs.set_thrust([10.5, 9.0])
         assert (ours.set_command((0.1, 0.0), 11.0) == theirs.set_command([[0.1, 0.0, 11.0]] * 2)).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
         assert (ours.reset((0.1, 0.0), thrust_m_s2=[9.0, 8.0]) == 0).all()
@@ -92,7 +98,6 @@ def test_limits_of_the_height_are_arguments(tmp_path: Path) -> None:
         (lambda it: it.step(DroneState([0, 0], [0, 0], [0, 0, 0]), GOAL), "state: position_m has no z"),
         (lambda it: it.step(STATE, TargetState([0, 0, 0], [0, 0])), "target: velocity_m_s has no z"),
         (lambda it: it.step(STATE, GOAL, 9.81), r"thrust_acceleration_m_s2 = 9\.81 must be left out"),
-        (lambda it: it.set_command((0.0, 0.0)), r"thrust_m_s2 is missing; the settings have \[height\]"),
         (lambda it: it.set_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
         (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "grounded = 1 must be a truth value"),
         (lambda _: DroneState(REST, REST, REST, [True] * 3), r"grounded = .* or such of shape \(2,\)"),

@@ -15,7 +15,7 @@ from mambo_sil.flight.loop import fly
 from mambo_sil.flight.names import PD_NAMES, PdName
 from mambo_sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
-from tests.support.command import command, run, unwrapped
+from tests.support.command import HEARS_CTRL_C, command, run, unwrapped
 from tests.support.one_norm import ONE_NORM
 
 PLAIN = ("--json", "--no-pictures")
@@ -23,7 +23,7 @@ PLAIN = ("--json", "--no-pictures")
 
 def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
     """A signal in the middle of the imports: no traceback."""
-    (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    (tmp_path / "typer.py").write_text(f"{HEARS_CTRL_C}import os\nos.kill(os.getpid(), signal.SIGINT)\n")
     search = os.pathsep.join([str(tmp_path), *sys.path])
     done = subprocess.run(
         [sys.executable, "-m", "mambo_nmpc", "presets"],

@@ -1,4 +1,4 @@
-"""SIGTERM while the command starts: exit 143 at any time."""
+"""SIGTERM while the command starts: exit 143 at any time; SIGINT that is ignored stays so."""
 
 import subprocess
 import sys
@@ -39,3 +39,14 @@ def test_a_terminated_command_exits_with_143(when: str) -> None:
     line = [sys.executable, "-c", script, "presets"]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "")
+
+
+def test_a_command_started_with_ctrl_c_ignored_goes_on() -> None:
+    """As in the background of a script, where the shell ignores it: the command leaves that as it is."""
+    interrupted = DURING_COMMAND.replace("SIGTERM", "SIGINT")
+    ignored = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"
+    script = f"{ignored}\n{interrupted}\nfrom mambo_nmpc.__main__ import main\nmain()"
+    line = [sys.executable, "-c", script, "presets"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "mambo-1norm" in done.stdout

@@ -30,6 +30,7 @@ from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.metric_names import titled
+from tests.support.height_settings import height_settings
 from tests.support.tools import toolchain
 
 MAMBO = presets.preset("mambo")
@@ -61,6 +62,15 @@ def trace_of(x_m: list[float], speed_m_s: list[float], target_x_m: list[float]) 
 
 
 FLOWN = trace_of([0.0, 2.5, 3.5, 3.0], [0.0, 5.5, -6.0, 0.0], [0.0, 3.0, 3.0, 3.0])
+
+
+def between(floor_m: float, ceiling_m: float) -> Settings:
+    """Return settings of a controller of the height with a floor and a ceiling."""
+    fence = {"limits.fence.ceiling_m": ceiling_m, "limits.fence.floor_m": floor_m}
+    settings = height_settings()
+    for name, wall in fence.items():
+        settings = with_option(settings, name, wall)
+    return settings
 
 
 def values(found: LimitMetrics) -> list[float]:
@@ -95,22 +105,53 @@ def test_walls_of_the_settings_are_a_fence_too() -> None:
     for name, wall in (("y_min_m", -1.0), ("y_max_m", 1.0)):
         walled = with_option(walled, f"limits.fence.{name}", wall)
     assert walls_m(MAMBO) is None
-    assert walls_m(walled) == (-np.inf, -1.0, np.inf, 1.0)
+    assert walls_m(walled) == (-np.inf, -1.0, -np.inf, np.inf, 1.0, np.inf)
     assert measure_limits(FLOWN, walled, [Scenario()]).past_wall_m == [0.0]
     beside = replace(FLOWN, position_m=FLOWN.position_m[..., [1, 0, 2]])
     assert measure_limits(beside, walled, [Scenario()]).past_wall_m == [2.5]
 
 
+def test_floor_and_ceiling_are_walls_of_a_controller_of_the_height() -> None:
+    """Beside those along x and y, of the settings or set in flight; without [height] there are none."""
+    settings = between(0.5, 1.5)
+    assert walls_m(settings) == (-np.inf, -np.inf, 0.5, np.inf, np.inf, 1.5)
+    assert walls_m(settings, 2.0) == (-2.0, -2.0, 0.5, 2.0, 2.0, 1.5)
+    assert walls_m(between(0.0, 0.0)) is None
+    assert walls_m(settings.model_copy(update={"height": None})) is None
+
+
+@pytest.mark.parametrize(
+    ("heights_m", "past_m"),
+    [
+        ([1.0, 1.75, 1.6, 1.0], 0.25),  # above the ceiling
+        ([1.0, 0.375, 0.4, 1.0], 0.125),  # below the floor
+        ([0.0, 0.25, 1.0, 1.6], 0.1),  # from the ground: counts from the first time inside
+        ([0.5, 1.5, 0.5, 1.5], 0.0),
+    ],
+)
+def test_a_flight_is_past_floor_and_ceiling(heights_m: list[float], past_m: float) -> None:
+    """As past the walls along x and y; the largest counts."""
+    flown = trace_of([0.0, 0.0, 1.0, 0.0], [0.0] * 4, [0.0] * 4)
+    flown.position_m[:, 0, 2] = np.negative(heights_m)
+    for fence_m, expected in ((0.0, past_m), (2.0, past_m), (0.375, 0.625)):
+        found = measure_limits(flown, between(0.5, 1.5), [Scenario(fence_m=fence_m)])
+        assert found.past_wall_m == pytest.approx([expected])
+    assert measure_limits(flown, MAMBO, [Scenario()]).past_wall_m == [0.0]
+
+
 @pytest.mark.long
 def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
-    """One line for each wall, and none without a fence."""
+    """One line for each wall, and none without a fence; floor and ceiling in both pictures of the height."""
     trace = trace_of([0.0, 1.0], [0.0, 0.0], [0.0, 1.0])
-    fences = {"nothing": None, "two": (-np.inf, -1.0, np.inf, 1.0), "four": walls_m(MAMBO, 2.0)}
+    heights = np.zeros((2, 1, 2))
+    spatial = replace(trace, target=np.concatenate([trace.target, heights], axis=-1))
+    fences = {"two": walls_m(between(0.5, 1.5)), "nothing": None, "four": walls_m(MAMBO, 2.0)}
     dashes = []
     for name, walls in fences.items():
-        draw_flights({name: trace}, tmp_path / name, walls)
-        dashes.append((tmp_path / f"{name}.svg").read_text("utf-8").count("stroke-dasharray"))
-    assert dashes == [0, 2, 4]
+        for flown in (trace, spatial):
+            draw_flights({name: flown}, tmp_path / name, walls)
+            dashes.append((tmp_path / f"{name}.svg").read_text("utf-8").count("stroke-dasharray"))
+    assert dashes == [0, 4, 0, 0, 4, 4]
 
 
 @pytest.mark.long

@@ -171,7 +171,7 @@ def test_a_course_with_a_height_has_two_columns_more(tmp_path: Path) -> None:
 def test_one_changed_bit_of_an_array_changes_the_digest(name: str, trace: SensedTrace) -> None:
     """The digest covers times and every array of its flight, and nothing of the other."""
     values = getattr(trace, name).copy()
-    values.view(np.uint64)[(-1,) * values.ndim] ^= 1
+    values.view(np.uint64)[(-1,) * values.ndim] ^= np.uint64(1)
     changed = replace(trace, **{name: values})
     assert changed.digest(1) != trace.digest(1)
     assert (changed.digest(0) == trace.digest(0)) == (name != "time_s")

@@ -8,6 +8,9 @@ from typer.testing import CliRunner
 
 from mambo_sil.cli.app import app
 
+HEARS_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+"""Begins a script that Ctrl-C stops, also where the tests run with SIGINT ignored, which children inherit."""
+
 
 def run(*arguments: str, code: int = 0) -> tuple[str, str]:
     """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
@@ -28,9 +31,9 @@ def command(
 ) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc in `folder` and a session of its own, until all that hold its output have ended.
 
-    `script` is the Python that runs it.
+    `script` is the Python that runs it; Ctrl-C stops it.
     """
-    line = [sys.executable, "-c", script, *map(str, arguments)]
+    line = [sys.executable, "-c", HEARS_CTRL_C + script, *map(str, arguments)]
     return subprocess.run(
         line, cwd=folder, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
     )

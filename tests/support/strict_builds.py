@@ -48,6 +48,6 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     if method_of(settings).limiting is None:
         absent |= {"_host_set_limits", "_host_limits_active"}
     if settings.height is None:
-        absent |= {"_host_set_thrust"}
+        absent |= {"_host_set_thrust", "_host_last_thrust"}
     names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name not in absent]
     return SimpleNamespace(**{f"nmpc{name}": getattr(opened, f"{prefix}{name}") for name in names})

@@ -16,6 +16,9 @@ SUM_TYPES: Final[dict[str, str]] = C_TYPES | {"fixed": "long long"}
 _INDENT: Final = 4
 _WIDTH: Final = 110
 _SUFFIXES: Final[dict[str, str]] = {"float32": "f", "float64": ""}
+_LEAST_POSITIONAL: Final = 1e-4
+_SCIENTIFIC_FROM: Final[dict[str, float]] = {"float32": 1e6, "float64": 1e16}
+"""Magnitudes without an exponent; `str` of NumPy has other ones with each of its versions."""
 
 
 class Spelling:
@@ -61,7 +64,11 @@ def real(value: float, scalar: str) -> str:
     rounded = SCALARS[scalar](value)
     if not np.isfinite(rounded):
         raise ValueError(f"{value!r} has no {scalar} literal in C")
-    return f"{rounded!s}{_SUFFIXES[scalar]}"
+    if rounded == 0 or _LEAST_POSITIONAL <= abs(float(rounded)) < _SCIENTIFIC_FROM[scalar]:
+        digits = np.format_float_positional(rounded, trim="0")
+    else:
+        digits = np.format_float_scientific(rounded, trim="-", exp_digits=2)
+    return f"{digits}{_SUFFIXES[scalar]}"
 
 
 def fixed(value: float, bits: int) -> str:

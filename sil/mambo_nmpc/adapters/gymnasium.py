@@ -11,7 +11,7 @@ from mambo_sil.api.frames import command_in_frame, vectors_to_ned
 from mambo_sil.api.options import ControllerOptions
 from mambo_sil.api.simulated import LOST_M, SimulatedDrone
 from mambo_sil.api.states import TargetState
-from mambo_sil.arguments import require, require_choice, require_number
+from mambo_sil.arguments import of_shape, require, require_choice, require_number
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.names import CurveName
@@ -33,7 +33,8 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
                  by an altitude loop.
     observation: (15,) position, velocity, roll, pitch, yaw, then position and velocity of the curve less
                  those of the drone, in NWU: x ahead, y left, z up.
-    reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode.
+    reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode. An
+                 attitude of NaN is a crash; a target of NaN is refused by the C, which holds its command.
     info:        distance_m, speed_m_s, the limits tilt_limit_rad, speed_limit_m_s and braking_limit_m_s2, and
                  with "target" what the C says: status, saturated, active (`nmpc_limits_active`).
     """
@@ -72,8 +73,8 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         return self._observe({})
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Hold a command, or fly to a target, for one update period."""
-        scaled, said = self._scale * np.clip(np.asarray(action, np.float64), -1.0, 1.0), {}
+        """Hold a command, or fly to a target, for one update period; raises ArgumentError for a shape."""
+        scaled, said = self._scale * np.clip(of_shape("action", action, (2,)), -1.0, 1.0), {}
         command_rad = command_in_frame("NWU", scaled)
         height_m, climb_m_s, acceleration_m_s2 = (float(part[2]) for part in self._now)
         lift: Vertical | float = Vertical(-height_m, climb_m_s, acceleration_m_s2)
@@ -87,10 +88,12 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
             if outcome.thrust_m_s2 is not None:
                 lift = float(outcome.thrust_m_s2)
             said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
-        self._drone.advance(command_rad, lift)
+        flies = not np.isnan(command_rad).any()
+        if flies:
+            self._drone.advance(command_rad, lift)
         self._steps += 1
         observation, info = self._observe({name: int(x) for name, x in said.items() if x is not None})
-        crashed = self._drone.crashed
+        crashed = self._drone.crashed or not flies
         return observation, CRASH_REWARD * crashed - info["distance_m"], crashed, False, info
 
     @property

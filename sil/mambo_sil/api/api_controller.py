@@ -197,15 +197,17 @@ class Controller:
     def set_command(self, command_rad: ArrayLike, thrust_m_s2: ArrayLike | None = None) -> NDArray[np.int64]:
         """Tell that `command_rad`, one pair for all or (..., 2), was sent in place of the last commands.
 
-        With `[height]` in the settings `thrust_m_s2`, one value for all or (...), was sent beside it.
-        Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function, and for a
-        thrust that is missing or has no use.
+        With `[height]` in the settings `thrust_m_s2`, one value for all or (...), was sent beside it; without
+        it the thrust is what it was. Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no
+        such function, and for a thrust that has no use.
         """
         if self._method.setter != "set_command":
             norm = self.settings.cost.norm
             raise ArgumentError(
                 f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
             )
+        if thrust_m_s2 is None and self._method.has_height:
+            thrust_m_s2 = self._compiled.last_thrust_m_s2
         return self._compiled.set_command(self._commands(command_rad, thrust_m_s2))
 
     def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
@@ -303,11 +305,9 @@ class Controller:
             left_out, rule = thrust_m_s2 is None, "be left out: the settings have no [height]"
             require(left_out, "thrust_m_s2", thrust_m_s2, rule)
             return angles
-        if thrust_m_s2 is None:
-            raise ArgumentError("thrust_m_s2 is missing; the settings have [height]")
         return np.column_stack([angles, self._thrusts(thrust_m_s2)])
 
-    def _thrusts(self, thrust_m_s2: ArrayLike) -> FloatArray:
+    def _thrusts(self, thrust_m_s2: ArrayLike | None) -> FloatArray:
         """Return thrusts (n,) of one value, or of a batch; raises ArgumentError."""
         array = as_numbers("thrust_m_s2", thrust_m_s2)
         if array.ndim and array.size != self.n:

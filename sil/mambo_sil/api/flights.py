@@ -35,7 +35,7 @@ from mambo_sil.flight.scenario import (
     choose_sensors,
 )
 from mambo_sil.flight.traces import Trace
-from mambo_sil.flight.trajectories import CURVES, Trajectory
+from mambo_sil.flight.trajectories import CURVES, Trajectory, is_trajectory
 
 LARGEST_PUSH_M_S2: Final = 100.0
 
@@ -113,11 +113,11 @@ def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:
     for name, curve in CURVES.items():
         if isinstance(trajectory, str) and trajectory == name:
             return curve(size_m, rate_rad_s)
-    methods = (getattr(trajectory, name, None) for name in ("target", "acceleration"))
-    flown = not isinstance(trajectory, type) and all(map(callable, methods))
     rule = f"be {', '.join(map(spell, CURVES))} or an object with the methods target and acceleration"
-    require(flown, "trajectory", trajectory, rule)
-    return cast("Trajectory", trajectory)
+    require(is_trajectory(trajectory), "trajectory", trajectory, rule)
+    flown = cast("Trajectory", trajectory)
+    require(bool(np.isfinite(flown.target(0.0)).all()), "trajectory", trajectory, "be finite at 0 s")
+    return flown
 
 
 def _require_push(push_m_s2: object, flights: int) -> None:

@@ -17,8 +17,8 @@ from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, horizontal
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace
 
-Walls = tuple[float, float, float, float]
-"""x_min, y_min, x_max, y_max of a fence, m; infinity for no wall."""
+Walls = tuple[float, float, float, float, float, float]
+"""x_min, y_min, floor, x_max, y_max, ceiling of a fence, m, heights up; infinity for no wall."""
 
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
 HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
@@ -90,27 +90,21 @@ def measure_limits(trace: Trace, settings: Settings, scenarios: Sequence[Scenari
 
 
 def walls_m(settings: Settings, fence_m: float = 0.0) -> Walls | None:
-    """Return the fence of a flight: +/- `fence_m` if that is set, else that of the settings, if any."""
-    if fence_m:
-        return -fence_m, -fence_m, fence_m, fence_m
-    fence = settings.limits.fence
-    if not (fence.x_min_m < fence.x_max_m or fence.y_min_m < fence.y_max_m):
-        return None
-    low, high = (
-        [getattr(fence, f"{axis}_{end}_m") if _has_walls(settings, axis) else sign * np.inf for axis in "xy"]
-        for end, sign in (("min", -1), ("max", 1))
-    )
-    return low[0], low[1], high[0], high[1]
+    """Return the fence of a flight, with `fence_m` +/- that along x and y; None without any wall."""
+    fence, square = settings.limits.fence, (-fence_m, fence_m)
+    ends = [
+        square if fence_m else (fence.x_min_m, fence.x_max_m),
+        square if fence_m else (fence.y_min_m, fence.y_max_m),
+        (fence.floor_m, fence.ceiling_m) if settings.height else (0.0, 0.0),
+    ]
+    x, y, height = ((low, high) if low < high else (-np.inf, np.inf) for low, high in ends)
+    walls: Walls = x[0], y[0], height[0], x[1], y[1], height[1]
+    return walls if np.isfinite(walls).any() else None
 
 
 def nears_limit(trace: Trace, speed_limit_m_s: float) -> bool:
     """Return whether the first flight shows its speed: it came near the limit (0: none)."""
     return bool(0.0 < FAST * speed_limit_m_s < horizontal_speed_m_s(trace)[:, 0].max())
-
-
-def _has_walls(settings: Settings, axis: str) -> bool:
-    fence = settings.limits.fence
-    return bool(getattr(fence, f"{axis}_min_m") < getattr(fence, f"{axis}_max_m"))
 
 
 def _update(flight: Flight, scenario: Scenario) -> int:
@@ -133,9 +127,9 @@ def _past_wall_m(trace: Trace, row: int, settings: Settings, scenario: Scenario)
     walls = walls_m(settings, scenario.fence_m)
     if walls is None:
         return 0.0 * float(trace.position_m[-1, row, 0])
-    low, high = np.array(walls[:2]), np.array(walls[2:])
+    low, high = np.array(walls[:3]), np.array(walls[3:])
     since = trace.time_s >= (scenario.fence_time_s if scenario.fence_m else -np.inf)
-    position_m = trace.position_m[since, row, :2]
-    outside_m = np.maximum(np.maximum(low - position_m, position_m - high).max(axis=1), 0.0)
+    place_m = trace.position_m[since, row] * [1.0, 1.0, -1.0]  # the height is up
+    outside_m = np.maximum(np.maximum(low - place_m, place_m - high).max(axis=1), 0.0)
     inside = np.flatnonzero(outside_m == 0.0)
     return float(outside_m[inside[0] if len(inside) else 0 :].max())

@@ -87,7 +87,7 @@ def _draw_column(
     path.set_title(title, loc="left", pad=20, parse_math=False)  # above the legend
     path.set(xlabel="x (north), m", aspect="equal")
     if heights:
-        _draw_heights(heights, trace)
+        _draw_heights(heights, trace, walls)
     error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
     error.set_ylim(0, None)
     for axis, axes in enumerate(angles):
@@ -109,20 +109,23 @@ def _draw_speed(axes: Axes, trace: Trace, limit_m_s: float) -> None:
 
 def _draw_walls(path: Axes, walls: Walls) -> None:
     """Draw the walls of a fence in a path seen from above."""
-    for x_m, y_m in (walls[:2], walls[2:]):
+    for x_m, y_m, _ in (walls[:3], walls[3:]):
         if math.isfinite(x_m):
             path.axvline(x_m, **_BOUND)
         if math.isfinite(y_m):
             path.axhline(y_m, **_BOUND)
 
 
-def _draw_heights(axes: Sequence[Axes], trace: Trace) -> None:
-    """Draw the height of the first flight along x and over time."""
+def _draw_heights(axes: Sequence[Axes], trace: Trace, walls: Walls | None) -> None:
+    """Draw the height of the first flight along x and over time, with floor and ceiling of a fence."""
     target_m, flown_m = trace.target_height_m[:, 0], -trace.position_m[:, 0, 2]
     abscissae = (trace.target[:, 0, 0], trace.position_m[:, 0, 0]), (trace.time_s, trace.time_s)
     for place, (targets, flown) in zip(axes, abscissae, strict=True):
         place.plot(targets, target_m, color=TARGET, linewidth=BROAD)
         place.plot(flown, flown_m, color=FLOWN)
+        for height_m in (walls[2], walls[5]) if walls else ():
+            if math.isfinite(height_m):
+                place.axhline(height_m, **_BOUND)
     axes[0].set(xlabel="x (north), m")
     axes[0].set_aspect("equal", adjustable="datalim")
 

@@ -44,7 +44,7 @@ class FlightSummary(ReportedSummary):
     metrics: dict[str, Number]
     metrics_without_transient: dict[str, Number] | None = None
     metrics_as_seen: dict[str, Number] | None = None
-    walls_m: tuple[Number, Number, Number, Number] | None = None
+    walls_m: tuple[Number, Number, Number, Number, Number, Number] | None = None
     """x_min, y_min, x_max, y_max, if there is a fence; None for no wall."""
     speed_limit_m_s: float | None = None
     """The speed limit, if the flight came near it."""

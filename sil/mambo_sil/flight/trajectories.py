@@ -343,6 +343,12 @@ class Trajectories:
         return {id(one): one for one in self.each}.values()
 
 
+def is_trajectory(value: object) -> bool:
+    """Return whether `value` is an object with the methods of a trajectory; a class is none."""
+    methods = (getattr(value, name, None) for name in ("target", "acceleration"))
+    return not isinstance(value, type) and all(map(callable, methods))
+
+
 def is_spatial(trajectory: Trajectory) -> bool:
     """Return whether a trajectory, or any of several, has a height."""
     if isinstance(trajectory, Trajectories):

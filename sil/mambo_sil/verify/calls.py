@@ -96,7 +96,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
     return np.dtype(
         [("status", np.int32)]
         + [
-            (name, method.numbers.type_of(quantity[name][0]), values[0].size)
+            (name, method.numbers.type_of(quantity[name][0]), (values[0].size,))
             if quantity.get(name)
             else (name, np.int32)
             for name, values in left.items()

@@ -118,7 +118,7 @@ def test_uncertainty_takes_the_ends_of_the_intervals() -> None:
         (("--campaign", "default", "--sensors", "mocap"), "--sensors: sensors = "),
         (("--sensors", "mocap"), "vehicle mambo has sensors.kind"),
         (("--vehicle", ""), "must not be empty"),
-        (("--drones", "0"), "greater than or equal to 1"),
+        (("--drones", "0"), "Invalid value for '--drones'"),
         (("missing.toml",), "missing.toml"),
         (("slow.toml", "--vehicle", "crazyflie"), "update_period_s"),
     ],

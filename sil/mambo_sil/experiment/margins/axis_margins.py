@@ -214,7 +214,8 @@ def _rms(answer: NDArray[np.complex128], theta: FloatArray) -> FloatArray:
     power = np.abs(answer) ** 2
     theta = np.concatenate([[0.0], theta])
     power = np.concatenate([power[:1], power])
-    return np.asarray(np.sqrt(np.trapezoid(power, theta, axis=0) / math.pi))
+    areas = np.diff(theta) * (power[1:] + power[:-1]).T / 2.0
+    return np.asarray(np.sqrt(areas.sum(axis=-1).T / math.pi))
 
 
 def measure_poles(loop: PeriodicLoop) -> Poles:

@@ -137,9 +137,19 @@ class CompiledController:
 
         Raises ValueError without a height in the settings.
         """
-        if not self._method.has_height:
-            raise ValueError("the settings have no height")
+        self._demand_height()
         return self._set_each(self._library.nmpc_host_set_thrust, np.asarray(thrust_m_s2)[:, None], THRUST)
+
+    @property
+    def last_thrust_m_s2(self) -> NDArray[np.float64]:
+        """The thrusts over mass (n,) that were last commanded, set or told.
+
+        Raises ValueError without a height in the settings.
+        """
+        self._demand_height()
+        thrusts = np.empty(self.n, self._numbers.type_of(*THRUST))
+        self._library.nmpc_host_last_thrust(self._controllers, self.n, _address(thrusts))
+        return self._numbers.to_si(thrusts, *THRUST).astype(np.float64)
 
     def slew_heading(
         self, previous_rad: ArrayLike, wanted_rad: ArrayLike, most_change_rad: float
@@ -200,6 +210,10 @@ class CompiledController:
             function(controllers, n, *given, addresses)
 
         return step
+
+    def _demand_height(self) -> None:
+        if not self._method.has_height:
+            raise ValueError("the settings have no height")
 
     def _demand_limits(self) -> None:
         if self._method.limiting is None:

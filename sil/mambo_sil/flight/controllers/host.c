@@ -66,6 +66,16 @@ void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_
         status[i] = (int)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
     }
 }
+
+/* The thrusts that were last commanded, set or told. */
+void nmpc_host_last_thrust(const nmpc_t *controllers, int n, nmpc_real_t *thrust_m_s2)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        thrust_m_s2[i] = controllers[i].height.thrust_m_s2;
+    }
+}
 #endif
 
 #ifdef NMPC_LIMIT_SPEED

@@ -1,0 +1,185 @@
+"""Figures in prose: each equals what a command printed when its evidence was made.
+
+A table that a page includes is written by its command; a figure in a sentence is typed by hand, and stays
+when the command prints another one. So a sentence with such a figure has a row in `FIGURES`:
+
+    Figure("docs/how-to/arduino.md", r"preset `mambo` takes (.+?) % of its period", lambda: ...)
+
+- the file, from the root of the repository;
+- a pattern that occurs once in its text, in which each run of blanks and line ends is one blank; its one
+  group is the figure, or several with the words between them;
+- a function that returns the group as it must be: from a stamp of evidence (`figures("footprint")`, what is
+  in docs/evidence/data/footprint.json under "figures"), or from the code itself if that takes no time.
+
+A figure in a console block of a tutorial or a how-to needs no row: `test_console` compares it.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure in a sentence: where it stands, and what it must be."""
+
+    page: str
+    pattern: str
+    expected: Callable[[], str]
+
+
+@cache
+def figures(item: str) -> Any:
+    """Return the figures of an item of evidence."""
+    return json.loads((ROOT / "docs" / "evidence" / "data" / f"{item}.json").read_text("utf-8"))["figures"]
+
+
+def board(name: str, controller: str = "mambo") -> Any:
+    """Return the footprint of a controller on a board."""
+    return next(one for one in figures("footprint")[controller] if one["name"] == name)
+
+
+def instructions(name: str, controller: str = "mambo", kind: str = "mean") -> str:
+    """Return instructions of a step."""
+    return f"{board(name, controller)['instructions'][kind]:.0f}"
+
+
+def step_us(name: str) -> str:
+    """Return the least and the longest time of a step in microseconds."""
+    least_s, most_s = board(name)["time_s"]
+    return f"{1e6 * least_s:.0f} to {1e6 * most_s:.0f}"
+
+
+def period_percent(name: str) -> str:
+    """Return the longest time of a step of preset `mambo` as a share of its update period of 10 ms."""
+    return f"{100 * board(name)['time_s'][1] / 0.01:.2g}"
+
+
+def size(name: str) -> str:
+    """Return stack, flash, RAM and time of preset `mambo`."""
+    found = board(name)
+    flash = f"{found['flash_bytes'] / 1000:.1f} KB"
+    return f"{found['stack_bytes']} B, {flash}, {found['ram_bytes']} B, {step_us(name)} us"
+
+
+def times_in_float64() -> str:
+    """Return how many times the instructions of float32 float64 takes on the Crazyflie."""
+    double = board("crazyflie", "mambo --scalar float64")["instructions"]["mean"]
+    return f"{double / board('crazyflie')['instructions']['mean']:.0f}"
+
+
+def shown(value: float, digits: int = 2) -> str:
+    """Return a figure with so many digits, without zeros behind the point."""
+    return f"{value:.{digits}g}"
+
+
+def without_limits(figure: str) -> float:
+    """Return a worst figure of preset `mambo` after a step of 30 m, of eight headings, without limits."""
+    one = next(one for one in figures("limits")["rows"] if one["case"] == "state known, no limits")
+    return float(one[figure].partition(", ")[2])
+
+
+def in_crazyflow(controller: str) -> str:
+    """Return the RMS error on the eight with noise of crazyflow's cf2x_L250, fitted to flights, in mm."""
+    found = figures("simulators")["cf2x_L250, fitted"][controller]["eight"]["noise"]
+    return shown(sorted(found)[len(found) // 2])
+
+
+def ratio_of_pid(index: str) -> float:
+    """Return the median, over 1000 random drones, of the tuned PID's index divided by that of `mambo`."""
+    found = figures("opponents")["improvements"]
+    return next(
+        float(one["median"]) for one in found if (one["controller"], one["index"]) == ("mambo", index)
+    )
+
+
+FIXED = "mambo --scalar fixed"
+BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
+WORK = "docs/evidence/constant-work.md"
+FIGURES = [
+    Figure(BOARDS, r"float32 takes (\d+) instructions on an ARM926", lambda: instructions("mambo")),
+    Figure(BOARDS, r"ARM926, and fixed point (\d+)", lambda: instructions("mambo", FIXED)),
+    Figure(BOARDS, r"takes \*\*(\S+) KB of flash", lambda: f"{board('crazyflie')['flash_bytes'] / 1000:.1f}"),
+    Figure(BOARDS, r"KB of flash, (\d+) B of RAM", lambda: str(board("crazyflie")["ram_bytes"])),
+    Figure(BOARDS, r"RAM and (\d+) instructions a step", lambda: instructions("crazyflie")),
+    Figure(BOARDS, r"Cortex-M4F\*\*, (\d+ to \d+) us", lambda: step_us("crazyflie")),
+    Figure(BOARDS, r"most of the Mega's (\d+) B", lambda: str(board("mega")["ram_bytes"])),
+    Figure(BOARDS, r"in software: (\d+) times the instructions", times_in_float64),
+    Figure(ARDUINO, r"preset `mambo` takes (\S+) % of its period", lambda: period_percent("mega")),
+    Figure(ARDUINO, r"on a Teensy 4.1 (\S+) %", lambda: period_percent("teensy41")),
+    Figure("docs/how-to/own-firmware.md", r"on a Cortex-M4F: (.+?) \(modelled\)", lambda: size("crazyflie")),
+    Figure(WORK, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
+    Figure(WORK, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
+    Figure("docs/evidence/benchmarks.md", r"(\d+) a step for `mambo`", lambda: instructions("crazyflie")),
+    Figure(
+        "docs/evidence/benchmarks.md",
+        r"for `mambo`, (\d+) for `mambo-1norm`",
+        lambda: instructions("crazyflie", "mambo-1norm"),
+    ),
+    Figure("README.md", r"(\d+ to \d+) us a step\*\*", lambda: step_us("crazyflie")),
+    Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie")),
+    Figure("README.md", r"\[(\d+) instructions instead of", lambda: instructions("mambo", FIXED)),
+    Figure("README.md", r"instructions instead of (\d+)\]", lambda: instructions("mambo")),
+    Figure("README.md", r"the paper's PD (\d+) cm, this MPC", lambda: shown(figures("space")["pd"])),
+    Figure("README.md", r"altitude loop (\d+) cm", lambda: shown(figures("space")["preset"])),
+    Figure("README.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
+    Figure("README.md", r"three axes (\S+) cm", lambda: shown(figures("space")["third-axis"])),
+    Figure("README.md", r"PID has (\S+) times", lambda: f"{ratio_of_pid('seen_iae_m_s'):.1f}"),
+    Figure(
+        "README.md", r"mostly drift, is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"
+    ),
+    Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
+    Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
+    Figure(
+        "README.md",
+        r"(\S+) mm with Mellinger",
+        lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
+    ),
+    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("first")["pd"])),
+    Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
+    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),
+    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("first")["mambo"], 1)),
+    Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
+    Figure(
+        "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)
+    ),
+    Figure(
+        "docs/reference/c-api.md",
+        r"quadratic, (\d+ to \d+) instructions",
+        lambda: f"{instructions('crazyflie', kind='least')} to {instructions('crazyflie', kind='most_met')}",
+    ),
+]
+
+
+def fault(figure: Figure, text: str) -> str:
+    """Return what is wrong with a figure in the text of its page, "" if nothing."""
+    found = re.findall(figure.pattern, " ".join(text.split()))
+    if len(found) != 1:
+        return f"{figure.page}: {figure.pattern!r} occurs {len(found)} times, and should once"
+    expected = figure.expected()
+    return (
+        "" if found[0] == expected else f"{figure.page}: {figure.pattern!r}: {found[0]}, should be {expected}"
+    )
+
+
+@pytest.mark.parametrize("figure", FIGURES, ids=lambda figure: f"{figure.page}: {figure.pattern}")
+def test_a_figure_in_a_sentence_is_what_its_command_prints(figure: Figure) -> None:
+    """Where the evidence has another figure the page is wrong."""
+    assert fault(figure, (ROOT / figure.page).read_text("utf-8")) == ""
+
+
+def test_a_wrong_a_missing_and_a_doubled_figure_are_found() -> None:
+    """With the page, the sentence, and what the figure should be."""
+    figure = Figure("page.md", r"takes (\d+) B", lambda: "411")
+    assert fault(figure, "It takes\n411 B.") == ""
+    assert fault(figure, "It takes 395 B.") == r"page.md: 'takes (\\d+) B': 395, should be 411"
+    assert "occurs 0 times" in fault(figure, "It takes room.")
+    assert "occurs 2 times" in fault(figure, "It takes 411 B, and takes 411 B.")
