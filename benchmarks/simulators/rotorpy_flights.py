@@ -30,7 +30,7 @@ from mambo_sil.model.derive.derived_settings import controller_text
 
 SEEDS: Final = (0, 1, 2, 3, 4)
 CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")
-DRONE: Final = vehicle_toml.read(Path(__file__).parents[1] / "rotorpy_crazyflie.toml")
+DRONE: Final = vehicle_toml.read(Path(__file__).with_name("rotorpy_crazyflie.toml"))
 MASS_KG: Final = float(quad_params["mass"])
 State = dict[str, Any]
 

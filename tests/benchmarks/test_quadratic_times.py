@@ -5,7 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.quadratic_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
+from benchmarks.peers.quadratic_times import (
+    OURS,
+    SETTINGS,
+    Array,
+    build,
+    one_pass,
+    share_limited,
+    write_problem,
+)
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.method import Quadratic

@@ -1,7 +1,7 @@
 """Settings around preset mambo: what they fly, and what they stand.
 
-    python -m benchmarks.margin_front measure     flights and margins, into build/margins; 20 min on a core
-    python -m benchmarks.margin_front evidence    print the table, draw the picture of the manual
+    python -m benchmarks.margins.front measure     flights and margins, into build/margins; 20 min on a core
+    python -m benchmarks.margins.front evidence    print the table, draw the picture of the manual
 
 Seeds are of no other campaign. It continues where it was stopped.
 """
@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from benchmarks.evidence.item import PAGES
-from benchmarks.margin_evidence import RINGING_RAD
-from benchmarks.margin_flights import BATCH, FOLDER, FREQUENCIES, SLOW_MOTORS
+from benchmarks.margins.flights import BATCH, FOLDER, FREQUENCIES, SLOW_MOTORS
+from benchmarks.margins.report import RINGING_RAD
 from benchmarks.markdown import table
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from benchmarks.markdown import table
-from benchmarks.ours import Ours
-from benchmarks.peers_setups import PEERS
-from benchmarks.programs import NotHereError, Program, run_tool
-from benchmarks.times_report import FLAGS
+from benchmarks.peers.ours import Ours
+from benchmarks.peers.programs import NotHereError, Program, run_tool
+from benchmarks.peers.setups import PEERS
+from benchmarks.peers.times_report import FLAGS
 from mambo_codegen.methods.quadratic.controller import QuadraticController
 from mambo_codegen.methods.quadratic.law import second_derivatives
 from mambo_codegen.methods.quadratic.method import Quadratic

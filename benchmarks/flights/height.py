@@ -44,7 +44,7 @@ from mambo_sil.flight.trajectories import CURVES, Circle, Hover, InSpace, Positi
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 
-SETTINGS: Final = Path(__file__).parent / "evidence" / "height.toml"
+SETTINGS: Final = Path(__file__).parents[1] / "evidence" / "height.toml"
 HEADINGS: Final = 8
 SEEN_HEIGHT, GROUNDED = 7, 9
 """Columns of the states of controllers of the height."""

@@ -1,6 +1,6 @@
 """The peers: how each generates C for the problem, as in its documentation, and how that C is built.
 
-`python -m benchmarks.peers_setups NAME FOLDER` runs in the Python that has the peers and imports nothing of
+`python -m benchmarks.peers.setups NAME FOLDER` runs in the Python that has the peers and imports nothing of
 ours. The last line on stdout is JSON: the versions of the peer's packages.
 """
 # ruff: noqa: PLC0415 - a set-up imports only its own peer, since others may be missing
@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.problem import (
+from benchmarks.peers.problem import (
     CHANGES,
     CONTROL,
     EFFORT,
@@ -35,7 +35,7 @@ from benchmarks.problem import (
     move_at,
     quadratic,
 )
-from benchmarks.programs import ROOT, Program, run_tool
+from benchmarks.peers.programs import ROOT, Program, run_tool
 
 PYTHON: Final = ROOT / "build/peers/bin/python"
 """The Python that has the peers, which the Makefile sets up."""
@@ -50,7 +50,7 @@ class Peer(Program):
 
     def write(self, folder: Path) -> dict[str, str]:
         """Run the set-up in the peers' Python."""
-        line = [str(PYTHON), "-m", "benchmarks.peers_setups", self.name, str(folder)]
+        line = [str(PYTHON), "-m", "benchmarks.peers.setups", self.name, str(folder)]
         versions: dict[str, str] = json.loads(run_tool(line).splitlines()[-1])
         return versions
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from benchmarks.problem import STEP_S
-from benchmarks.programs import Program
+from benchmarks.peers.problem import STEP_S
+from benchmarks.peers.programs import Program
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option

@@ -1,6 +1,6 @@
 """Fly what the pages of the adapters show, in crazyflow, RotorPy and Gymnasium; write paths. Takes a minute.
 
-    python -m benchmarks.adapters FOLDER
+    python -m benchmarks.simulators.adapters FOLDER
 
 wants the extras `crazyflow`, `rotorpy` and `gymnasium`.
 """

@@ -1,7 +1,7 @@
 """Search the gains of a law with feed-forward on random flights of a drone through its sensors.
 
-python -m benchmarks.feedforward pd-feedforward             takes five minutes
-python -m benchmarks.feedforward pid-feedforward [VEHICLE]  takes ten minutes
+python -m benchmarks.gains.feedforward pd-feedforward             takes five minutes
+python -m benchmarks.gains.feedforward pid-feedforward [VEHICLE]  takes ten minutes
 
 Three curves with 60 flights of 40 s each. Sizes and rates, headings, drones, wind, sensors and links differ
 from flight to flight, as in a campaign. The error of a candidate is the geometric mean over the curves of the

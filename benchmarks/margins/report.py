@@ -1,4 +1,4 @@
-"""What the flights of `benchmarks.margin_flights` say of margins: tables and the picture of docs/evidence."""
+"""What the flights of `benchmarks.margins.flights` say of margins: tables, and the picture of the manual."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -99,7 +99,7 @@ class DrawnDrones:
 
 
 def read(folder: Path, campaign: str, controller: str) -> DrawnDrones:
-    """Return the drones of a file of `benchmarks.margin_flights`."""
+    """Return the drones of a file of `benchmarks.margins.flights`."""
     lines = (folder / f"{campaign}-{controller}.jsonl").read_text("utf-8").splitlines()
     return DrawnDrones([json.loads(line) for line in lines])
 
@@ -111,8 +111,6 @@ def rank(first: FloatArray, second: FloatArray) -> float:
         return float("nan")
     return float(spearmanr(*values).statistic)
 
-
-DRAWS: Final = ("noise_scale", "motor_lag_s")
 
 CASES: Final = (
     ("default", "mambo"),

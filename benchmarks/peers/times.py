@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
-from benchmarks.host_builds import build, plans, silence, sizes
-from benchmarks.ours import ONE_NORM, PEERS_MODEL, bundle
-from benchmarks.peers_setups import PEERS
-from benchmarks.programs import BENCHMARKS, ROOT, NotHereError, Program, run_tool
-from benchmarks.states import Inputs, state_sets
-from benchmarks.times_report import COLD, FLAGS, Row, Timing, write_report
+from benchmarks.peers.host_builds import build, plans, silence, sizes
+from benchmarks.peers.ours import ONE_NORM, PEERS_MODEL, bundle
+from benchmarks.peers.programs import HERE, ROOT, NotHereError, Program, run_tool
+from benchmarks.peers.setups import PEERS
+from benchmarks.peers.states import Inputs, state_sets
+from benchmarks.peers.times_report import COLD, FLAGS, Row, Timing, write_report
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
@@ -176,7 +176,7 @@ def main() -> None:
         rows = [row for row, _ in prepared]
         libraries = {key: path for _, built in prepared for key, path in built.items()}
         timer = work / "timing.so"
-        line = [*host_toolchain().command, "-O2", "-shared", "-fPIC", str(BENCHMARKS / "timing.c")]
+        line = [*host_toolchain().command, "-O2", "-shared", "-fPIC", str(HERE / "timing.c")]
         run_tool([*line, "-o", str(timer)])
         print("timing", file=sys.stderr)
         before = os.getloadavg()[0]

@@ -13,8 +13,8 @@ import numpy as np
 from elftools.elf.elffile import ELFFile
 from numpy.typing import NDArray
 
-from benchmarks.ours import Ours
-from benchmarks.programs import BENCHMARKS, Program, run_tool
+from benchmarks.peers.ours import Ours
+from benchmarks.peers.programs import HERE, Program, run_tool
 from mambo_codegen.toolchain import host_toolchain
 
 Array = NDArray[Any]
@@ -37,7 +37,7 @@ def build(program: Program, folder: Path, flags: str, library: Path) -> Path:
     line = [*compiler, *_COMMON, *flags.split(), f"-ffp-contract={contract}"]
     objects = program.compile(line, folder, work)
     objects.append(str(work / "heap_calls.o"))
-    run_tool([*c, "-O2", "-fPIC", "-c", str(BENCHMARKS / "glue/heap_calls.c"), "-o", objects[-1]])
+    run_tool([*c, "-O2", "-fPIC", "-c", str(HERE / "glue/heap_calls.c"), "-o", objects[-1]])
     wrapped = [f"-Wl,--wrap={name}" for name in _ALLOCATORS]
     link = [*compiler, "-shared", "-Wl,--gc-sections", "-Wl,-Bsymbolic", *wrapped, *objects]
     run_tool([*link, "-lm", "-o", str(library)])

@@ -1,7 +1,8 @@
 """Footprint of the peers' generated C on a Crazyflie, measured like ours, for one problem.
 
-`python -m benchmarks.peers` prints the table of docs/evidence/peers.md. The row of a peer that cannot be
-generated or built states the reason. The peers are those of `make bench-peers`; their C needs newlib.
+`python -m benchmarks.peers.footprints` prints the table of docs/evidence/peers.md. The row of a peer that
+cannot be generated or built states the reason. The peers are those of `make bench-peers`; their C needs
+newlib.
 """
 
 import re
@@ -14,9 +15,9 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from benchmarks.markdown import table
-from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle
-from benchmarks.peers_setups import DOUBLE, PEERS
-from benchmarks.programs import NotHereError, Program, run_tool
+from benchmarks.peers.ours import ONE_NORM, PEERS_MODEL, Ours, bundle
+from benchmarks.peers.programs import NotHereError, Program, run_tool
+from benchmarks.peers.setups import DOUBLE, PEERS
 from mambo_codegen import boards
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render

@@ -1,4 +1,4 @@
-"""Table and plot of `benchmarks/times.py`."""
+"""Table and plot of `benchmarks/peers/times.py`."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from benchmarks.markdown import table
-from benchmarks.programs import Program
+from benchmarks.peers.programs import Program
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, ORANGE, PAGE_INCHES, QUIET, THIN, style
 

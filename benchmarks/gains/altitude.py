@@ -1,13 +1,13 @@
 """Search the gains of the altitude loop `pid` on random flights of a drone through its sensors.
 
-python -m benchmarks.altitude [VEHICLE]   takes some minutes
+python -m benchmarks.gains.altitude [VEHICLE]   takes some minutes
 
 Three curves in space with 60 flights of 15 s each, under the PID with feed-forward for roll and pitch. Sizes
 and rates, headings, drones, wind, sensors and links differ from flight to flight, as in a campaign: so weight
 and thrust are wrong by up to a fifth. The error of a candidate is the geometric mean over the curves of the
 median rms error of the height; that of a crashed flight is infinite. A candidate that crashes more often than
-the vehicle's own loop is out. Search and choice are those of benchmarks/feedforward.py, with the variation of
-the thrust in place of that of the command.
+the vehicle's own loop is out. Search and choice are those of `feedforward.py`, with the variation of the
+thrust in place of that of the command.
 """
 
 import sys
@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.feedforward import Judged, choose, drawn_flights, row, search
+from benchmarks.gains.feedforward import Judged, choose, drawn_flights, row, search
 from benchmarks.markdown import table
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw, HeightGains, pid_altitude_gains

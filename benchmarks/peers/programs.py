@@ -12,8 +12,8 @@ from typing import Final, Literal
 
 Cost = Literal["1-norm", "quadratic", "quadratic, other problem"]
 
-ROOT: Final = Path(__file__).parents[1]
-BENCHMARKS: Final = ROOT / "benchmarks"
+ROOT: Final = Path(__file__).parents[2]
+HERE: Final = Path(__file__).parent
 
 
 class NotHereError(Exception):
@@ -67,8 +67,8 @@ class Program(ABC):
     def compile(self, line: list[str], folder: Path, work: Path) -> list[str]:
         """Compile sources and glue with the command `line`; returns the object files, which are in `work`."""
         objects: list[str] = []
-        for source in [*self.files(folder), BENCHMARKS / self.glue]:
+        for source in [*self.files(folder), HERE / self.glue]:
             objects.append(str(work / f"{len(objects)}.o"))
-            flags = [*self.definitions(folder), f"-I{BENCHMARKS / 'glue'}"]
+            flags = [*self.definitions(folder), f"-I{HERE / 'glue'}"]
             run_tool([*line, self.dialect, *flags, "-c", str(source), "-o", objects[-1]])
         return objects

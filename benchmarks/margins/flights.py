@@ -1,7 +1,7 @@
 """Do margins predict flights? Margins of drawn drones beside what these drones fly.
 
-    python -m benchmarks.margin_flights measure     margins and flights, into build/margins; 40 min on a core
-    python -m benchmarks.margin_flights evidence    print tables, draw the picture of docs/evidence/margins.md
+    python -m benchmarks.margins.flights measure     margins and flights, into build/margins; 40 min on a core
+    python -m benchmarks.margins.flights evidence    print tables, draw the picture of the manual
 
 It continues where it was stopped.
 """
@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.margin_evidence import write
+from benchmarks.margins.report import write
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import preset
