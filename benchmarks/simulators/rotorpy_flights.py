@@ -157,7 +157,7 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
 
 def measure(folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """Return the scores by challenger and mission, and the paths of the first seed on the circle (k, 3)."""
-    text, found = identified(fly_log(), folder / "rotorpy.csv")
+    text, found = identified(fly_log(), folder / "rotorpy.csv", MASS_KG)
     (folder / "rotorpy.toml").write_text(text, "utf-8")
     described = controller_toml.parse(controller_text(DRONE, DRONE.name), DRONE.name)
     challengers: dict[str, Challenger | Geometric] = {

@@ -108,6 +108,14 @@ def identify(
             metavar="SIGNAL=COLUMN,...",
         ),
     ] = "",
+    mass_kg: Annotated[
+        float | None,
+        typer.Option(
+            help="Mass with battery, for vehicle.toml: no log shows it. Without it the file has none.",
+            min=0.001,
+            max=100,
+        ),
+    ] = None,
     manoeuvre: Annotated[
         Path | None,
         typer.Option(
@@ -122,8 +130,9 @@ def identify(
     When you have a drone that flies: its log becomes the model for which `design` derives settings.
     """
     if manoeuvre is not None:
-        if logs or columns:
-            raise typer.BadParameter("is used without logs and without --columns", param_hint="--manoeuvre")
+        if logs or columns or mass_kg is not None:
+            words = "is used without logs, --columns and --mass-kg"
+            raise typer.BadParameter(words, param_hint="--manoeuvre")
         from mambo_sil.model.identify.manoeuvre import write_manoeuvre
 
         typer.echo(write_manoeuvre(manoeuvre))
@@ -151,7 +160,7 @@ def identify(
             draw_fit(folder / CURVES, summary.split_s, summary.verdicts, folder / "fit")
             if summary.good:
                 (folder / MODEL).write_text(model_text(summary), "utf-8")
-                (folder / VEHICLE).write_text(vehicle_text(summary), "utf-8")
+                (folder / VEHICLE).write_text(vehicle_text(summary, mass_kg), "utf-8")
             summary.write(folder)
     show(summary, identify_text(summary), as_json=as_json)
     models = (MODEL, VEHICLE) if summary.good else ()
