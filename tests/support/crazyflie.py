@@ -12,12 +12,15 @@ import numpy as np
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings.model import Settings
+from mambo_sil.board import desk
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from tests.support.bundles import place
 from tests.support.shell import shell
 from tests.support.tools import require
 
-STUBS: Final = Path(__file__).parent.parent / "targets" / "crazyflie_stubs"
+STAND_INS: Final = Path(desk.__file__).parent / "stand_ins"
+"""Headers in the place of the firmware's."""
+HOST: Final = Path(__file__).parent.parent / "targets" / "crazyflie_host.c"
 FIRMWARE_FLAGS: Final = (
     *("-Os", "-std=gnu11", "-fno-math-errno", "-fno-strict-aliasing", "-fno-strict-overflow"),
     *("-fomit-frame-pointer", "-ffunction-sections", "-fdata-sections"),
@@ -37,7 +40,7 @@ TURNED: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -math.pi / 6.0])
 """A state at rest in the origin, heading to the left by 30 degrees."""
 
 _TYPES = "".join(
-    line for line in (STUBS / "stabilizer_types.h").read_text("utf-8").splitlines(True) if line[0] != "#"
+    line for line in (STAND_INS / "stabilizer_types.h").read_text("utf-8").splitlines(True) if line[0] != "#"
 )
 _INTERFACE: Final = cffi.FFI()
 _INTERFACE.cdef(
@@ -64,7 +67,7 @@ _INTERFACE.cdef(
 def compile_host(source: Path, output: Path, *flags: str) -> Path:
     """Compile a source for this machine with the firmware's flags and `flags`; return the object."""
     shell(
-        *(require("gcc", "gcc"), *FIRMWARE_FLAGS, *flags, f"-I{STUBS}", f"-I{source.parent}", "-fPIC"),
+        *(require("gcc", "gcc"), *FIRMWARE_FLAGS, *flags, f"-I{STAND_INS}", f"-I{source.parent}", "-fPIC"),
         *("-c", source, "-o", output),
     )
     return output
@@ -229,7 +232,7 @@ def build(folder: Path) -> Built:
         compile_host(folder / "src" / f"{name}.c", folder / f"{name}.o", "-ffp-contract=off")
         for name in LIBRARY
     ]
-    objects = (*library, compile_host(STUBS / "host.c", folder / "host.o"))
+    objects = (*library, compile_host(HOST, folder / "host.o"))
     return Built(folder, objects, linked(folder / APP, objects))
 
 

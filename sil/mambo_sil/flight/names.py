@@ -18,8 +18,8 @@ CurveName = Literal[
 """Level curves, then curves in space."""
 Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
-SensorsName = Literal["none", "mambo", "mambo-derotated", "mocap"]
-"""`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
+SensorsName = Literal["none", "mambo", "mambo-derotated", "mocap", "flow-deck"]
+"""`mambo-derotated` subtracts the rotation of the camera from the optical flow; `flow-deck` is for --app."""
 SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
     "none": ("none",),
     "mambo": ("none", "mambo", "mambo-derotated"),

@@ -51,31 +51,47 @@ class LibrarySource:
 def load_shared_library(source: LibrarySource, toolchain: Toolchain) -> Any:
     """Return the library of `source`, built with `toolchain` unless it is cached.
 
-    Raises BuildError, UnwritableError if the compiler had no space for its files, and CacheError if the cache
-    cannot be used or the library cannot be loaded.
+    Raises what `built_library` raises, and CacheError if the library cannot be loaded.
     """
-    flags = (*source.flags, *((toolchain.optimisation,) if toolchain.optimisation else ()), *LIBRARY_FLAGS)
-    contents = (source.key, flags, source.libraries, toolchain.command, toolchain.identity())
-    name = f"{source.name}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
+    name = _file_name(source, toolchain)
     if name not in _LOADED:
-
-        def build(folder: Path) -> Path:
-            files = source.files()
-            for path, text in files.items():
-                (folder / path).parent.mkdir(parents=True, exist_ok=True)
-                (folder / path).write_text(text, "utf-8")
-            units = sorted(path for path in files if path.endswith(".c"))
-            library = folder / f"{source.name}.so"
-            toolchain.run([*flags, *units, "-o", library.name, *source.libraries], folder)
-            if not library.is_file():
-                raise BuildError(f"{shlex.join(toolchain.command)} wrote no output; set CC to a C compiler")
-            return library
-
-        _LOADED[name] = _load(build_cached(name, build), source.interface)
+        _LOADED[name] = load_library(built_library(source, toolchain), source.interface)
     return _LOADED[name]
 
 
-def _load(path: Path, interface: "_cffi_backend.FFI | cffi.FFI") -> Any:
+def built_library(source: LibrarySource, toolchain: Toolchain) -> Path:
+    """Return the path of the library of `source`, built with `toolchain` unless it is cached.
+
+    Raises BuildError, UnwritableError if the compiler had no space for its files, and CacheError if the cache
+    cannot be used.
+    """
+
+    def build(folder: Path) -> Path:
+        files = source.files()
+        for path, text in files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, "utf-8")
+        units = sorted(path for path in files if path.endswith(".c"))
+        library = folder / f"{source.name}.so"
+        toolchain.run([*_flags(source, toolchain), *units, "-o", library.name, *source.libraries], folder)
+        if not library.is_file():
+            raise BuildError(f"{shlex.join(toolchain.command)} wrote no output; set CC to a C compiler")
+        return library
+
+    return build_cached(_file_name(source, toolchain), build)
+
+
+def _flags(source: LibrarySource, toolchain: Toolchain) -> tuple[str, ...]:
+    return (*source.flags, *((toolchain.optimisation,) if toolchain.optimisation else ()), *LIBRARY_FLAGS)
+
+
+def _file_name(source: LibrarySource, toolchain: Toolchain) -> str:
+    flags = _flags(source, toolchain)
+    contents = (source.key, flags, source.libraries, toolchain.command, toolchain.identity())
+    return f"{source.name}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
+
+
+def load_library(path: Path, interface: "_cffi_backend.FFI | cffi.FFI") -> Any:
     """Load the shared library at `path`; raises CacheError if that fails."""
     try:
         return interface.dlopen(str(path))

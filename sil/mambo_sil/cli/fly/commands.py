@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import UnwritableError, echo
-from mambo_sil.cli.fly.fly_options import Conditions, Course, Output, Repetition, Runner, command_of
+from mambo_sil.cli.fly.fly_options import Conditions, Course, Other, Output, Runner, command_of
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
@@ -28,18 +28,23 @@ if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
 
 
-def _fly(
-    runner: Runner, course: Course, conditions: Conditions, output: Output, repetition: Repetition
-) -> None:
+def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output, other: Other) -> None:
     """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes.
 
     To see how settings fly a curve, a push, gusts, sensors or another drone.
     """
-    if repetition.repeat is not None:
+    if other.repeat is not None:
         from mambo_sil.cli.fly.repeat import fly_again
 
-        fly_again(repetition.repeat, output, repetition.context)
+        fly_again(other.repeat, output, other)
         return
+    if other.app is not None:
+        from mambo_sil.cli.fly.app import fly_app
+
+        fly_app(course, conditions, runner, output, other)
+        return
+    if other.events is not None:
+        raise typer.BadParameter("it is for a flight with --app", param_hint="--events")
     demand_port(runner.port, runner.baud)
     if runner.port is not None:
         from mambo_sil.cli.fly.port import fly_on_port
@@ -51,7 +56,7 @@ def _fly(
         fly_once(course, conditions, runner, output)
 
 
-fly = command_of(_fly, Runner, Course, Conditions, Output, Repetition)
+fly = command_of(_fly, Runner, Course, Conditions, Output, Other)
 
 
 def campaign(

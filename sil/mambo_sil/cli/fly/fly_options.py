@@ -1,15 +1,16 @@
 """The options of `fly`, in records: functions take those they need."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import typer
 
 from mambo_sil.cli.command import AsJson, Scalar, complete_presets
 from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards
+from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, ControllerName, SensorsName, Start
 
 SIZE_M: Final = 2.0
@@ -52,7 +53,7 @@ class Conditions:
         typer.Option(
             help="State that controller and inner loops get: the true one, or that of the vehicle's sensors, "
             "which are the Mambo's, without or with compensation of the rotation in the optical flow, or "
-            "motion capture."
+            "motion capture; with --app motion capture or a flow deck."
         ),
     ] = "none"
     altitude_loop: Annotated[
@@ -120,8 +121,8 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Repetition:
-    """The record of a flight to repeat, if any; `context` knows which options the user gave."""
+class Other:
+    """A recorded flight again, or that of an app on the desk; `context` knows which options were given."""
 
     context: typer.Context
     repeat: Annotated[
@@ -130,6 +131,27 @@ class Repetition:
             help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
         ),
     ] = None
+    app: Annotated[
+        Literal["crazyflie"] | None,
+        typer.Option(
+            help="Fly the app that --for writes, unchanged, on the desk: with set-points, estimator, loops "
+            "and mixer as in its firmware."
+        ),
+    ] = None
+    events: Annotated[
+        str | None,
+        typer.Option(
+            help="With --app: what happens, a shipped events file or one of your own.", metavar="NAME|FILE"
+        ),
+    ] = None
+
+    def refuse(self, allowed: Container[str], reason: str) -> None:
+        """Raise FlightError for an option that was given and is not among the allowed ones."""
+        for name in self.context.params:
+            given = self.context.get_parameter_source(name)
+            if name not in allowed and given is not None and given.name == "COMMANDLINE":
+                option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
+                raise FlightError(f"{reason}: leave out {option}")
 
 
 def command_of(run: Callable[..., None], *records: type[Any]) -> Callable[..., None]:

@@ -2,14 +2,11 @@
 
 from pathlib import Path
 
-import typer
-
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
-from mambo_sil.cli.fly.fly_options import Output
+from mambo_sil.cli.fly.fly_options import Other, Output
 from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_sil.cli.progress import progress_bar
-from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
@@ -26,18 +23,14 @@ ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
 """Options allowed with --repeat; the record contains all others."""
 
 
-def fly_again(file: Path, output: Output, context: typer.Context) -> None:
+def fly_again(file: Path, output: Output, other: Other) -> None:
     """Repeat the flight recorded in `file`, or in the database of its campaign, with the reference.
 
     Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.
 
     Raises FlightError and ScenarioError.
     """
-    for name in context.params.keys() - ALLOWED:
-        given = context.get_parameter_source(name)
-        if given is not None and given.name == "COMMANDLINE":
-            option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
-            raise FlightError(f"--repeat {echo(str(file))} contains the whole flight: leave out {option}")
+    other.refuse(ALLOWED, f"--repeat {echo(str(file))} contains the whole flight")
     record = (None if file.exists() else campaign_record(file)) or read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     watched, flies = _controllers(record, flight)

@@ -29,7 +29,8 @@ typedef struct {
 } quaternion_t;
 
 typedef struct {
-    vector_t gyro;
+    vector_t gyro; /* degrees per second */
+    vector_t acc;  /* g */
 } sensorData_t;
 
 typedef struct {
@@ -44,6 +45,9 @@ typedef enum {
 } control_mode_t;
 
 typedef struct {
+    float roll;
+    float pitch;
+    float yaw;
     float thrust;
     control_mode_t controlMode;
 } control_t;

@@ -5,11 +5,13 @@
 
 #include "controller.h"
 #include "controller_pid.h"
+#include "crtp_commander_high_level.h"
 #include "debug.h"
 #include "log.h"
 #include "power_distribution.h"
 #include "supervisor.h"
 #include "task.h"
+#include "worker.h"
 
 setpoint_t host_flown;
 int host_pid_calls;
@@ -34,6 +36,14 @@ void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorD
 
 uint32_t xTaskGetTickCount(void) { return host_time_ms; }
 bool supervisorIsFlying(void) { return host_is_flying; }
+enum trajectory_state crtpCommanderHighLevelGetPlannerState(void) { return TRAJECTORY_STATE_FLYING; }
+
+int workerSchedule(void (*function)(void *), void *argument)
+{
+    function(argument);
+    return 0;
+}
+
 float powerDistributionGetMaxThrust(void) { return 0.48f; }
 
 logVarId_t logGetVarId(const char *group, const char *name)

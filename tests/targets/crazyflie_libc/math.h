@@ -6,6 +6,7 @@
 #define isfinite(value) __builtin_isfinite(value)
 
 float atan2f(float y, float x);
+float cosf(float x);
 float fabsf(float value);
 float fmaxf(float a, float b);
 float fminf(float a, float b);

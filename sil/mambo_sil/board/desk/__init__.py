@@ -1,0 +1,1 @@
+"""The generated app of a Crazyflie, compiled unchanged, with what surrounds it in the firmware."""

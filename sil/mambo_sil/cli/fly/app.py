@@ -1,0 +1,90 @@
+"""`fly --app`: fly a generated app on the desk, with what surrounds it in its firmware."""
+
+from typing import Final, Literal, get_args
+
+import typer
+
+from mambo_codegen.errors import echo
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.board.desk import desk_library, events_file
+from mambo_sil.board.desk.desk_events import broken, fly_events, measure
+from mambo_sil.board.desk.desk_report import DESK_FILES, DeskSummary, desk_text, draw_flight, write_trace
+from mambo_sil.board.desk.events_file import EventsFile, SensorsSection
+from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Other, Output, Runner
+from mambo_sil.cli.options import load, show
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.names import CurveName
+from mambo_sil.results.folders import new_results
+
+OF_AN_APP: Final = frozenset(
+    {"app", "events", "source", "scalar", "sensors", "seed", "output", "pictures", "as_json"}
+)
+"""Options allowed with --app and an events file, which says all else."""
+OF_A_COURSE: Final = frozenset({"trajectory", "size_m", "rate_rad_s", "duration_s"})
+"""Options allowed besides where there is no events file."""
+
+
+def fly_app(course: Course, conditions: Conditions, runner: Runner, output: Output, other: Other) -> None:
+    """Fly once on the desk, write the results; exit 1 if a bound of the events file is broken.
+
+    Raises FlightError, and the errors of loading settings and events and of building the C.
+    """
+    name, events = other.app or desk_library.TARGET, other.events
+    other.refuse(
+        OF_AN_APP if events is not None else OF_AN_APP | OF_A_COURSE,
+        "what a flight with --app is, an events file says",
+    )
+    source = runner.source or name
+    settings = load(source, runner.scalar)
+    file = _course(course) if events is None else events_file.load(events)
+    given = other.context.get_parameter_source("sensors")
+    if given is not None and given.name == "COMMANDLINE":
+        file = _with_sensors(file, conditions.sensors)
+    with new_results(output.output, DeskSummary.command, DESK_FILES) as folder:
+        library = desk_library.build(settings, host_toolchain())
+        trace = fly_events(library, file, conditions.seed)
+        measures = measure(trace, file)
+        write_trace(trace, folder / "trace.csv")
+        if output.pictures:
+            draw_flight(trace, file, events or course.trajectory, folder / "flight")
+        summary = DeskSummary(
+            app=name,
+            source=source,
+            settings=settings.digest,
+            events=events,
+            flight=file,
+            seed=conditions.seed,
+            measures=measures,
+            broken=broken(measures, file),
+            console=trace.console,
+        )
+        summary.write(folder)
+    show(summary, desk_text(summary), as_json=output.as_json)
+    written = DESK_FILES if output.pictures else DESK_FILES[:1]
+    typer.echo(f"{echo(str(output.output))}: {', '.join(written)}", err=True)
+    if not summary.good:
+        raise typer.Exit(1)
+
+
+def _course(course: Course) -> EventsFile:
+    """Return the flight of a curve by name, without events; raises FlightError."""
+    names: tuple[CurveName, ...] = get_args(CurveName)
+    for name in names:
+        if course.trajectory == name:
+            return EventsFile(
+                trajectory=name,
+                size_m=SIZE_M if course.size_m is None else course.size_m,
+                rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
+                duration_s=course.duration_s,
+            )
+    raise FlightError(f"--trajectory {echo(course.trajectory)} must be {', '.join(names)} with --app")
+
+
+def _with_sensors(file: EventsFile, name: str) -> EventsFile:
+    """Return an events file with other sensors; raises FlightError."""
+    kinds: tuple[Literal["mocap", "flow-deck"], ...] = get_args(events_file.SensorsKind)
+    for kind in kinds:
+        if name == kind:
+            sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": kind})
+            return file.model_copy(update={"sensors": sensors})
+    raise FlightError(f"--sensors {echo(name)} must be {' or '.join(kinds)} with --app")
