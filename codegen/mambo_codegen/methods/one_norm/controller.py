@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.one_norm import cost
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
 from mambo_codegen.methods.one_norm.predictor import Predictor
@@ -82,7 +82,7 @@ class OneNormController:
     """
 
     def __init__(self, constants: OneNormConstants, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
-        settings, products = constants.settings, arithmetic(constants)
+        settings, products = constants.settings, OneNormArithmetic(constants)
         self._constants = constants
         self.settings = settings
         self._numbers, self._inputs = constants.numbers, Inputs(constants)

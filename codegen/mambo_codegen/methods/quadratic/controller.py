@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, HeightState
@@ -83,7 +83,7 @@ class QuadraticController:
 
     def __init__(self, constants: QuadraticConstants, n: int = 1) -> None:
         self.settings, self._constants = constants.settings, constants
-        self._numbers, self._products = constants.numbers, arithmetic(constants)
+        self._numbers, self._products = constants.numbers, QuadraticArithmetic(constants)
         self._inputs = Inputs(constants)
         self._observer = KalmanObserver(constants, self._products)
         self._model = AttitudeModel(constants, self._products)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
 from mambo_codegen.methods.quadratic import formats, law
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
@@ -130,7 +130,7 @@ class Quadratic(QuadraticConstants, Method):
         return {
             "quadratic": True,
             "attitude": self.attitude,
-            "move_limits": AttitudeModel(self, arithmetic(self)).command_limit.tolist(),
+            "move_limits": AttitudeModel(self, QuadraticArithmetic(self)).command_limit.tolist(),
             "observer": self.observer,
             "law": self.law,
             **height_context(self.height),

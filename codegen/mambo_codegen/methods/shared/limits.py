@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.inputs import choose
-from mambo_codegen.methods.shared.limits_arithmetic import limits_arithmetic
+from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
@@ -98,7 +98,7 @@ class LimitsLaw:
     """The constants of the limits, in the scalar type of the controller."""
 
     def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
-        self._products = limits_arithmetic(constants, limits)
+        self._products = LimitsArithmetic(constants, limits)
         self._numbers, self._ranges = constants.numbers, constants.limits
         self._quantities = limits.quantities
         constant = self._numbers.constant
