@@ -11,11 +11,12 @@ from mambo_codegen.methods.quadratic import formats, law
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
+from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.numbers.representation import THRUST
