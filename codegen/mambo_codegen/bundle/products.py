@@ -6,6 +6,7 @@ format of its result (`products_fixed.c.j2`).
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 _NAMES: Final = (
@@ -41,8 +42,11 @@ class Infix(str):
     __slots__ = ()
 
 
-def products(*, fixed: bool) -> dict[str, Callable[..., str]]:
-    """Return the functions of the templates that write products, by name."""
+def products(*, fixed: bool, weighs: bool = False) -> dict[str, Callable[..., str]]:
+    """Return the functions of the templates that write products, by name.
+
+    weighed, over_weight: an acceleration of a tilt times its weight, and over it; as it is without `weighs`.
+    """
 
     def call(name: str) -> Callable[..., str]:
         return lambda *arguments: f"{name}({', '.join(arguments)})"
@@ -54,12 +58,21 @@ def products(*, fixed: bool) -> dict[str, Callable[..., str]]:
 
         return write
 
-    return {name: call(name) if fixed else infix(name) for name in _NAMES}
+    found = {name: call(name) if fixed else infix(name) for name in _NAMES}
+    factors = {"weighed": "weight", "over_weight": "inverse"}
+    return found | {
+        name: partial(_times, found["factor_product"], factor) if weighs else str
+        for name, factor in factors.items()
+    }
 
 
 def term(product: str) -> str:
     """Return a product as an operand: in brackets if it is written with operators."""
     return f"({product})" if isinstance(product, Infix) and " " in product else product
+
+
+def _times(product: Callable[..., str], factor: str, acceleration: str) -> str:
+    return product(acceleration, factor)
 
 
 def _factor(argument: str) -> str:

@@ -155,7 +155,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        products(fixed=numbers.formats is not None)
+        products(fixed=numbers.formats is not None, weighs=method.has_height)
         | {"height": None}
         | method.context
         | {

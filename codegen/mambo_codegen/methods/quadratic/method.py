@@ -17,6 +17,7 @@ from mambo_codegen.methods.quadratic.height_constants import refusals as height_
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.methods.quadratic.step import REST_M_S
+from mambo_codegen.methods.quadratic.step_choices import step_choices
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.numbers.representation import THRUST
@@ -149,6 +150,7 @@ class Quadratic(QuadraticConstants, Method):
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
+            "step": step_choices(self),
             "rest_m_step": REST_M_S * period_s,
             "trims": [
                 f" {'-' if trim_rad > 0 else '+'} NMPC_{name}_TRIM_COMMAND_RAD" if trim_rad else ""
