@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.shared.members import target_members
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         limited=angles if has_height else fed,
         held=f"hold(self, attitude{inverse});" if constants.feedback_steps else "/* The command holds. */",
         cleared=_cleared(has_height=has_height) if tracker else (),
-        rested=_members(has_height=has_height, is_given=is_given),
+        rested=target_members(constants),
         target_motion="acceleration_m_s2" if is_given else "velocity_m_s",
         closing=(
             *(("height_predict(height, lies)",) if has_height else ()),
@@ -120,10 +121,3 @@ def _locals(*, has_height: bool, has_limits: bool) -> tuple[str, ...]:
 
 def _cleared(*, has_height: bool) -> tuple[str, ...]:
     return ("tracker_clear(self)", *(("height_clear_target(height)",) if has_height else ()))
-
-
-def _members(*, has_height: bool, is_given: bool) -> tuple[str, ...]:
-    """Return the members of nmpc_target_t, in their order."""
-    level = ("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
-    upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
-    return (*(f"{name}[{axis}]" for name in level for axis in range(2)), *(upward if has_height else ()))
