@@ -185,7 +185,7 @@ class HeightAxis:
         thrust = thrust_m_s2[:, 0]
         return replace(state, command=self._vertical(state.share, thrust), thrust_m_s2=thrust)
 
-    def follow(
+    def observe(
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""

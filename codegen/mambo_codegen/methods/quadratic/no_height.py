@@ -39,7 +39,7 @@ class NoHeight:
         del thrust_m_s2
         return state
 
-    def follow(
+    def observe(
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Return zeros, on no floor."""

@@ -61,7 +61,7 @@ class _Aim:
     target: (n, 4 or more) less the height's columns, and within the limits.
     weight: (n,) by how much more tilts count with the next thrust than in hover; None if no more.
     missed: (n,) as in the memory.
-    flies:  (n,) whether there is a new command.
+    has_command: (n,) whether there is a new command.
     rests:  (n,) whether the model has come to rest after an outage.
     """
 
@@ -71,7 +71,7 @@ class _Aim:
     height: HeightState
     weight: Real | None
     missed: NDArray[np.int64]
-    flies: Rows
+    has_command: Rows
     rests: Rows
 
 
@@ -106,7 +106,7 @@ class ControlStep:
         attitude = self._turn(memory.attitude, inputs, none_yet)
         angles, seen = inputs.state[:, 4:6], has_state[:, None]
         tilt_rad = np.where(seen, angles, memory.command_rad)
-        lift = self.height.follow(memory.height, inputs.state[:, 7:10], tilt_rad, has_state, none_yet)
+        lift = self.height.observe(memory.height, inputs.state[:, 7:10], tilt_rad, has_state, none_yet)
         tilt = np.where(seen, self.model.measure(angles, lift.weight), attitude.tilt)
         world = self._to_world(attitude, tilt)
         estimate = self._observe(memory.estimate, inputs, none_yet, world)
@@ -164,7 +164,7 @@ class ControlStep:
         if self.tracker is not None:
             motion = choose(follows, self.tracker.update(motion, target[:, self.tracker.columns]), motion)
         weight = self.height.command_weight(height)
-        aim = _Aim(target, motion, limits, height, weight, missed, flies=follows, rests=follows & False)
+        aim = _Aim(target, motion, limits, height, weight, missed, has_command=follows, rests=follows & False)
         if not self.limits.brake:
             return aim
         return self._end_outage(aim, estimate, acts)
@@ -187,7 +187,7 @@ class ControlStep:
             limits=replace(aim.limits, active=active),
             height=self.height.clear_target(aim.height, overdue),
             missed=np.where(rests, self.at_rest, aim.missed),
-            flies=aim.flies | brakes,
+            has_command=aim.has_command | brakes,
             rests=rests,
         )
 
@@ -208,8 +208,8 @@ class ControlStep:
             command = np.where(fed, command + self._rate_feedback(memory, inputs), command)
             without = clamp(self._angles(attitude.command, aim.weight), tilt_limit)
             held = np.where(fed & (memory.missed == 0)[:, None], without, held)
-        command = np.where(aim.flies[:, None], clamp(command, tilt_limit), held)
-        attitude, level = choose(aim.flies, moved, attitude), np.zeros_like(command)
+        command = np.where(aim.has_command[:, None], clamp(command, tilt_limit), held)
+        attitude, level = choose(aim.has_command, moved, attitude), np.zeros_like(command)
         attitude = choose(aim.rests, self.model.set_command(attitude, level, aim.weight), attitude)
         return attitude, np.where(aim.rests[:, None], level, command)
 
