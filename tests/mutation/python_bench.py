@@ -1,0 +1,217 @@
+"""Run the tests of a room on every mutant of its Python, each in a fork of one process.
+
+python -m tests.mutation.python_bench ROOM STRIDE TURN FILE   try one mutant in STRIDE, from number TURN on,
+                                                               and write to FILE which no test notices
+
+A process imports the tests once. A fork of it changes the code of functions and the values of constants in
+place, and runs the tests that reach the changed lines, the quickest first, until one fails.
+"""
+
+import faulthandler
+import json
+import os
+import resource
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType, FunctionType, ModuleType
+from typing import Any, Final
+
+import pytest
+
+from mambo_codegen import kept
+from tests.mutation.python_mutants import PythonMutant, names_of, python_mutants
+
+ROOT: Final = Path(__file__).parents[2]
+SOURCE_ROOTS: Final = ("codegen", "sil")
+PACKAGES: Final = ("mambo_codegen", "mambo_sil", "tests")
+LIMIT_S: Final = 60
+"""Processor time of the tests of a mutant: one that needs more never ends."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Source, by patterns of paths, and the tests that are to notice its mutants."""
+
+    source: tuple[str, ...]
+    tests: tuple[str, ...]
+    without: tuple[str, ...] = ()
+    """Names of files that only draw or print."""
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of the source."""
+        found = {path for pattern in self.source for path in ROOT.glob(pattern)}
+        return sorted(path for path in found if path.name not in {"__init__.py", *self.without})
+
+
+ROOMS: Final = {
+    "constants": Room(
+        (
+            "codegen/mambo_codegen/methods/**/*constants.py",
+            "codegen/mambo_codegen/methods/**/law.py",
+        ),
+        ("tests/codegen/constants", *(f"tests/codegen/test_{name}.py" for name in ("limits", "quadratic", "quadratic_settings", "quadratic_loop"))),
+    ),
+    "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
+    "fences": Room(("sil/mambo_sil/flight/fences.py",), ("tests/flight/test_fences.py",)),
+    "margins": Room(
+        ("sil/mambo_sil/experiment/margins/*.py",),
+        ("tests/experiment/margins",),
+        ("margins_plots.py", "margins_report.py"),
+    ),
+}
+
+
+def mutants_of(room: Room) -> dict[Path, list[PythonMutant]]:
+    """Return the mutants of each file of a room."""
+    sources = (path for root in SOURCE_ROOTS for path in (ROOT / root).rglob("*.py"))
+    names = frozenset[str]().union(*(names_of(path.read_text("utf-8")) for path in sources))
+    return {path: python_mutants(path.name, path.read_text("utf-8"), names) for path in room.files}
+
+
+class Bench:
+    """A plugin of pytest that runs the collected tests on mutants; `unnoticed` has those that none notices."""
+
+    def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]]) -> None:
+        self._chosen, self.unnoticed = chosen, list[PythonMutant]()
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Run the tests on the source as it is, then on every mutant."""
+        files = frozenset(str(path) for path, _ in self._chosen)
+        tests = [(item, *_in_a_fork(lambda: _reached(session, item, files))) for item in session.items]
+        tests.sort(key=lambda one: one[1])
+        for path, mutant in self._chosen:
+            reaching = [item for item, _, lines in tests if _reaches(lines.get(str(path), []), mutant)]
+            if _in_a_fork(lambda: _survives(session, path, mutant, reaching)):
+                self.unnoticed.append(mutant)
+        return True
+
+
+def _in_a_fork(work: Callable[[], Any]) -> Any:
+    """Return what `work` returns, as JSON has it, from a fork that prints nothing; None if it crashes or hangs.
+
+    Raises RuntimeError if `work` raises an error.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        faulthandler.disable()  # a crash is an answer, not a report
+        with Path(os.devnull).open("w") as nowhere:
+            for printed in (1, 2):
+                os.dup2(nowhere.fileno(), printed)
+        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
+        kept.write_cached = lambda *_: None  # what a mutant computes is not kept
+        try:
+            found, code = json.dumps(work()), 0
+        except BaseException:  # also what ends a process
+            found, code = traceback.format_exc(), 1
+        with os.fdopen(writing, "w") as answer:
+            answer.write(found)
+        os._exit(code)
+    os.close(writing)
+    with os.fdopen(reading) as answer:
+        text = answer.read()
+    status = os.waitpid(child, 0)[1]
+    if os.WIFSIGNALED(status):
+        return None
+    if status:
+        raise RuntimeError(text)
+    return json.loads(text)
+
+
+def _pass(session: pytest.Session, items: Sequence[pytest.Item]) -> bool:
+    """Run tests until one fails; return whether none does."""
+    for item, following in zip(items, [*items[1:], None], strict=True):
+        session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        if session.testsfailed:
+            return False
+    return True
+
+
+def _reached(
+    session: pytest.Session, item: pytest.Item, files: frozenset[str]
+) -> tuple[float, dict[str, list[int]]]:
+    """Return the time of a test and the lines of files that it runs."""
+    lines: dict[str, set[int]] = {file: set() for file in files}
+
+    def note(frame: FrameType, _event: str, _argument: Any) -> Any:
+        file = frame.f_code.co_filename
+        if file not in files:
+            return None
+        lines[file].add(frame.f_lineno)
+        return note
+
+    start = time.process_time()
+    sys.settrace(note)
+    assert _pass(session, [item]), f"{item.nodeid} fails without a fault"
+    sys.settrace(None)
+    return time.process_time() - start, {file: sorted(found) for file, found in lines.items()}
+
+
+def _reaches(lines: Sequence[int], mutant: PythonMutant) -> bool:
+    """Return whether a test that runs these lines can notice a mutant: at the level of the module any can."""
+    return mutant.lines is None or any(line in mutant.lines for line in lines)
+
+
+def _survives(
+    session: pytest.Session, path: Path, mutant: PythonMutant, items: Sequence[pytest.Item]
+) -> bool:
+    """Return whether a module can be imported with a mutant, and tests pass then."""
+    (module,) = (one for one in sys.modules.values() if getattr(one, "__file__", None) == str(path))
+    other = ModuleType(module.__name__)
+    try:
+        exec(compile(mutant.apply(path.read_text("utf-8")), str(path), "exec"), vars(other))
+    except Exception:  # whatever a fault leads to
+        return False
+    _install(module, other)
+    return _pass(session, items)
+
+
+def _install(module: ModuleType, other: ModuleType) -> None:
+    """Change a module to what another one has, for all that have imported from it.
+
+    Functions and methods get other code; other values are replaced wherever they have their name.
+    """
+    ours = [one for name, one in sys.modules.items() if name.partition(".")[0] in PACKAGES]
+    for name, value in vars(other).items():
+        there = vars(module).get(name)
+        if name.startswith("__"):
+            continue
+        if isinstance(value, FunctionType):
+            _recode(there, value)
+        elif isinstance(value, type):
+            for key, inner in list(vars(value).items()):
+                _recode(_function_of(vars(there).get(key)), _function_of(inner))
+        elif repr(value) != repr(there):
+            for user in ours:
+                if vars(user).get(name) is there:
+                    setattr(user, name, value)
+
+
+def _function_of(attribute: Any) -> Any:
+    """Return the function of a method or property."""
+    for name in ("fget", "func", "__func__"):
+        attribute = getattr(attribute, name, attribute)
+    return attribute
+
+
+def _recode(there: Any, function: Any) -> None:
+    if isinstance(function, FunctionType) and function.__code__ != there.__code__:
+        there.__code__ = function.__code__
+
+
+def main(name: str, stride: int, turn: int, answer: Path) -> None:
+    """Write which mutants of a room no test notices, as JSON."""
+    room = ROOMS[name]
+    bench = Bench([(path, one) for path, found in mutants_of(room).items() for one in found][turn::stride])
+    code = pytest.main(["-q", "-p", "no:cacheprovider", *room.tests], plugins=[bench])
+    assert code == 0, code
+    answer.write_text(json.dumps([one.key for one in bench.unnoticed]), "utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))
