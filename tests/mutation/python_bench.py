@@ -16,6 +16,7 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from types import FrameType, FunctionType, ModuleType
 from typing import Any, Final
@@ -104,7 +105,6 @@ def _in_a_fork(work: Callable[[], Any]) -> Any:
             for printed in (1, 2):
                 os.dup2(nowhere.fileno(), printed)
         resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
-        kept.write_cached = lambda *_: None  # what a mutant computes is not kept
         try:
             found, code = json.dumps(work()), 0
         except BaseException:  # also what ends a process
@@ -161,14 +161,21 @@ def _survives(
     session: pytest.Session, path: Path, mutant: PythonMutant, items: Sequence[pytest.Item]
 ) -> bool:
     """Return whether a module can be imported with a mutant, and tests pass then."""
-    (module,) = (one for one in sys.modules.values() if getattr(one, "__file__", None) == str(path))
+    module = import_module(_name_of(path))
     other = ModuleType(module.__name__)
     try:
         exec(compile(mutant.apply(path.read_text("utf-8")), str(path), "exec"), vars(other))
     except Exception:  # whatever a fault leads to
         return False
     _install(module, other)
+    kept.write_cached = lambda *_: None  # what a mutant computes is not kept
     return _pass(session, items)
+
+
+def _name_of(path: Path) -> str:
+    """Return the name of the module in a file."""
+    (root,) = (ROOT / name for name in SOURCE_ROOTS if path.is_relative_to(ROOT / name))
+    return ".".join(path.relative_to(root).with_suffix("").parts)
 
 
 def _install(module: ModuleType, other: ModuleType) -> None:
