@@ -55,7 +55,13 @@ ROOMS: Final = {
             "codegen/mambo_codegen/methods/**/*constants.py",
             "codegen/mambo_codegen/methods/**/law.py",
         ),
-        ("tests/codegen/constants", *(f"tests/codegen/test_{name}.py" for name in ("limits", "quadratic", "quadratic_settings", "quadratic_loop"))),
+        (
+            "tests/codegen/constants",
+            *(
+                f"tests/codegen/test_{name}.py"
+                for name in ("limits", "quadratic", "quadratic_settings", "quadratic_loop")
+            ),
+        ),
     ),
     "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
     "fences": Room(("sil/mambo_sil/flight/fences.py",), ("tests/flight/test_fences.py",)),

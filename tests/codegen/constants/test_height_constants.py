@@ -147,7 +147,11 @@ class PointMass:
     def __init__(self, settings: Settings, loads: tuple[float, ...]) -> None:
         height = settings.height
         assert height is not None
-        self._lag_s, self._period_s, self._load = height.lag_s, settings.horizon.update_period_s, np.array(loads)
+        self._lag_s, self._period_s, self._load = (
+            height.lag_s,
+            settings.horizon.update_period_s,
+            np.array(loads),
+        )
         self.place_m = self.climb_m_s = np.zeros(len(loads))
         self._thrust_m_s2 = np.full(len(loads), GRAVITY_M_S2)
 
@@ -224,7 +228,11 @@ def test_no_acceleration_of_the_model_is_beyond_its_limit(settings: Settings) ->
 
 def test_the_limit_of_weak_thrust_is_that_of_a_fall() -> None:
     """Where the thrust lifts less than gravity draws."""
-    weak = height_of(settings_of(EXACT | {"height.thrust_max_m_s2": 11.0, "height.learn": "none", "height.descent_m_s": 0.1}))
+    weak = height_of(
+        settings_of(
+            EXACT | {"height.thrust_max_m_s2": 11.0, "height.learn": "none", "height.descent_m_s": 0.1}
+        )
+    )
     assert weak.limit_m_step2 == weak.gravity_m_step2
 
 

@@ -15,7 +15,15 @@ from mambo_codegen.methods.limits_constants import BRAKING_SHARE, SPELLING, Limi
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from tests.support.height import CRAZYFLIE
-from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, axis_of, settings_of, settling_steps, two_move_cost
+from tests.support.quadratic import (
+    ANGLES,
+    ONE_MOVE,
+    TWO_MOVES,
+    axis_of,
+    settings_of,
+    settling_steps,
+    two_move_cost,
+)
 from tests.support.strategies import Values
 
 WORST_ROLL: Values = {
@@ -82,7 +90,9 @@ def test_the_braking_is_what_the_tilt_limit_gives_whatever_the_heading(values: V
         limits[1] = braking_m_s2
         return -1.0 if controller(settings).set_limits([limits])[0] == Status.OK else 1.0
 
-    assert brentq(is_refused, 0.5 * worst_m_s2, 2.0 * worst_m_s2, xtol=1e-6) == pytest.approx(worst_m_s2, rel=1e-3)
+    assert brentq(is_refused, 0.5 * worst_m_s2, 2.0 * worst_m_s2, xtol=1e-6) == pytest.approx(
+        worst_m_s2, rel=1e-3
+    )
 
 
 def test_of_two_axes_that_each_hinder_the_braking_counts_as_both() -> None:
@@ -102,7 +112,9 @@ def controller(settings: Settings) -> Any:
 @pytest.mark.parametrize("height", [False, True])
 def test_a_limit_that_is_not_set_is_the_widest_that_may_be_set(height: bool) -> None:
     """Speed, walls, floor and ceiling: the controller takes them, and refuses any that are wider."""
-    settings = settings_of((CRAZYFLIE if height else TWO_MOVES) | {"code.scalar": "float64", "limits.braking_m_s2": 2.0})
+    settings = settings_of(
+        (CRAZYFLIE if height else TWO_MOVES) | {"code.scalar": "float64", "limits.braking_m_s2": 2.0}
+    )
     widest = constants_of(settings).limits
     assert len(widest) == (11 if height else 7)
     unset = {0: 1, 2: -1, 3: -1, 4: 1, 5: 1, 6: 1} | ({7: -1, 8: 1} if height else {})
@@ -118,12 +130,24 @@ def test_limits_that_are_set_are_those_of_the_settings() -> None:
     """In the order of nmpc_limits_t; a fence may have walls along one axis, or a floor and a ceiling, alone."""
     walls = {"x_min_m": -1.0, "x_max_m": 2.0, "floor_m": -0.5, "ceiling_m": 3.0}
     height = {"height.climb_m_s": 0.7, "height.descent_m_s": 0.6}
-    settings = limited(CRAZYFLIE | height, braking_m_s2=1.5, tilt_rad=0.4, **{f"fence.{name}": m for name, m in walls.items()})
+    settings = limited(
+        CRAZYFLIE | height,
+        braking_m_s2=1.5,
+        tilt_rad=0.4,
+        **{f"fence.{name}": m for name, m in walls.items()},
+    )
     reach_m = settings.ranges.position_m
     expected = [2.0, 1.5, -1.0, -reach_m, 2.0, reach_m, 0.4, -0.5, 3.0, 0.7, 0.6]
     assert constants_of(settings).limits.tolist() == expected
     other = limited(CRAZYFLIE, **{"fence.y_min_m": -3.0, "fence.y_max_m": 4.0})
-    assert constants_of(other).limits[[2, 3, 4, 5, 7, 8]].tolist() == [-reach_m, -3.0, reach_m, 4.0, -reach_m, reach_m]
+    assert constants_of(other).limits[[2, 3, 4, 5, 7, 8]].tolist() == [
+        -reach_m,
+        -3.0,
+        reach_m,
+        4.0,
+        -reach_m,
+        reach_m,
+    ]
 
 
 @pytest.mark.parametrize("values", [ONE_MOVE, TWO_MOVES | {"model.pitch_lag_s": 0.25}])
@@ -217,7 +241,9 @@ def test_formats_hold_their_largest_value_and_are_as_fine_as_that_allows(braking
     """The largest fits in 31 bits with 1 % to spare, and twice as much would not; braking has three bits more."""
     settings = limited(WORST_ROLL, braking_m_s2=braking_m_s2)
     found = constants_of(settings)
-    gives_m_s2 = deceleration_m_s2(limited(WORST_ROLL | {"model.roll_trim_rad": 0.0, "model.pitch_trim_rad": 0.0}))
+    gives_m_s2 = deceleration_m_s2(
+        limited(WORST_ROLL | {"model.roll_trim_rad": 0.0, "model.pitch_trim_rad": 0.0})
+    )
     largest = {
         "braking": 8 * 2 * gives_m_s2,
         "approach": found.steepest_1_s,

@@ -21,8 +21,7 @@ ONE_NORM = with_option(presets.preset("mambo-1norm"), "horizon.prediction_step_s
 HEIGHT = settings_of(CRAZYFLIE | {"target.acceleration": "tracked"})
 STRONG = settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "height.thrust_max_m_s2": 30.0})
 WEAK = settings_of(
-    CRAZYFLIE
-    | {"target.acceleration": "tracked", "height.thrust_max_m_s2": 12.0, "height.descent_m_s": 0.2}
+    CRAZYFLIE | {"target.acceleration": "tracked", "height.thrust_max_m_s2": 12.0, "height.descent_m_s": 0.2}
 )
 
 
