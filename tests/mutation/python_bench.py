@@ -8,6 +8,7 @@ place, and runs the tests that reach the changed lines, the quickest first, unti
 """
 
 import faulthandler
+import gc
 import json
 import os
 import resource
@@ -16,7 +17,9 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from types import FrameType, FunctionType, ModuleType
 from typing import Any, Final
@@ -51,24 +54,19 @@ class Room:
 
 ROOMS: Final = {
     "constants": Room(
-        (
-            "codegen/mambo_codegen/methods/**/*constants.py",
-            "codegen/mambo_codegen/methods/**/law.py",
-        ),
-        (
+        source=("codegen/mambo_codegen/methods/**/*constants.py", "codegen/mambo_codegen/methods/**/law.py"),
+        tests=(
             "tests/codegen/constants",
-            *(
-                f"tests/codegen/test_{name}.py"
-                for name in ("limits", "quadratic", "quadratic_settings", "quadratic_loop")
-            ),
+            "tests/codegen/test_limits.py",
+            *(f"tests/codegen/test_quadratic{name}.py" for name in ("", "_settings", "_loop")),
         ),
     ),
-    "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
-    "fences": Room(("sil/mambo_sil/flight/fences.py",), ("tests/flight/test_fences.py",)),
+    "derive": Room(source=("sil/mambo_sil/model/derive/*.py",), tests=("tests/model/derive",)),
+    "fences": Room(source=("sil/mambo_sil/flight/fences.py",), tests=("tests/flight/test_fences.py",)),
     "margins": Room(
-        ("sil/mambo_sil/experiment/margins/*.py",),
-        ("tests/experiment/margins",),
-        ("margins_plots.py", "margins_report.py"),
+        source=("sil/mambo_sil/experiment/margins/*.py",),
+        tests=("tests/experiment/margins",),
+        without=("margins_plots.py", "margins_report.py"),
     ),
 }
 
@@ -81,25 +79,26 @@ def mutants_of(room: Room) -> dict[Path, list[PythonMutant]]:
 
 
 class Bench:
-    """A plugin of pytest that runs the collected tests on mutants; `unnoticed` has those that none notices."""
+    """A plugin of pytest that runs the collected tests on mutants; `unnoticed` are those that all pass."""
 
     def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]]) -> None:
         self._chosen, self.unnoticed = chosen, list[PythonMutant]()
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Run the tests on the source as it is, then on every mutant."""
+        gc.freeze()  # a fork shares the memory that is not looked through for garbage
         files = frozenset(str(path) for path, _ in self._chosen)
-        tests = [(item, *_in_a_fork(lambda: _reached(session, item, files))) for item in session.items]
+        tests = [(item, *_in_a_fork(partial(_reached, session, item, files))) for item in session.items]
         tests.sort(key=lambda one: one[1])
         for path, mutant in self._chosen:
             reaching = [item for item, _, lines in tests if _reaches(lines.get(str(path), []), mutant)]
-            if _in_a_fork(lambda: _survives(session, path, mutant, reaching)):
+            if _in_a_fork(partial(_survives, session, path, mutant, reaching)):
                 self.unnoticed.append(mutant)
         return True
 
 
 def _in_a_fork(work: Callable[[], Any]) -> Any:
-    """Return what `work` returns, as JSON has it, from a fork that prints nothing; None if it crashes or hangs.
+    """Return what `work` returns, as JSON has it, from a fork that prints nothing; None if that crashes.
 
     Raises RuntimeError if `work` raises an error.
     """
@@ -131,7 +130,8 @@ def _in_a_fork(work: Callable[[], Any]) -> Any:
 
 def _pass(session: pytest.Session, items: Sequence[pytest.Item]) -> bool:
     """Run tests until one fails; return whether none does."""
-    for item, following in zip(items, [*items[1:], None], strict=True):
+    for item, following in pairwise([*items, None]):
+        assert item is not None
         session.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
         if session.testsfailed:
             return False
@@ -174,7 +174,7 @@ def _survives(
     except Exception:  # whatever a fault leads to
         return False
     _install(module, other)
-    kept.write_cached = lambda *_: None  # what a mutant computes is not kept
+    vars(kept)["write_cached"] = lambda *_: None  # what a mutant computes is not kept
     return _pass(session, items)
 
 
@@ -192,7 +192,7 @@ def _install(module: ModuleType, other: ModuleType) -> None:
     ours = [one for name, one in sys.modules.items() if name.partition(".")[0] in PACKAGES]
     for name, value in vars(other).items():
         there = vars(module).get(name)
-        if name.startswith("__"):
+        if name.startswith("__") or value is there:
             continue
         if isinstance(value, FunctionType):
             _recode(there, value)

@@ -57,7 +57,7 @@ class PythonMutant:
     end: int
     wrong: str
     key: Key
-    lines: range
+    lines: range | None
 
     def apply(self, text: str) -> str:
         """Return `text` with the fault."""

@@ -1,4 +1,4 @@
-"""The constants of the height against their definitions: simulated costs, flights of a point mass, programmes."""
+"""The constants of the height against their definitions: simulated costs, flights, linear programmes."""
 
 import itertools
 from typing import Any, Final
@@ -77,7 +77,7 @@ def settings(request: pytest.FixtureRequest) -> Settings:
 
 
 def test_the_law_is_the_minimum_of_a_simulated_cost(settings: Settings) -> None:
-    """Rows, in steps, and the ratio of the second derivatives; and the approach rate that follows from them."""
+    """Rows, in steps, and the ratio of the second derivatives; and the approach rate that they give."""
     like, axis = axis_like_roll(settings)
     found, kept = height_of(settings), [0, 1, 2, 3, 4, 6, 7]
     if axis.ramp:
@@ -107,7 +107,7 @@ def test_the_model_of_the_thrust_is_the_exact_solution_for_a_held_command(settin
 
 
 def test_units_are_those_of_differences_of_places(settings: Settings) -> None:
-    """Second differences of the places of a falling body, and of ones with the least and the largest thrust."""
+    """Second differences of the places of a body that falls, or has the least or the largest thrust."""
     found, height, period_s = height_of(settings), settings.height, settings.horizon.update_period_s
     assert height is not None
 
@@ -124,7 +124,7 @@ def test_units_are_those_of_differences_of_places(settings: Settings) -> None:
 
 @pytest.mark.parametrize("learn", ["gain", "acceleration", "none"])
 def test_the_observer_s_gain_is_the_riccati_equation_s(learn: str) -> None:
-    """SciPy's, in steps; with a learnt gain of the thrust, whose effect on the acceleration is g, divided by g."""
+    """SciPy's, in steps; that of a learnt gain of the thrust, whose effect is g, over g."""
     settings = settings_of(DELAYED | {"height.learn": learn, "height.disturbance_noise": 1.7})
     observer, period_s = settings.observer, settings.horizon.update_period_s
     transition = np.array([[1, period_s, period_s**2 / 2], [0, 1, period_s], [0, 0, 1]])
@@ -212,7 +212,7 @@ def test_what_is_learnt_ends_at_the_limit_of_the_settings(learn: str, limit: flo
 
 
 def test_no_acceleration_of_the_model_is_beyond_its_limit(settings: Settings) -> None:
-    """By all thrusts, learnt gains and tilts at the ends of what they may be; and the limit is one of those."""
+    """By all thrusts, learnt gains and tilts at their ends; and the limit is one of those."""
     found, height = height_of(settings), settings.height
     assert height is not None
     deviation = height.learn_limit if height.learn == "gain" else 0.0
@@ -237,7 +237,7 @@ def test_the_limit_of_weak_thrust_is_that_of_a_fall() -> None:
 
 
 def test_climb_and_descent_are_braked_by_the_thrust_there_is(settings: Settings) -> None:
-    """A speed that falls at the approach rate decelerates most at once: by what the ends of the thrust leave."""
+    """A speed that falls at the approach rate decelerates most at once: by what the thrust can give."""
     found, height, period_s = height_of(settings), settings.height, settings.horizon.update_period_s
     assert height is not None
     time_s = np.linspace(0.0, 1.0, 100_001)
@@ -286,11 +286,12 @@ def best_line(low: float, high: float) -> tuple[float, float, float]:
     """
     x = np.linspace(low, high, 2001)
     rows = np.column_stack([x, -(x**2), np.zeros_like(x)])
-    above, below = rows + [0, 0, -1], -rows + [0, 0, -1]
+    error = np.array([0, 0, 1])
+    above, below = rows - error, -rows - error
     bounds = np.concatenate([np.ones_like(x), -np.ones_like(x)])
-    found = linprog([0, 0, 1], A_ub=np.concatenate([above, below]), b_ub=bounds, bounds=[(None, None)] * 3)
-    start, slope, error = found.x
-    return float(start), float(slope), float(error)
+    found = linprog(error, A_ub=np.concatenate([above, below]), b_ub=bounds, bounds=[(None, None)] * 3)
+    start, slope, least = found.x.tolist()
+    return start, slope, least
 
 
 @pytest.mark.parametrize("values", [{}, {"height.learn_limit": 0.2}, {"height.learn": "none"}])
@@ -324,7 +325,7 @@ def test_reciprocals_have_the_best_line_and_the_error_they_say(values: Values) -
 
 
 def test_the_cosine_is_close_where_it_counts() -> None:
-    """Within 9e-4 where cos x is more than the least one, and never more than that beyond the steepest angle."""
+    """Within 9e-4 where cos x is more than the least one, and no larger beyond the steepest angle."""
     x = np.linspace(0, STEEPEST_RAD, 10_001)
     second, fourth = COSINE_TERMS
     found = 1 - x**2 * (second - fourth * x**2)

@@ -1,4 +1,4 @@
-"""The constants of the limits against their definitions: linear programmes, tangents, the controller's check."""
+"""The constants of the limits against their definitions: linear programmes, tangents, what is refused."""
 
 import itertools
 import math
@@ -73,7 +73,7 @@ def deceleration_m_s2(settings: Settings) -> float:
     for angle, sign in itertools.product(ANGLES, (1, -1)):
         found = linprog([-sign * gains[angle]], bounds=[(-limit_rad, limit_rad)])
         most.append(-found.fun - sign * at_rest[angle])
-    return min(most)
+    return float(min(most))
 
 
 @pytest.mark.parametrize("values", [WORST_ROLL, WORST_PITCH, PLAIN])
@@ -127,7 +127,7 @@ def test_a_limit_that_is_not_set_is_the_widest_that_may_be_set(height: bool) -> 
 
 
 def test_limits_that_are_set_are_those_of_the_settings() -> None:
-    """In the order of nmpc_limits_t; a fence may have walls along one axis, or a floor and a ceiling, alone."""
+    """In the order of nmpc_limits_t; a fence may have walls along one axis alone."""
     walls = {"x_min_m": -1.0, "x_max_m": 2.0, "floor_m": -0.5, "ceiling_m": 3.0}
     height = {"height.climb_m_s": 0.7, "height.descent_m_s": 0.6}
     settings = limited(
@@ -189,7 +189,7 @@ def desired_m_s(settings: Settings, distance_m: Any) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("acceleration", ["tracked", "given", "none"])
 def test_braking_begins_and_ends_where_its_curve_touches_the_line(acceleration: str) -> None:
-    """v = k d touches v^2 = 2 A (d - d_0) at the knee; what is fed forward ends nearer, at a share of it."""
+    """The line v = k d touches v^2 = 2 A (d - d_0) at the knee; fed forward it ends nearer."""
     braking_m_s2 = 1.3
     settings = limited({"target.acceleration": acceleration}, braking_m_s2=braking_m_s2, speed_m_s=20.0)
     found = constants_of(settings)
@@ -238,7 +238,7 @@ def test_the_rate_of_updates_makes_changes_of_the_desired_velocity_accelerations
 
 @pytest.mark.parametrize("braking_m_s2", [0.3, 2.0])
 def test_formats_hold_their_largest_value_and_are_as_fine_as_that_allows(braking_m_s2: float) -> None:
-    """The largest fits in 31 bits with 1 % to spare, and twice as much would not; braking has three bits more."""
+    """The largest fits in 31 bits, and twice as much would not; braking has three bits more to spare."""
     settings = limited(WORST_ROLL, braking_m_s2=braking_m_s2)
     found = constants_of(settings)
     gives_m_s2 = deceleration_m_s2(

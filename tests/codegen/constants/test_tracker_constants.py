@@ -1,4 +1,4 @@
-"""The constants of the target tracker against their definitions: differences of flown paths, and simulations."""
+"""The constants of the target tracker against their definitions: differences of places, simulations."""
 
 from typing import Any
 
@@ -59,7 +59,7 @@ def largest_m_s2(settings: Settings, *, climb: bool) -> float:
     slope, rest, bounds = GRAVITY_M_S2, 0.0, (-limit_rad, limit_rad)
     if climb and height is not None:
         slope, rest, bounds = 1.0, -GRAVITY_M_S2, (height.thrust_min_m_s2, height.thrust_max_m_s2)
-    return max(sign * rest - linprog([-sign * slope], bounds=[bounds]).fun for sign in (1, -1))
+    return float(max(sign * rest - linprog([-sign * slope], bounds=[bounds]).fun for sign in (1, -1)))
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_no_input_within_its_range_is_beyond_the_limit_of_a_jump() -> None:
 
 @pytest.mark.parametrize("gain", [0.1, 0.3, 0.8])
 def test_the_bounds_of_the_estimates_are_those_of_the_worst_inputs(gain: float) -> None:
-    """Of an acceleration whose jerk is the largest at every step, to one per cent; the jerk is a tenth of it."""
+    """Of an acceleration whose jerk is the largest at every step, to 1 %; the jerk is a tenth of it."""
     found = tracker_of(with_option(QUADRATIC, "target.tracker_gain", gain))
     worst, jerk = 0.0, found.jerk_limit_m_step2_update
     for _ in range(3000):

@@ -1,6 +1,8 @@
-"""Margins against their definitions: what is changed by a margin has a pole on the unit circle, and not before."""
+"""Margins against their definitions: a loop that is changed by one has a pole on the unit circle."""
 
+import itertools
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 import control
@@ -40,6 +42,10 @@ class Broken:
         """Return the largest absolute pole with the loop's gain changed by a factor."""
         return float(np.abs(np.linalg.eigvals(self.a - gain * self.b @ self.c)).max())
 
+    def size_turned(self, turn: complex, angle_rad: float) -> float:
+        """Return the same with L times exp(turn angle)."""
+        return self.size(np.exp(turn * angle_rad))
+
     def size_delayed(self, steps: int) -> float:
         """Return the largest absolute pole with a dead time of `steps`."""
         n = len(self.a)
@@ -69,7 +75,7 @@ def margins(broken: Broken) -> LoopMargins:
 
 def edge(size: Callable[[float], float], points: Any) -> float:
     """Return where, along increasing or decreasing points, the largest absolute pole first reaches 1."""
-    for before, after in zip(points, points[1:], strict=False):
+    for before, after in itertools.pairwise(points.tolist()):
         if size(after) >= 1.0 + 1e-9:
             return float(brentq(lambda at: size(at) - (1.0 + 1e-9), before, after, xtol=1e-12))
     return float("nan")
@@ -91,9 +97,7 @@ def test_gain_margins_are_factors_at_which_a_pole_reaches_the_unit_circle(broken
 def test_the_phase_margin_is_the_turn_that_a_loop_bears(broken: Broken) -> None:
     """Either way: L times exp(i angle), a complex gain."""
     found, angles = margins(broken), np.linspace(0.0, np.pi, 400)
-    edges = [
-        edge(lambda angle, sign=sign: broken.size(np.exp(sign * 1j * angle)), angles) for sign in (1, -1)
-    ]
+    edges = [edge(partial(broken.size_turned, turn), angles) for turn in (1j, -1j)]
     if np.isnan(edges).all():
         assert found.phase_deg == found.delay_s == np.inf
         assert np.isnan(found.crossover_rad_s)
@@ -126,7 +130,7 @@ def test_sensitivities_are_the_largest_of_all_frequencies(broken: Broken) -> Non
 
 
 def test_the_loops_differ_in_what_they_show() -> None:
-    """One has two crossovers, of which the first is beyond 180 degrees; one has none; two have a lower margin."""
+    """One has two crossovers, the first beyond 180 degrees; one has none; two have a lower margin."""
     found = {name: margins(Broken(loop)) for name, loop in LOOPS.items()}
     rad_s = np.geomspace(0.02, np.pi / STEP_S, 20_000)
     loop = Broken(LOOPS["a resonance with a lead"]).returned(rad_s)
