@@ -62,7 +62,10 @@ ROOMS: Final = {
         ),
     ),
     "derive": Room(source=("sil/mambo_sil/model/derive/*.py",), tests=("tests/model/derive",)),
-    "fences": Room(source=("sil/mambo_sil/flight/fences.py",), tests=("tests/flight/test_fences.py",)),
+    "fences": Room(
+        source=("sil/mambo_sil/flight/fences.py",),
+        tests=("tests/flight/test_fences.py", "tests/flight/test_fence_metrics.py"),
+    ),
     "margins": Room(
         source=("sil/mambo_sil/experiment/margins/*.py",),
         tests=("tests/experiment/margins",),
