@@ -43,7 +43,7 @@ def drawn(seed: int, columns: int = 4) -> Trace:
     target[-1, 1::4, 2] = 0.0
     target[0, 1::2, 2:4] = target[1, 1::2, 2:4] = 0.0
     return Trace(
-        time_s=0.5 * np.arange(SAMPLES),
+        time_s=0.5 * np.arange(SAMPLES, dtype=np.float64),
         position_m=position_m,
         velocity_m_s=rng.normal(0, 2, (*shape, 3)),
         euler_rad=np.zeros((*shape, 3)),
@@ -185,9 +185,8 @@ def test_numbers_of_the_limits_are_changed_by_their_names() -> None:
     for settings in (MAMBO, with_option(height_settings(), "limits.speed_m_s", 3.0)):
         limiting = method_of(settings).limiting
         assert limiting is not None
-        names = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
-        if settings.height is not None:
-            names = (*names, "floor", "ceiling", "climb", "descent")
+        names = ["speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt"]
+        names += ["floor", "ceiling", "climb", "descent"] if settings.height is not None else []
         for index, name in enumerate(names):
             expected = limiting.limits.tolist()
             expected[index] = 0.123
