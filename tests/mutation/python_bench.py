@@ -4,7 +4,8 @@ python -m tests.mutation.python_bench ROOM STRIDE TURN FILE   try one mutant in 
                                                                and write to FILE which no test notices
 
 A process imports the tests once. A fork of it changes the code of functions and the values of constants in
-place, and runs the tests that reach the changed lines, the quickest first, until one fails.
+place, and runs the tests that reach the changed lines, the quickest first, until one fails. Slow tests are
+not run: the constants that flights depend on have tests of their own.
 """
 
 import faulthandler
@@ -22,7 +23,7 @@ from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType, FunctionType, ModuleType
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import pytest
 
@@ -32,6 +33,8 @@ from tests.mutation.python_mutants import PythonMutant, names_of, python_mutants
 ROOT: Final = Path(__file__).parents[2]
 SOURCE_ROOTS: Final = ("codegen", "sil")
 PACKAGES: Final = ("mambo_codegen", "mambo_sil", "tests")
+LONGEST_S: Final = 1.5
+"""Processor time, while lines are noted, of the longest test that is run on mutants."""
 LIMIT_S: Final = 60
 """Processor time of the tests of a mutant: one that needs more never ends."""
 
@@ -82,21 +85,21 @@ def mutants_of(room: Room) -> dict[Path, list[PythonMutant]]:
 
 
 class Bench:
-    """A plugin of pytest that runs the collected tests on mutants; `unnoticed` are those that all pass."""
+    """A plugin of pytest that runs the collected tests on mutants, and writes which of these pass all."""
 
-    def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]]) -> None:
-        self._chosen, self.unnoticed = chosen, list[PythonMutant]()
+    def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]], answer: TextIO) -> None:
+        self._chosen, self._answer = chosen, answer
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Run the tests on the source as it is, then on every mutant."""
         gc.freeze()  # a fork shares the memory that is not looked through for garbage
         files = frozenset(str(path) for path, _ in self._chosen)
         tests = [(item, *_in_a_fork(partial(_reached, session, item, files))) for item in session.items]
-        tests.sort(key=lambda one: one[1])
+        tests = sorted((one for one in tests if one[1] < LONGEST_S), key=lambda one: one[1])
         for path, mutant in self._chosen:
             reaching = [item for item, _, lines in tests if _reaches(lines.get(str(path), []), mutant)]
             if _in_a_fork(partial(_survives, session, path, mutant, reaching)):
-                self.unnoticed.append(mutant)
+                print(json.dumps(mutant.key), file=self._answer, flush=True)
         return True
 
 
@@ -221,12 +224,12 @@ def _recode(there: Any, function: Any) -> None:
 
 
 def main(name: str, stride: int, turn: int, answer: Path) -> None:
-    """Write which mutants of a room no test notices, as JSON."""
+    """Write the keys of mutants of a room that no test notices, one in a line, as JSON."""
     room = ROOMS[name]
-    bench = Bench([(path, one) for path, found in mutants_of(room).items() for one in found][turn::stride])
-    code = pytest.main(["-q", "-p", "no:cacheprovider", *room.tests], plugins=[bench])
+    chosen = [(path, one) for path, found in mutants_of(room).items() for one in found][turn::stride]
+    with answer.open("w", encoding="utf-8") as file:
+        code = pytest.main(["-q", "-p", "no:cacheprovider", *room.tests], plugins=[Bench(chosen, file)])
     assert code == 0, code
-    answer.write_text(json.dumps([one.key for one in bench.unnoticed]), "utf-8")
 
 
 if __name__ == "__main__":

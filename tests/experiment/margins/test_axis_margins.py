@@ -180,7 +180,7 @@ def test_frequencies_end_at_half_the_rates() -> None:
 def test_the_figures_at_each_place_are_those_of_the_loop_broken_there(
     name: str, sensors: SensorsName
 ) -> None:
-    """The largest sensitivity on the grid of ticks at the motors, else of updates; the height has no motors."""
+    """The largest sensitivity, on the grid of ticks at the motors; the height has no motors."""
     loops, found, period_s = hovering(name, sensors)
     for loop, margins in zip(loops, found, strict=True):
         updates, ticks = frequencies(loop, period_s, 400)
