@@ -46,7 +46,7 @@ class Room:
     source: tuple[str, ...]
     tests: tuple[str, ...]
     without: tuple[str, ...] = ()
-    """Names of files that only draw or print."""
+    """Names of files that another room has, or that only draw or print."""
 
     @property
     def files(self) -> list[Path]:
@@ -55,24 +55,35 @@ class Room:
         return sorted(path for path in found if path.name not in {"__init__.py", *self.without})
 
 
+_METHODS: Final = "codegen/mambo_codegen/methods/**"
+_CONSTANTS: Final = "tests/codegen/constants"
+_MARGINS: Final = "sil/mambo_sil/experiment/margins"
 ROOMS: Final = {
-    "constants": Room(
-        source=("codegen/mambo_codegen/methods/**/*constants.py", "codegen/mambo_codegen/methods/**/law.py"),
-        tests=(
-            "tests/codegen/constants",
-            "tests/codegen/test_limits.py",
-            *(f"tests/codegen/test_quadratic{name}.py" for name in ("", "_settings", "_loop")),
-        ),
-    ),
-    "derive": Room(source=("sil/mambo_sil/model/derive/*.py",), tests=("tests/model/derive",)),
     "fences": Room(
         source=("sil/mambo_sil/flight/fences.py",),
         tests=("tests/flight/test_fences.py", "tests/flight/test_fence_metrics.py"),
     ),
+    "tracker": Room((f"{_METHODS}/tracker_constants.py",), (f"{_CONSTANTS}/test_tracker_constants.py",)),
+    "limits": Room(
+        source=(f"{_METHODS}/limits_constants.py",),
+        tests=(f"{_CONSTANTS}/test_limits_constants.py", "tests/codegen/test_limits.py"),
+    ),
+    "height": Room((f"{_METHODS}/height_constants.py",), (f"{_CONSTANTS}/test_height_constants.py",)),
+    "laws": Room(
+        source=(f"{_METHODS}/*constants.py", f"{_METHODS}/law.py"),
+        tests=(
+            _CONSTANTS,
+            "tests/codegen/test_limits.py",
+            *(f"tests/codegen/test_quadratic{name}.py" for name in ("", "_settings", "_loop")),
+        ),
+        without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
+    ),
+    "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
+    "loops": Room((f"{_MARGINS}/loop_margins.py",), ("tests/experiment/margins/test_loop_margins.py",)),
     "margins": Room(
-        source=("sil/mambo_sil/experiment/margins/*.py",),
+        source=(f"{_MARGINS}/*.py",),
         tests=("tests/experiment/margins",),
-        without=("margins_plots.py", "margins_report.py"),
+        without=("loop_margins.py", "margins_plots.py", "margins_report.py"),
     ),
 }
 

@@ -138,7 +138,7 @@ class _Source:
         for child in ast.iter_child_nodes(node):
             if isinstance(child, ast.stmt):
                 yield from self._of_body([child], runs=lines is not None)
-            elif not isinstance(child, ast.JoinedStr | ast.arguments) and not _is_strict(child):
+            elif not isinstance(child, ast.JoinedStr | ast.arguments) and not _is_exact(child):
                 yield from self._of(child, lines)
 
     def _of_node(self, node: ast.AST) -> Iterator[tuple[int, int, str]]:
@@ -213,8 +213,12 @@ class _Source:
         return self._text[start:end]
 
 
-def _is_strict(node: ast.AST) -> bool:
-    return isinstance(node, ast.keyword) and node.arg == "strict"
+def _is_exact(node: ast.AST) -> bool:
+    """Return whether a node is a type, or says that a loop ends with all that it runs over."""
+    match node:
+        case ast.Subscript(value=ast.Name(id="Literal")) | ast.keyword(arg="strict"):
+            return True
+    return False
 
 
 def _exchanged(name: str, known: frozenset[str]) -> Iterator[str]:
