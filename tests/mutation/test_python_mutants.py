@@ -43,7 +43,7 @@ def in_function(line: str) -> set[str]:
         ("return min(a, b)", {"return max(a, b)"}),
         ("return a if b else low", {"return (a)", "return (low)", "return a if b else high"}),
         ("return a[1], 0.5", {"return a[2], 0.5", "return a[1], 0.55"}),
-        ("return 1.0 * climb_m_s", {"return 1.0 / climb_m_s", "return 1.1 * climb_m_s", "return 1.0 * descent_m_s"}),
+        ("return 2 * climb_m_s", {"return 2 / climb_m_s", "return 3 * climb_m_s", "return 2 * descent_m_s"}),
         ('return zip(a, ("low", "b"), strict=True)', {'return zip(a, ("high", "b"), strict=True)'}),
         ("return not a or b", {"return (a) or b", "return not a and b"}),
         ("return abs(a)", {"return (a)"}),
