@@ -214,9 +214,11 @@ class _Source:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Return whether a node is a type, or says that a loop ends with all that it runs over."""
+    """Return whether a node is a type, a setting of one, or says that a loop runs over all."""
     match node:
-        case ast.Subscript(value=ast.Name(id="Literal")) | ast.keyword(arg="strict"):
+        case ast.Subscript(value=ast.Name(id="Literal")) | ast.Call(func=ast.Name(id="ConfigDict")):
+            return True
+        case ast.keyword(arg="strict"):
             return True
     return False
 

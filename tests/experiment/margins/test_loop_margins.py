@@ -129,6 +129,14 @@ def test_sensitivities_are_the_largest_of_all_frequencies(broken: Broken) -> Non
         assert found.bandwidth_rad_s == pytest.approx(rad_s[np.argmax(s > np.sqrt(0.5))], rel=1e-3)
 
 
+@pytest.mark.parametrize(("margin", "found"), [(950.0, 950.0), (1050.0, np.inf)])
+def test_a_margin_above_a_thousand_is_none(margin: float, found: float) -> None:
+    """Upwards, of a loop of so small a gain."""
+    loop = LOOPS["an integrator with lags"]
+    weak = Broken(loop * margins(Broken(loop)).gain_up / margin)
+    assert margins(weak).gain_up == pytest.approx(found, rel=1e-5)
+
+
 def test_the_loops_differ_in_what_they_show() -> None:
     """One has two crossovers, the first beyond 180 degrees; one has none; two have a lower margin."""
     found = {name: margins(Broken(loop)) for name, loop in LOOPS.items()}

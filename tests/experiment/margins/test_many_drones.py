@@ -11,6 +11,7 @@ import pytest
 
 from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
+from mambo_sil.experiment.margins.margins_record import MarginSpread
 from mambo_sil.experiment.margins.many_drones import MeasuredDrone, summarise_drones, write_drones
 
 FIGURES: Final = {
@@ -71,7 +72,7 @@ def test_worst_and_median_are_those_of_all_drones(seed: int, motors: bool) -> No
     """The least of a margin, the largest of a sensitivity; an unstable loop is the worst."""
     drones = drawn(seed, motors=motors)
     summary = summarise_drones(drones, "drawn")
-    expected = []
+    expected: list[tuple[str, str | None, str, float, list[float]]] = []
     for number, name in enumerate(("roll", "pitch", "height")):
         axes = [drone.axes[number] for drone in drones]
         for place in ("command", "motors") if name != "height" and motors else ("command",):
@@ -81,7 +82,9 @@ def test_worst_and_median_are_those_of_all_drones(seed: int, motors: bool) -> No
                 expected.append((name, place, said, max(values) if larger else min(values), values))
         damping = [axis.poles.least_damping for axis in axes]
         expected.append((name, None, "least damping", min(damping), damping))
-    found = {(one.axis, one.place, one.figure): one for one in summary.spreads}
+    found: dict[tuple[str, str | None, str], MarginSpread] = {
+        (one.axis, one.place, one.figure): one for one in summary.spreads
+    }
     if motors:
         assert len(found) == len(expected)
     for name, place, said, worst, values in expected:
