@@ -21,6 +21,7 @@ LOOPS: Final = {
     "conditionally stable": 4.0 * (_S + 1) ** 2 / (_S**3 * (_S / 30 + 1) ** 2),
     "a resonance with a lead": 0.9 * _S * (_S / 1.7 + 1) / ((_S**2 + 0.3 * _S + 9.0) * (_S / 100 + 1) ** 2),
     "an unstable drone": 6.0 * (_S + 1) / (_S * (_S - 1) * (0.02 * _S + 1)),
+    "a lag of two steps": 2.0 / (0.02 * _S + 1),
     "a weak resonance": 0.15 * _S / (_S**2 + 0.3 * _S + 9.0),
 }
 

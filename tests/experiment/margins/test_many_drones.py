@@ -11,8 +11,8 @@ import pytest
 
 from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
-from mambo_sil.experiment.margins.margins_record import MarginSpread
 from mambo_sil.experiment.margins.many_drones import MeasuredDrone, summarise_drones, write_drones
+from mambo_sil.experiment.margins.margins_record import MarginSpread
 
 FIGURES: Final = {
     "gain margin": "gain_up",
@@ -82,13 +82,11 @@ def test_worst_and_median_are_those_of_all_drones(seed: int, motors: bool) -> No
                 expected.append((name, place, said, max(values) if larger else min(values), values))
         damping = [axis.poles.least_damping for axis in axes]
         expected.append((name, None, "least damping", min(damping), damping))
-    found: dict[tuple[str, str | None, str], MarginSpread] = {
-        (one.axis, one.place, one.figure): one for one in summary.spreads
-    }
+    found: dict[Any, MarginSpread] = {(one.axis, one.place, one.figure): one for one in summary.spreads}
     if motors:
         assert len(found) == len(expected)
-    for name, place, said, worst, values in expected:
-        one = found[name, place, said]
+    for *key, worst, values in expected:
+        one = found[tuple(key)]
         assert (one.worst, one.median) == (worst, statistics.median(values))
         assert one.drone == values.index(worst)
     assert summary.unstable == sum(any(not axis.stable for axis in drone.axes) for drone in drones)
