@@ -267,3 +267,58 @@ def test_limits_at_the_ends_of_the_ranges_are_allowed() -> None:
     fence = {"fence.x_min_m": -50.0, "fence.x_max_m": 50.0}
     settings = limited(base, speed_m_s=3.0, braking_m_s2=most_m_s2, **fence)
     assert constants_of(settings).limits[:5].tolist() == [3.0, most_m_s2, -50.0, -50.0, 50.0]
+    with pytest.raises(ValueError, match="x_min_m"):
+        limited(base, speed_m_s=3.0, **{"fence.x_min_m": -51.0, "fence.x_max_m": 49.0})
+
+
+def test_numbers_of_fixed_point_stand_for_the_limits() -> None:
+    """Each limit has the format of its quantity, as what follows from it in the controller shows."""
+    walls = {
+        "x_min_m": -1.0,
+        "x_max_m": 2.0,
+        "y_min_m": -3.0,
+        "y_max_m": 1.5,
+        "floor_m": -0.5,
+        "ceiling_m": 3.0,
+    }
+    fence = {f"fence.{name}": place_m for name, place_m in walls.items()}
+    height = {"height.climb_m_s": 0.7, "height.descent_m_s": 0.6, "code.scalar": "fixed"}
+    settings = limited(CRAZYFLIE | height, braking_m_s2=1.5, tilt_rad=0.4, **fence)
+    method, memory = method_of(settings), controller(settings).memory
+    bounds, lift = memory.limits.bounds, memory.height_bounds
+
+    def si(number: Any, quantity: str) -> list[float]:
+        return [float(one) for one in np.ravel(method.numbers.to_si(np.atleast_1d(number), quantity))]
+
+    assert si(bounds.speed_m_s, "velocity") == pytest.approx([2.0], rel=1e-4)
+    assert si(bounds.braking, "braking") == pytest.approx([3.0], rel=1e-4)
+    assert si(bounds.centre_m, "position") == pytest.approx([0.5, -0.75], rel=1e-4)
+    assert si(bounds.clear_m + bounds.margin_m[:, None], "position") == pytest.approx([1.5, 2.25], rel=1e-4)
+    assert si(bounds.tilt_rad, "angle") == pytest.approx([0.4], rel=1e-4)
+    assert si([lift.floor_m, lift.ceiling_m], "position") == pytest.approx([-0.5, 3.0], rel=1e-4)
+    up_m, down_m = si([lift.up_m, lift.down_m], "position")
+    assert up_m / down_m == pytest.approx(0.7 / 0.6, rel=1e-4)
+    stored = controller(settings).step(np.zeros((1, 10)), np.zeros((1, 8))).stored[0].tolist()
+    first = next(
+        at for at in range(len(stored)) if stored[at : at + 2] == pytest.approx([0.5, -0.75], rel=1e-4)
+    )
+    clear_x_m, clear_y_m, margin_m, knee_m, near_m, *others = stored[first + 2 : first + 10]
+    assert [clear_x_m + margin_m, clear_y_m + margin_m] == pytest.approx([1.5, 2.25], rel=1e-4)
+    assert margin_m == pytest.approx(2.0**2 / 3.0 + knee_m / 2, rel=1e-3), "2 m/s, and half the knee"
+    assert near_m in (pytest.approx(knee_m, rel=1e-3), pytest.approx(0.7 * knee_m, rel=1e-3))
+    assert others == pytest.approx([2.0, 3.0, 0.4], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("limits", "has"),
+    [
+        ({}, False),
+        ({"limits.fence.y_max_m": 1.0, "limits.fence.y_min_m": -1.0}, True),
+        ({"limits.speed_m_s": 1.0}, True),
+        ({"limits.braking_m_s2": 1.0}, True),
+        ({"limits.tilt_rad": 0.3}, False),
+    ],
+)
+def test_speed_braking_or_a_fence_alone_give_a_controller_limits(limits: Values, has: bool) -> None:
+    """A tilt limit, which every controller has, does not."""
+    assert (method_of(settings_of(TWO_MOVES | limits)).limiting is not None) is has

@@ -21,6 +21,8 @@ LOOPS: Final = {
     "conditionally stable": 4.0 * (_S + 1) ** 2 / (_S**3 * (_S / 30 + 1) ** 2),
     "a resonance with a lead": 0.9 * _S * (_S / 1.7 + 1) / ((_S**2 + 0.3 * _S + 9.0) * (_S / 100 + 1) ** 2),
     "an unstable drone": 6.0 * (_S + 1) / (_S * (_S - 1) * (0.02 * _S + 1)),
+    "two lower margins": 200.0 * (_S + 1) ** 2 / (_S * (10 * _S + 1) ** 2 * (_S / 30 + 1) ** 2),
+    "a margin of a twentieth": 34.06 / (_S * (0.1 * _S + 1) * (0.03 * _S + 1)),
     "a lag of two steps": 2.0 / (0.02 * _S + 1),
     "a weak resonance": 0.15 * _S / (_S**2 + 0.3 * _S + 9.0),
 }
@@ -123,9 +125,9 @@ def test_sensitivities_are_the_largest_of_all_frequencies(broken: Broken) -> Non
     found, rad_s = margins(broken), np.geomspace(0.02, np.pi / STEP_S, 50_000)
     loop = broken.returned(rad_s)
     s, t = np.abs(1 / (1 + loop)), np.abs(loop / (1 + loop))
-    assert found.sensitivity == pytest.approx(s.max(), rel=1e-6)
+    assert found.sensitivity == pytest.approx(s.max(), rel=1e-5)
     assert found.sensitivity_rad_s == pytest.approx(rad_s[s.argmax()], rel=1e-3)
-    assert found.complementary == pytest.approx(t.max(), rel=1e-6)
+    assert found.complementary == pytest.approx(t.max(), rel=1e-5)
     if s[0] < np.sqrt(0.5):
         assert found.bandwidth_rad_s == pytest.approx(rad_s[np.argmax(s > np.sqrt(0.5))], rel=1e-3)
 
@@ -146,6 +148,8 @@ def test_the_loops_differ_in_what_they_show() -> None:
     first, last = np.flatnonzero((np.abs(loop[:-1]) > 1) != (np.abs(loop[1:]) > 1))
     assert np.degrees(np.angle(loop[[first, last]])) == pytest.approx([129.0, -20.0], abs=2.0)
     assert {name for name, one in found.items() if one.gain_down > 0.0} == {
-        *("conditionally stable", "an unstable drone")
+        *("conditionally stable", "an unstable drone", "two lower margins")
     }
+    assert found["two lower margins"].gain_down > 0.1, "not the lower of both"
+    assert 1.0 < found["a margin of a twentieth"].gain_up < 1.1
     assert {name for name, one in found.items() if one.delay_s == np.inf} == {"a weak resonance"}

@@ -85,8 +85,8 @@ def test_worst_and_median_are_those_of_all_drones(seed: int, motors: bool) -> No
     found: dict[Any, MarginSpread] = {(one.axis, one.place, one.figure): one for one in summary.spreads}
     if motors:
         assert len(found) == len(expected)
-    for *key, worst, values in expected:
-        one = found[tuple(key)]
+    for *where, worst, values in expected:
+        one = found[tuple(where)]
         assert (one.worst, one.median) == (worst, statistics.median(values))
         assert one.drone == values.index(worst)
     assert summary.unstable == sum(any(not axis.stable for axis in drone.axes) for drone in drones)
