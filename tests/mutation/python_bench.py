@@ -68,7 +68,10 @@ ROOMS: Final = {
         source=(f"{_METHODS}/limits_constants.py",),
         tests=(f"{_CONSTANTS}/test_limits_constants.py", "tests/codegen/test_limits.py"),
     ),
-    "height": Room((f"{_METHODS}/height_constants.py",), (f"{_CONSTANTS}/test_height_constants.py",)),
+    "height": Room(
+        source=(f"{_METHODS}/height_constants.py",),
+        tests=(f"{_CONSTANTS}/test_height_constants.py", f"{_CONSTANTS}/test_tracker_constants.py"),
+    ),
     "laws": Room(
         source=(f"{_METHODS}/*constants.py", f"{_METHODS}/law.py"),
         tests=(
