@@ -15,6 +15,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text
+from mambo_sil.model.derive.step_response import fit_steps
 from tests.support.scenarios import changed
 
 GENERIC = vehicle_toml.preset("generic")
@@ -65,6 +66,7 @@ def test_the_braking_is_a_share_of_what_the_tilt_gives(
         found = linprog([-sign * slope * gain], bounds=[(-limit_rad, limit_rad)])
         most.append(-found.fun - sign * slope * trim_rad)
     assert settings.limits.braking_m_s2 == pytest.approx(0.65 * min(most), rel=ROUNDED)
+    assert (settings.model.roll_gain, settings.model.pitch_gain) == gains
     limiting = method_of(settings).limiting
     assert limiting is not None
     assert limiting.tilted.at(limit_rad) == pytest.approx(min(most), rel=1e-9)
@@ -92,7 +94,7 @@ def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_
     )
 
 
-@pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.002, 0.3])
+@pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.00105, 0.002, 0.3])
 def test_the_noise_of_the_position_is_that_of_the_sensors(noise_m: float) -> None:
     """At least a millimetre."""
     found = settings_for(changed(GENERIC, sensors={"position_noise_m": noise_m})).observer
@@ -145,3 +147,38 @@ def test_the_response_time_is_the_mean_of_both_axes(lags_s: tuple[float, float])
     assert settings.cost.response_time_s == pytest.approx(max(mean_s, 0.1), rel=ROUNDED)
     assert (settings.model.roll_lag_s, settings.model.pitch_lag_s) == lags_s
     assert math.isclose(settings.model.roll_delay_s, 0.02)
+
+
+@pytest.mark.parametrize(("braking_m_s2", "has"), [(0.105, True), (0.095, False)])
+def test_the_least_braking_is_the_least_that_settings_allow(braking_m_s2: float, has: bool) -> None:
+    """A drone that hardly tilts has limits as long as they are not refused."""
+    half_rad = braking_m_s2 / (0.65 * GRAVITY_M_S2)
+    limits = settings_for(strong(1.0 / math.cos(2.0 * half_rad))).limits
+    assert limits.braking_m_s2 == (pytest.approx(braking_m_s2, rel=ROUNDED) if has else 0.0)
+
+
+@pytest.mark.parametrize("largest_m_s2", [30.0, 51.0, 54.0, 130.5])
+def test_every_thrust_of_a_drone_is_in_the_range(largest_m_s2: float) -> None:
+    """The next whole number of m/s^2 above the largest; the default where that is enough."""
+    drone = changed(GENERIC, altitude={"thrust_max_n": largest_m_s2 * GENERIC.body.mass_kg})
+    found = settings_for(drone).ranges.thrust_acceleration_max_m_s2
+    assert found >= largest_m_s2 - 1e-9
+    assert (
+        found < largest_m_s2 + 1.0
+        or found == type(settings_for(GENERIC).ranges)().thrust_acceleration_max_m_s2
+    )
+
+
+def test_the_model_is_the_fit_of_each_axis() -> None:
+    """Of a drone whose inner loops are known, with three digits: lag, delay, integral part."""
+    drone = vehicle_toml.preset("mambo")
+    model = settings_for(drone).model
+    roll, pitch = fit_steps(drone)
+    for name, fit in (("roll", roll), ("pitch", pitch)):
+        for key, value in (
+            ("lag_s", fit.lag_s),
+            ("delay_s", fit.delay_s),
+            ("integral_1_s", fit.integral_1_s),
+        ):
+            assert getattr(model, f"{name}_{key}") == pytest.approx(value, rel=ROUNDED)
+    assert roll.lag_s != pytest.approx(pitch.lag_s, rel=0.1)
