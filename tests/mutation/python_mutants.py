@@ -214,13 +214,19 @@ class _Source:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Return whether a node is a type, a setting of one, or says that a loop runs over all."""
+    """Return whether a node is a type or a setting of one, chooses words, or says that a loop runs over all."""
     match node:
         case ast.Subscript(value=ast.Name(id="Literal")) | ast.Call(func=ast.Name(id="ConfigDict")):
             return True
         case ast.keyword(arg="strict"):
             return True
+        case ast.IfExp(body=body, orelse=orelse):
+            return all(_is_text(branch) for branch in (body, orelse))
     return False
+
+
+def _is_text(node: ast.expr) -> bool:
+    return isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
 
 
 def _exchanged(name: str, known: frozenset[str]) -> Iterator[str]:

@@ -47,6 +47,7 @@ def in_function(line: str) -> set[str]:
         ('return zip(a, ("low", "b"), strict=True)', {'return zip(a, ("high", "b"), strict=True)'}),
         ("return not a or b", {"return (a) or b", "return not a and b"}),
         ("return abs(a)", {"return (a)"}),
+        ('return "few" if a < b else f"{a} times"', set()),
         ('raise ValueError("a" + b)', set()),
         ('"""a + b"""', set()),
         ("c: float", set()),

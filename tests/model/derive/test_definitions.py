@@ -15,7 +15,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text
-from mambo_sil.model.derive.step_response import fit_steps
+from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.scenarios import changed
 
 GENERIC = vehicle_toml.preset("generic")
@@ -182,3 +182,13 @@ def test_the_model_is_the_fit_of_each_axis() -> None:
         ):
             assert getattr(model, f"{name}_{key}") == pytest.approx(value, rel=ROUNDED)
     assert roll.lag_s != pytest.approx(pitch.lag_s, rel=0.1)
+
+
+def test_the_answer_to_a_step_begins_at_0_and_ends_at_1() -> None:
+    """Of roll and pitch, each to its own command, over three seconds of the simulation's ticks."""
+    drone = vehicle_toml.preset("mambo")
+    answers = _answers(drone)
+    assert answers.shape == (2, round(3.0 / drone.step_s) + 1)
+    assert answers[:, 0].tolist() == [0.0, 0.0]
+    assert answers[:, -1] == pytest.approx([1.0, 1.0], abs=0.03)
+    assert np.argmax(answers[1] > 0.5) < np.argmax(answers[0] > 0.5), "pitch is quicker"
