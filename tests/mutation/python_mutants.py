@@ -214,7 +214,7 @@ class _Source:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Return whether a node is a type or a setting of one, chooses words, or says that a loop runs over all."""
+    """Return whether a node is a type or its setting, chooses words, or says that a loop runs over all."""
     match node:
         case ast.Subscript(value=ast.Name(id="Literal")) | ast.Call(func=ast.Name(id="ConfigDict")):
             return True
