@@ -58,6 +58,7 @@ class Room:
 _METHODS: Final = "codegen/mambo_codegen/methods/**"
 _CONSTANTS: Final = "tests/codegen/constants"
 _MARGINS: Final = "sil/mambo_sil/experiment/margins"
+_MARGIN_TESTS: Final = "tests/experiment/margins"
 ROOMS: Final = {
     "fences": Room(
         source=("sil/mambo_sil/flight/fences.py",),
@@ -82,11 +83,23 @@ ROOMS: Final = {
         without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
     ),
     "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
-    "loops": Room((f"{_MARGINS}/loop_margins.py",), ("tests/experiment/margins/test_loop_margins.py",)),
+    "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),
+    "axes": Room((f"{_MARGINS}/axis_margins.py",), (f"{_MARGIN_TESTS}/test_axis_margins.py",)),
+    "drones": Room(
+        source=(f"{_MARGINS}/corners.py", f"{_MARGINS}/many_drones.py"),
+        tests=(f"{_MARGIN_TESTS}/test_corners.py", f"{_MARGIN_TESTS}/test_many_drones.py"),
+    ),
+    "hover": Room(
+        source=(f"{_MARGINS}/hover_loop.py",),
+        tests=(f"{_MARGIN_TESTS}/test_hover_loop.py", f"{_MARGIN_TESTS}/test_axis_margins.py"),
+    ),
     "margins": Room(
         source=(f"{_MARGINS}/*.py",),
-        tests=("tests/experiment/margins",),
-        without=("loop_margins.py", "margins_plots.py", "margins_report.py"),
+        tests=(_MARGIN_TESTS,),
+        without=(
+            *("loop_margins.py", "axis_margins.py", "corners.py", "many_drones.py", "hover_loop.py"),
+            *("margins_plots.py", "margins_report.py"),
+        ),
     ),
 }
 
