@@ -9,6 +9,7 @@ _EQUAL: Final = "two numbers that are equal"
 _CHOICE: Final = "a choice, which has no definition: flights judge it, and the committed C shows it"
 _PARITY: Final = "C and reference then differ, which parity shows"
 _SIZE: Final = "only its absolute value counts"
+_WORDS: Final = "words of a comment"
 _ROOT: Final = "the root lies in the wider interval too"
 
 REASONS: Final[Mapping[Key, str]] = {
@@ -170,4 +171,57 @@ REASONS: Final[Mapping[Key, str]] = {
         "least = int(np.argmin(leads)) if len(leads) else None",
         "leads -> phases #1",
     ): "both have a number for each crossover",
+    **{
+        ("derived_settings.py", f"{name}: Final = {value}", f"{value} -> {wrong}"): _CHOICE
+        for name, value, wrong in (("RAMP_S", "0.4", "0.44000000000000006"),)
+    },
+    **{
+        ("derived_settings.py", line, change): _WORDS
+        for line, change in (
+            ("ticks = round(period_s * rate_hz)", "round(period_s * rate_hz) -> (period_s * rate_hz)"),
+            ("ticks = round(period_s * rate_hz)", "* -> /"),
+            ("if slowness_s < QUICKEST_RESPONSE_S:", "< -> <="),
+            ("if slowness_s < QUICKEST_RESPONSE_S:", "< -> >"),
+            ("if half_rad > most_rad:", "> -> <"),
+            ("if half_rad > most_rad:", "> -> >="),
+        )
+    },
+    **{
+        ("derived_settings.py", line, change): _EQUAL
+        for line, change in (
+            ("if braking_m_s2 >= LEAST_BRAKING_M_S2:", ">= -> >"),
+            ("if largest_m_s2 > MOST_THRUST_M_S2:", "> -> >="),
+            (
+                "if (drone.rotors is None and drone.thrust is None) or most_m_s2 < LEAST_THRUST_MAX_M_S2:",
+                "< -> <=",
+            ),
+        )
+    },
+    **{
+        ("step_response.py", line, change): "the loops are linear, and at rest long before and behind"
+        for line, change in (
+            ("STEP_RAD: Final = 0.1", "0.1 -> 0.11000000000000001"),
+            ("DURATION_S: Final = 3.0", "3.0 -> 3.3000000000000003"),
+            ("_BEFORE_S: Final = SETTLE_S + 0.5", "0.5 -> 0.55"),
+        )
+    },
+    (
+        "step_response.py",
+        "state = vehicle.at_rest(np.zeros((3, 2)), 0.0, airframe_of(drone).hover_command)",
+        "zeros -> ones",
+    ): "the attitude does not depend on the place",
+    **{
+        (
+            "step_response.py",
+            "first, last = -round(_BEFORE_S / PERIOD_S), round(DURATION_S / PERIOD_S)",
+            f"round({time} / PERIOD_S) -> ({time} / PERIOD_S)",
+        ): "a whole number anyway"
+        for time in ("_BEFORE_S", "DURATION_S")
+    },
+    ("height_constants.py", "while error > RECIPROCAL_ERROR:", "> -> >="): _EQUAL,
+    (
+        "height_constants.py",
+        "margin = found.error + 1e-5",
+        "1e-5 -> 1.1000000000000001e-05",
+    ): "a choice: more than all roundings",
 }

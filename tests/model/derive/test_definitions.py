@@ -83,7 +83,7 @@ def test_the_update_period_is_the_nearest_of_all_numbers_of_ticks(rate_hz: int) 
 
 
 @pytest.mark.parametrize("rate_hz", [10, 20, 50, 100])
-@pytest.mark.parametrize("delay_s", [0.0, 0.03])
+@pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.19])
 def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_s: float) -> None:
     """At updates every 10 ms, over two seconds; at most 0.2 s, which settings allow."""
     sensors = {"position_rate_hz": rate_hz, "position_delay_s": delay_s}
@@ -94,11 +94,11 @@ def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_
     )
 
 
-@pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.00105, 0.002, 0.3])
+@pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.00105, 0.002, 0.3, 50.0])
 def test_the_noise_of_the_position_is_that_of_the_sensors(noise_m: float) -> None:
-    """At least a millimetre."""
+    """At least a millimetre, at most the 10 m that settings allow."""
     found = settings_for(changed(GENERIC, sensors={"position_noise_m": noise_m})).observer
-    assert found.position_noise == max(noise_m, 0.001)
+    assert found.position_noise == min(max(noise_m, 0.001), 10.0)
 
 
 @pytest.mark.parametrize("ratio", [1.3, 5.0])
@@ -192,3 +192,18 @@ def test_the_answer_to_a_step_begins_at_0_and_ends_at_1() -> None:
     assert answers[:, 0].tolist() == [0.0, 0.0]
     assert answers[:, -1] == pytest.approx([1.0, 1.0], abs=0.03)
     assert np.argmax(answers[1] > 0.5) < np.argmax(answers[0] > 0.5), "pitch is quicker"
+
+
+def test_a_drone_without_sensors_is_calm() -> None:
+    """With the noise of a filtered velocity, as with motion capture, and a third of its disturbance."""
+    seen = vehicle_toml.preset("generic").model_dump()
+    blind = settings_for(VehicleFile.model_validate(seen | {"sensors": {"kind": "none"}})).observer
+    captured = settings_for(GENERIC).observer
+    assert blind.velocity_noise == captured.velocity_noise == 0.15
+    assert (blind.disturbance_noise, captured.disturbance_noise) == (1.0, 3.0)
+    assert blind.position_noise == type(blind)().position_noise
+
+
+def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:
+    """That settings allow."""
+    assert settings_for(strong(1.00001)).limits.tilt_rad == 0.01
