@@ -73,12 +73,16 @@ ROOMS: Final = {
         source=(f"{_METHODS}/height_constants.py",),
         tests=(f"{_CONSTANTS}/test_height_constants.py", f"{_CONSTANTS}/test_tracker_constants.py"),
     ),
+    "inputs": Room(
+        source=(f"{_METHODS}/constants.py",),
+        tests=tuple(f"{_CONSTANTS}/test_{name}.py" for name in ("input_ranges", "one_norm_constants")),
+    ),
     "laws": Room(
-        source=(f"{_METHODS}/*constants.py", f"{_METHODS}/law.py"),
+        source=(f"{_METHODS}/*_constants.py", f"{_METHODS}/law.py"),
         tests=(
-            _CONSTANTS,
-            "tests/codegen/test_limits.py",
-            *(f"tests/codegen/test_quadratic{name}.py" for name in ("", "_settings", "_loop")),
+            f"{_CONSTANTS}/test_limits_constants.py",
+            "tests/codegen/test_quadratic.py",
+            "tests/codegen/test_quadratic_settings.py",
         ),
         without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
     ),
