@@ -80,6 +80,7 @@ ROOMS: Final = {
     "laws": Room(
         source=(f"{_METHODS}/*_constants.py", f"{_METHODS}/law.py"),
         tests=(
+            f"{_CONSTANTS}/test_attitude_constants.py",
             f"{_CONSTANTS}/test_limits_constants.py",
             "tests/codegen/test_quadratic.py",
             "tests/codegen/test_quadratic_settings.py",
