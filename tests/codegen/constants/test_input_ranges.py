@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from tests.support.height import CRAZYFLIE
 from tests.support.quadratic import TWO_MOVES, settings_of

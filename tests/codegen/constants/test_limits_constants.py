@@ -9,9 +9,14 @@ import pytest
 from scipy.optimize import brentq, linprog, minimize_scalar
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
-from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw
-from mambo_codegen.methods.limits_constants import BRAKING_SHARE, SPELLING, LimitsConstants, limits_bits
+from mambo_codegen.methods.shared.inputs import Status
+from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw
+from mambo_codegen.methods.shared.limits_constants import (
+    BRAKING_SHARE,
+    SPELLING,
+    LimitsConstants,
+    limits_bits,
+)
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from tests.support.height import CRAZYFLIE

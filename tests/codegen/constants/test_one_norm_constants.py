@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings

@@ -8,7 +8,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import linprog
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.tracker_constants import JERK_SHARE, JUMP_MARGIN, TrackerConstants
+from mambo_codegen.methods.shared.tracker_constants import JERK_SHARE, JUMP_MARGIN, TrackerConstants
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
