@@ -7,7 +7,7 @@ import pytest
 
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.margins.corners import at_ends, corners, in_words, intervals
+from mambo_sil.experiment.margins.corners import at_ends, corners, in_words, intervals, uncertain
 
 WIDTHS: Final = {
     "attitude.roll.gain": 0.11,
@@ -78,12 +78,21 @@ def test_intervals_are_those_of_the_file() -> None:
 
 def test_no_end_lies_outside_of_the_ranges_of_a_file() -> None:
     """Where the interval is wider than the range the drone is at its end, which the file's schema takes."""
-    drone = uncertain_drone(factor=1000.0)
+    drone = uncertain_drone(factor=3000.0)
     low, high = (at_ends(drone, dict.fromkeys(PROPERTY.values(), end)) for end in (-1, 1))
     expected = {"gain": (0.1, 3.0), "lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2)}
     for key in WIDTHS:
         name = PROPERTY[key.rpartition(".")[2]]
         if name in expected:
             assert (value_of(low, key), value_of(high, key)) == expected[name], key
-    assert value_of(low, "body.drag_1_s") == 0.0
-    assert value_of(high, "body.drag_1_s") == pytest.approx(50.15)
+    assert (value_of(low, "body.drag_1_s"), value_of(high, "body.drag_1_s")) == (0.0, 100.0)
+
+
+def test_intervals_of_the_thrust_stay_with_a_height_only() -> None:
+    """And a drone without intervals stays as it is."""
+    drone = uncertain_drone()
+    assert uncertain(drone, height=True) == drone
+    without = intervals(uncertain(drone, height=False))
+    assert not any(key.startswith("thrust") and width for keys in without.values() for key, width in keys)
+    certain = vehicle_toml.preset("crazyflie-flown")
+    assert uncertain(certain, height=False) == uncertain(certain, height=True) == certain

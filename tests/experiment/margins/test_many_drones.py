@@ -9,9 +9,15 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
+from mambo_sil.experiment.campaign.campaign_file import default
 from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
-from mambo_sil.experiment.margins.many_drones import MeasuredDrone, summarise_drones, write_drones
+from mambo_sil.experiment.margins.many_drones import (
+    MeasuredDrone,
+    _of_a_drone,
+    summarise_drones,
+    write_drones,
+)
 from mambo_sil.experiment.margins.margins_record import MarginSpread
 
 FIGURES: Final = {
@@ -27,9 +33,9 @@ def drawn_loop(rng: np.random.Generator) -> LoopMargins:
     return LoopMargins(**{name: float(rng.uniform(1, 2)) for name in LoopMargins.model_fields})
 
 
-def drawn_axis(rng: np.random.Generator, name: str, *, motors: bool) -> Margins:
-    """Return an axis, in one of six cases of an unstable loop."""
-    stable = bool(rng.random() > 1 / 6)
+def drawn_axis(rng: np.random.Generator, name: str, *, motors: bool, unstable: float) -> Margins:
+    """Return an axis; `unstable` is the share of unstable loops."""
+    stable = bool(rng.random() > unstable)
     poles = Poles(least_damping=rng.uniform(-1, 1), least_damped_rad_s=1.0, slowest_s=1.0, growth_1_s=-1.0)
     shared: dict[str, Any] = {
         "stable": stable,
@@ -46,13 +52,16 @@ def drawn_axis(rng: np.random.Generator, name: str, *, motors: bool) -> Margins:
     )
 
 
-def drawn(seed: int, *, motors: bool = True) -> list[MeasuredDrone]:
+def drawn(seed: int, *, motors: bool = True, unstable: float = 1 / 6) -> list[MeasuredDrone]:
     """Return eleven drones with three axes."""
     rng = np.random.default_rng(seed)
     return [
         MeasuredDrone(
             {"number": float(number)},
-            tuple(drawn_axis(rng, name, motors=motors) for name in ("roll", "pitch", "height")),
+            tuple(
+                drawn_axis(rng, name, motors=motors, unstable=unstable)
+                for name in ("roll", "pitch", "height")
+            ),
         )
         for number in range(11)
     ]
@@ -93,10 +102,11 @@ def test_worst_and_median_are_those_of_all_drones(seed: int, motors: bool) -> No
     assert (summary.drones, summary.origin) == (11, "drawn")
 
 
+@pytest.mark.parametrize("unstable", [0.0, 1 / 6])
 @pytest.mark.parametrize("seed", range(5))
-def test_the_worst_drone_has_the_largest_sensitivity(seed: int) -> None:
+def test_the_worst_drone_has_the_largest_sensitivity(seed: int, unstable: float) -> None:
     """Of all places and axes; the first unstable one, if any."""
-    drones = drawn(seed)
+    drones = drawn(seed, unstable=unstable)
     sizes = [
         max(
             math.inf
@@ -126,3 +136,14 @@ def test_a_row_of_the_file_has_the_figures_of_its_drone(tmp_path: Path) -> None:
             assert float(row[f"{axis.axis}_pole_least_damping"]) == pytest.approx(
                 axis.poles.least_damping, rel=1e-5
             )
+
+
+def test_what_distinguishes_a_drone_is_what_was_drawn() -> None:
+    """The draws on which margins depend, each by its own name."""
+    values = default().draw(0)
+    found = _of_a_drone(values)
+    assert {"mass_kg", "inertia_scale_x", "inertia_scale_y", "motor_lag_s", "command_delay_ticks"} < set(
+        found
+    )
+    assert found == {name: values[name] for name in found}
+    assert len(found) == 8
