@@ -75,7 +75,11 @@ ROOMS: Final = {
     ),
     "inputs": Room(
         source=(f"{_METHODS}/constants.py",),
-        tests=tuple(f"{_CONSTANTS}/test_{name}.py" for name in ("input_ranges", "one_norm_constants")),
+        tests=(
+            *(f"{_CONSTANTS}/test_{name}.py" for name in ("input_ranges", "one_norm_constants")),
+            *(f"{_CONSTANTS}/test_{name}.py" for name in ("stored_numbers", "tracker_constants")),
+            "tests/codegen/test_limits.py",
+        ),
     ),
     "laws": Room(
         source=(f"{_METHODS}/*_constants.py", f"{_METHODS}/law.py"),
@@ -96,7 +100,9 @@ ROOMS: Final = {
     ),
     "hover": Room(
         source=(f"{_MARGINS}/hover_loop.py",),
-        tests=(f"{_MARGIN_TESTS}/test_hover_loop.py", f"{_MARGIN_TESTS}/test_axis_margins.py"),
+        tests=tuple(
+            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "axis_margins", "linear", "control")
+        ),
     ),
     "margins": Room(
         source=(f"{_MARGINS}/*.py",),

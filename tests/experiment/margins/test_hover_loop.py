@@ -11,6 +11,7 @@ from mambo_sil.experiment.margins.controller_jacobian import linear_controller
 from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians
 from mambo_sil.experiment.margins.hover_loop import (
     AT_COMMAND,
+    SEEN_OF,
     SENT,
     PeriodicLoop,
     axis_loop,
@@ -20,6 +21,7 @@ from mambo_sil.experiment.margins.hover_loop import (
 from mambo_sil.experiment.margins.loop_margins import open_loop, sensitivity
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Hover
+from tests.support.height_settings import height_settings
 
 TICKS, K, INPUTS, OUTPUTS = 3, 5, 2, 4
 
@@ -113,3 +115,11 @@ def test_a_delay_of_whole_updates_turns_the_open_loop_back(updates: int) -> None
     for axis in range(2):
         late = opened(updates * flight.ticks_per_update, axis)
         assert late == pytest.approx(opened(0, axis) * turn, rel=1e-6)
+
+
+def test_a_command_depends_on_the_seen_numbers_of_its_axis() -> None:
+    """By the C: position, velocity and angle of roll and pitch, height and climb; and on no others."""
+    system = linear_controller(height_settings())
+    for axis, columns in enumerate(SEEN_OF):
+        read = np.flatnonzero(np.abs(system.d[axis]) > 1e-6 * np.abs(system.d[axis]).max())
+        assert {*columns[:2]} <= set(read.tolist()) <= set(columns)
