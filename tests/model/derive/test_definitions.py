@@ -45,7 +45,12 @@ def test_the_tilt_limit_is_half_the_tilt_that_carries_the_weight(ratio: float) -
 
 @pytest.mark.parametrize(
     ("gains", "trims_rad"),
-    [((0.8, 1.1), (0.03, -0.01)), ((1.2, 0.9), (0.0, -0.04)), ((1.0, 1.0), (0.0, 0.0))],
+    [
+        ((0.8, 1.1), (0.03, -0.01)),
+        ((0.8, 1.1), (-0.05, 0.02)),
+        ((1.2, 0.9), (0.0, -0.04)),
+        ((1.0, 1.0), (0.0, 0.0)),
+    ],
 )
 def test_the_braking_is_a_share_of_what_the_tilt_gives(
     gains: tuple[float, float], trims_rad: tuple[float, float]
