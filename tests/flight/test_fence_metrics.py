@@ -54,17 +54,28 @@ def drawn(seed: int, columns: int = 4) -> Trace:
     )
 
 
-def walled(**walls: float) -> Settings:
-    """Return preset mambo with walls."""
-    document = MAMBO.model_dump()
-    document["limits"]["fence"] |= walls
+LOW, HIGH = dict.fromkeys(("x", "y", "z"), -np.inf), dict.fromkeys(("x", "y", "z"), np.inf)
+"""No walls, by their axes; the height is up."""
+
+
+def walled(low: dict[str, float], high: dict[str, float]) -> Settings:
+    """Return preset mambo with walls, with a height the Crazyflie's."""
+    base = height_settings() if "z" in low else MAMBO
+    document = base.model_dump(exclude_none=True)
+    document["limits"]["fence"] |= {f"{axis}_min_m": place_m for axis, place_m in low.items() if axis != "z"}
+    document["limits"]["fence"] |= {f"{axis}_max_m": place_m for axis, place_m in high.items() if axis != "z"}
+    if "z" in low:
+        document["limits"]["fence"] |= {"floor_m": low["z"], "ceiling_m": high["z"]}
     return Settings.model_validate(document)
 
 
 def outside_m(walls: Any, place_m: Any) -> float:
     """Return the distance by which a place is beyond the wall that it is farthest beyond."""
-    x_min, y_min, x_max, y_max = walls
-    beyond = [x_min - place_m[0], place_m[0] - x_max, y_min - place_m[1], place_m[1] - y_max]
+    x_m, y_m, down_m = place_m
+    up = (x_m, y_m, -down_m)
+    low, high = walls[:3], walls[3:]
+    beyond = [wall - one for wall, one in zip(low, up, strict=True)]
+    beyond += [one - wall for wall, one in zip(high, up, strict=True)]
     return float(max(0.0, *beyond))
 
 
@@ -82,25 +93,36 @@ def past_wall_m(trace: Trace, row: int, walls: Any, since_s: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("settings", "walls"),
+    ("low", "high"),
     [
-        (walled(x_min_m=-1.5, x_max_m=0.5), (-1.5, -np.inf, 0.5, np.inf)),
-        (walled(y_min_m=-0.5, y_max_m=2.0), (-np.inf, -0.5, np.inf, 2.0)),
-        (walled(x_min_m=-1.0, x_max_m=3.0, y_min_m=-3.5, y_max_m=1.0), (-1.0, -3.5, 3.0, 1.0)),
-        (walled(x_min_m=-1.0, x_max_m=0.0, y_min_m=0.0, y_max_m=1.0), (-1.0, 0.0, 0.0, 1.0)),
-        (walled(x_min_m=-2.0, x_max_m=-1.0), (-2.0, -np.inf, -1.0, np.inf)),
-        (walled(x_min_m=1.0, x_max_m=2.0), (1.0, -np.inf, 2.0, np.inf)),
-        (walled(y_min_m=-2.0, y_max_m=-1.0), (-np.inf, -2.0, np.inf, -1.0)),
-        (walled(y_min_m=1.0, y_max_m=2.0), (-np.inf, 1.0, np.inf, 2.0)),
+        ({"x": -1.5}, {"x": 0.5}),
+        ({"y": -0.5}, {"y": 2.0}),
+        ({"x": -1.0, "y": -3.5}, {"x": 3.0, "y": 1.0}),
+        ({"x": -1.0, "y": 0.0}, {"x": 0.0, "y": 1.0}),
+        ({"x": -2.0}, {"x": -1.0}),
+        ({"x": 1.0}, {"x": 2.0}),
+        ({"y": -2.0}, {"y": -1.0}),
+        ({"y": 1.0}, {"y": 2.0}),
+        ({"z": -0.5}, {"z": 2.5}),
+        ({"z": -2.0}, {"z": -1.0}),
+        ({"x": -1.0, "z": 0.0}, {"x": 2.0, "z": 1.5}),
     ],
 )
-def test_past_a_wall_of_the_settings_is_that_of_a_slow_loop(settings: Settings, walls: Any) -> None:
+def test_past_a_wall_of_the_settings_is_that_of_a_slow_loop(
+    low: dict[str, float], high: dict[str, float]
+) -> None:
     """From the first sample inside on, whatever the time of a fence in flight that there is not."""
-    trace = drawn(1)
+    trace, settings = drawn(1), walled(low, high)
+    walls = (*(LOW | low).values(), *(HIGH | high).values())
     expected = [past_wall_m(trace, row, walls, -np.inf) for row in range(FLIGHTS)]
     assert walls_m(settings) == walls
     for one in (Scenario(), Scenario(fence_time_s=5.0)):
         assert measure_limits(trace, settings, [one] * FLIGHTS).past_wall_m.tolist() == expected
+
+
+def square(half_m: float) -> tuple[float, ...]:
+    """Return the walls of a square fence."""
+    return (-half_m, -half_m, -np.inf, half_m, half_m, np.inf)
 
 
 def test_past_a_fence_in_flight_is_that_of_a_slow_loop() -> None:
@@ -111,8 +133,7 @@ def test_past_a_fence_in_flight_is_that_of_a_slow_loop() -> None:
         for row, time_s in enumerate(times_s.tolist())
     ]
     expected = [
-        past_wall_m(trace, row, (-one.fence_m, -one.fence_m, one.fence_m, one.fence_m), one.fence_time_s)
-        for row, one in enumerate(scenarios)
+        past_wall_m(trace, row, square(one.fence_m), one.fence_time_s) for row, one in enumerate(scenarios)
     ]
     found = measure_limits(trace, MAMBO, scenarios).past_wall_m
     assert found.tolist() == expected
@@ -192,7 +213,7 @@ def test_numbers_of_the_limits_are_changed_by_their_names() -> None:
             expected[index] = 0.123
             assert with_limits(settings, **{name: 0.123}) == tuple(expected)
     assert square_fence(2.5) == {"x_min": -2.5, "y_min": -2.5, "x_max": 2.5, "y_max": 2.5}
-    assert walls_m(MAMBO, 2.5) == (-2.5, -2.5, 2.5, 2.5)
+    assert walls_m(MAMBO, 2.5) == square(2.5)
 
 
 @pytest.mark.parametrize("limit_m_s", [0.5, 8.0])

@@ -16,10 +16,6 @@ _DRAWN: Final = "drawn = [campaign.draw(number) for number in range(first, min(f
 _ROOT: Final = "the root lies in the wider interval too"
 
 REASONS: Final[Mapping[Key, str]] = {
-    **{
-        ("fences.py", 'for end, sign in (("min", -1), ("max", 1))', change): "a multiple of infinity"
-        for change in ("1 -> 2", "1 -> 2 #1")
-    },
     (
         "fences.py",
         "along = (way_m / np.where(rests, length_m, 1.0)[:, np.newaxis]).T",

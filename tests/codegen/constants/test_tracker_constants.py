@@ -78,6 +78,7 @@ def test_a_target_that_a_drone_cannot_follow_has_jumped(settings: Settings, clim
         assert one.acceleration_limit_m_step2 == pytest.approx(step2_s2 * most_m_s2, rel=1e-12)
         beyond = 1 - one.input_limit / one.tested_input
         assert beyond == pytest.approx(1 / 5), "of inputs drawn evenly"
+    assert method_of(QUADRATIC).climb_tracker is None, "without a height"
     assert (read.input_quantity, told.input_quantity) == ("velocity", "thrust")
 
 
