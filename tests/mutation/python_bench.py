@@ -91,7 +91,15 @@ ROOMS: Final = {
         ),
         without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
     ),
-    "derive": Room(("sil/mambo_sil/model/derive/*.py",), ("tests/model/derive",)),
+    "derive": Room(
+        source=("sil/mambo_sil/model/derive/*.py",),
+        tests=("tests/model/derive",),
+        without=("derived_margins.py",),
+    ),
+    "design": Room(
+        source=("sil/mambo_sil/model/derive/derived_margins.py",),
+        tests=("tests/model/derive/test_derived_margins.py",),
+    ),
     "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),
     "axes": Room((f"{_MARGINS}/axis_margins.py",), (f"{_MARGIN_TESTS}/test_axis_margins.py",)),
     "drones": Room(

@@ -13,6 +13,8 @@ _WORDS: Final = "words of a comment"
 _LONG: Final = "a long test notices it: draws do not depend on how many there are"
 _ALIKE: Final = "all drones have the same names"
 _DRAWN: Final = "drawn = [campaign.draw(number) for number in range(first, min(first + _BATCH, drones))]"
+_TIMES: Final = "time_s = PERIOD_S * np.arange(first, last + 1, dtype=np.float64)"
+_STEP: Final = 'step = HeldCommand.of(Signal(np.array([time_s[0], 0.0]), np.array([0.0, 1.0]), "step"))'
 _ROOT: Final = "the root lies in the wider interval too"
 
 REASONS: Final[Mapping[Key, str]] = {
@@ -247,6 +249,30 @@ REASONS: Final[Mapping[Key, str]] = {
                 'writer.writerow(["drone", *drones[0].values, *(f"{axis}_stable" for axis in names), *keys])',
                 "0 -> 1",
                 _ALIKE,
+            ),
+        )
+    },
+    (
+        "fences.py",
+        "(fence.floor_m, fence.ceiling_m) if settings.height else (0.0, 0.0),",
+        "0.0 -> 1.0",
+    ): "a floor above the ceiling is no wall either",
+    (
+        "fences.py",
+        "place_m = trace.position_m[since, row] * [1.0, 1.0, -1.0] # the height is up",
+        "* -> /",
+    ): "by 1 and -1",
+    **{
+        ("step_response.py", line, change): reason
+        for line, change, reason in (
+            (_TIMES, "+ -> -", "a sample less of hundreds"),
+            (_TIMES, "1 -> 2", "a sample more of hundreds"),
+            (_STEP, "0 -> 1", "before the step the command is 0 from the first or second sample on"),
+            (_STEP, "1.0 -> 1.1", "the fit has a gain of its own"),
+            (
+                "still = np.zeros_like(time_s)",
+                "zeros_like -> ones_like",
+                "not read by the fit of an attitude",
             ),
         )
     },
