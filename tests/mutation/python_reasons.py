@@ -15,6 +15,8 @@ _ALIKE: Final = "all drones have the same names"
 _DRAWN: Final = "drawn = [campaign.draw(number) for number in range(first, min(first + _BATCH, drones))]"
 _TIMES: Final = "time_s = PERIOD_S * np.arange(first, last + 1, dtype=np.float64)"
 _STEP: Final = 'step = HeldCommand.of(Signal(np.array([time_s[0], 0.0]), np.array([0.0, 1.0]), "step"))'
+_RAMP: Final = "both axes have the same ramp"
+_STABLE: Final = "no loop that is unstable is known: 270 drawn at random have a radius below 1"
 _ROOT: Final = "the root lies in the wider interval too"
 
 REASONS: Final[Mapping[Key, str]] = {
@@ -43,7 +45,7 @@ REASONS: Final[Mapping[Key, str]] = {
             "height_constants.py",
             "if solution is None or not solution.spectral_radius < 1:",
             change,
-        ): "no loop that is unstable is known: 270 drawn at random have a radius below 1"
+        ): _STABLE
         for change in ("or -> and", "< -> <=", "1 -> 2")
     },
     **{
@@ -274,6 +276,23 @@ REASONS: Final[Mapping[Key, str]] = {
                 "zeros_like -> ones_like",
                 "not read by the fit of an attitude",
             ),
+        )
+    },
+    ("attitude_constants.py", "MOST_WEIGHT: Final = 1.9", "1.9 -> 2.09"): _CHOICE,
+    **{
+        ("law.py", line, change): reason
+        for line, change, reason in (
+            ("moves=len(laws[0].rows),", "0 -> 1", _RAMP),
+            ("if laws[0].curvature is None:", "0 -> 1", _RAMP),
+            (
+                "if round(settings.observer.outage_s / horizon.update_period_s) > MOST_OUTAGE_STEPS:",
+                "round(settings.observer.outage_s / horizon.update_period_s) "
+                "-> (settings.observer.outage_s / horizon.update_period_s)",
+                _EQUAL,
+            ),
+            ("radius = float(np.max(law_constants(settings).spectral_radius))", "max -> min", _STABLE),
+            ("if not radius < 1:", "< -> <=", _STABLE),
+            ("if not radius < 1:", "1 -> 2", _STABLE),
         )
     },
 }

@@ -109,6 +109,7 @@ def test_the_observer_s_constants_are_in_steps() -> None:
     slowed_m_step2 = in_steps(0.3 * 7.0)
     assert found.drag_1_step * found.velocity_limit_m_step == pytest.approx(slowed_m_step2, rel=1e-12)
     assert found.age_steps * PERIOD_S == pytest.approx(0.013, rel=1e-12)
+    assert isinstance(found.outage_steps, int)
     assert found.outage_steps == len(np.arange(0.0, 0.5 - 1e-9, PERIOD_S))
     assert found.steps_per_s * found.velocity_limit_m_step == pytest.approx(7.0, rel=1e-12)
     assert found.steps2_per_s2 * found.disturbance_limit_m_step2 == pytest.approx(2.5, rel=1e-12)

@@ -42,7 +42,7 @@ WORST_PITCH: Values = {
     "model.roll_gain": 1.2,
     "model.pitch_gain": 0.9,
     "model.roll_trim_rad": 0.01,
-    "model.pitch_trim_rad": 0.05,
+    "model.pitch_trim_rad": -0.05,
 }
 PLAIN: Values = {}
 """Drones of which one axis has both the smaller gain and the larger trim; and one without trims."""
