@@ -15,7 +15,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.model.replay.log_replay import replay_log
 from mambo_sil.model.replay.replay_report import LogReplaySummary, summarise
-from mambo_sil.model.replay.replay_verdict import Verdict
+from mambo_sil.model.replay.replay_verdict import ReplayVerdict
 from tests.support.command import run
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -96,9 +96,9 @@ def test_a_log_that_lost_rows_tells_its_controller_from_others(seed: int) -> Non
     share, kind = draw.uniform(0.0, 0.2), draw.choice(["single", "some", "second"])
     lost = lost_rows(len(table) - 1, share, kind, seed)
     settings, change = OTHERS[draw.choice([*OTHERS])]
-    may_be_open = {Verdict.CANNOT_TELL} if curve == "hover" else set()
-    assert judged(without(table, lost)).verdict in {Verdict.YES} | may_be_open
-    assert judged(without(sent(table, change), lost), settings).verdict in {Verdict.NO} | may_be_open
+    may_be_open = {ReplayVerdict.CANNOT_TELL} if curve == "hover" else set()
+    assert judged(without(table, lost)).verdict in {ReplayVerdict.YES} | may_be_open
+    assert judged(without(sent(table, change), lost), settings).verdict in {ReplayVerdict.NO} | may_be_open
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def test_a_lost_row_costs_a_row(hover: Table) -> None:
     """One in 500, and one in 100; all others before the first loss are equal in every bit."""
     for apart in (500, 100):
         summary = judged(without(hover, range(300, len(hover) - 2, apart)))
-        assert summary.verdict is Verdict.YES
+        assert summary.verdict is ReplayVerdict.YES
         assert summary.first_different_s is not None
         assert summary.first_different_s > 3.0
         assert summary.lost == len(range(300, len(hover) - 2, apart))
@@ -121,7 +121,7 @@ def test_a_lost_row_costs_a_row(hover: Table) -> None:
 def test_behind_a_gap_of_a_second_the_controller_begins_anew(hover: Table) -> None:
     """What follows is judged when its estimates have settled."""
     summary = judged(without(hover, range(500, 600)))
-    assert (summary.verdict, summary.lost, summary.gaps) == (Verdict.YES, 100, 1)
+    assert (summary.verdict, summary.lost, summary.gaps) == (ReplayVerdict.YES, 100, 1)
     assert summary.judged == 1201 - 100 - 200 - 200
 
 
@@ -131,7 +131,7 @@ def test_missing_numbers_cost_their_rows(hover: Table) -> None:
     place = header.index("seen_x_m")
     rows = [[*row[:place], "nan", *row[place + 1 :]] if k % 50 == 25 else row for k, row in enumerate(rows)]
     summary = judged([header, *rows])
-    assert (summary.verdict, summary.lost, summary.steps) == (Verdict.YES, 24, 1177)
+    assert (summary.verdict, summary.lost, summary.steps) == (ReplayVerdict.YES, 24, 1177)
 
 
 def test_a_calm_axis_fails_no_flight() -> None:
@@ -148,8 +148,8 @@ def test_a_calm_axis_fails_no_flight() -> None:
         "--no-pictures",
     )
     table = list(csv.reader(Path("flight/trace.csv").read_text("utf-8").splitlines()))
-    assert judged(without(table, [400, 500, 600])).verdict is Verdict.YES
-    assert judged(sent(table, lambda commands: 1.05 * commands)).verdict is Verdict.NO
+    assert judged(without(table, [400, 500, 600])).verdict is ReplayVerdict.YES
+    assert judged(sent(table, lambda commands: 1.05 * commands)).verdict is ReplayVerdict.NO
 
 
 def test_a_log_in_which_nothing_moves_tells_nothing() -> None:
@@ -172,7 +172,7 @@ def test_a_log_in_which_nothing_moves_tells_nothing() -> None:
 def test_a_short_log_tells_nothing(hover: Table) -> None:
     """It must be settled first."""
     summary = judged(sent(hover[:300], lambda commands: np.round(commands, 6)))
-    assert (summary.verdict, summary.judged) == (Verdict.CANNOT_TELL, 99)
+    assert (summary.verdict, summary.judged) == (ReplayVerdict.CANNOT_TELL, 99)
     assert "99 updates can be judged" in summary.missing
 
 
@@ -187,7 +187,7 @@ def test_a_clock_that_begins_again_is_one_clock(bits: int, hover: Table) -> None
     ]
     assert header[0] == "time_s"
     summary = judged(table)
-    assert (summary.verdict, summary.lost) == (Verdict.YES, 0)
+    assert (summary.verdict, summary.lost) == (ReplayVerdict.YES, 0)
     assert summary.equal_steps == summary.steps == len(rows)
 
 
@@ -202,4 +202,4 @@ def test_the_count_of_the_updates_goes_before_the_clock(hover: Table) -> None:
     again = [f"{float(counted[500][0]) + 0.0009:.6f}", *counted[500][1:]]
     table = [[*header, "nmpc.step"], *counted[:501], again, *counted[501:700], *counted[701:]]
     summary = judged(table)
-    assert (summary.verdict, summary.steps, summary.lost) == (Verdict.YES, len(rows) - 1, 1)
+    assert (summary.verdict, summary.steps, summary.lost) == (ReplayVerdict.YES, len(rows) - 1, 1)

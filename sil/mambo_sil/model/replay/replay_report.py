@@ -7,7 +7,7 @@ import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.replay.log_replay import AXES, SETTLING_S, LogReplay
-from mambo_sil.model.replay.replay_verdict import SAME, Verdict, errors_of, judge
+from mambo_sil.model.replay.replay_verdict import SAME, ReplayVerdict, errors_of, judge
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table
 
@@ -44,7 +44,7 @@ class LogReplaySummary(ReportedSummary):
     largest_rad: tuple[Number, Number]
     largest_s: tuple[Number, Number]
     """Time since the beginning of the log of the largest error."""
-    verdict: Verdict
+    verdict: ReplayVerdict
     missing: str
     """What is missing for a verdict."""
     remarks: list[str]
@@ -52,7 +52,7 @@ class LogReplaySummary(ReportedSummary):
     @property
     def good(self) -> bool | None:
         """Whether the log is one of this controller; None if that cannot be told."""
-        return None if self.verdict is Verdict.CANNOT_TELL else self.verdict is Verdict.YES
+        return None if self.verdict is ReplayVerdict.CANNOT_TELL else self.verdict is ReplayVerdict.YES
 
     def section(self, folder: Path) -> Section:
         """Return the section of the report on this replay; raises ResultsError."""
@@ -126,9 +126,9 @@ def finding(summary: LogReplaySummary) -> str:
     """Say in one line whether the log is one of this controller."""
     miss = f"{100.0 * max(summary.miss):.2g} % of the logged command's motion"
     match summary.verdict:
-        case Verdict.CANNOT_TELL:
+        case ReplayVerdict.CANNOT_TELL:
             return f"CANNOT TELL whether it was this controller: {summary.missing}"
-        case Verdict.NO:
+        case ReplayVerdict.NO:
             limit = f"and should {100.0 * SAME:g} % at most"
             return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
     if summary.equal_steps == summary.steps:

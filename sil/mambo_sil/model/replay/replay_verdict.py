@@ -25,7 +25,7 @@ MOST_FILLED: Final = 0.3
 """Largest share of filled updates among which the others tell controllers apart."""
 
 
-class Verdict(StrEnum):
+class ReplayVerdict(StrEnum):
     """Whether a log is one of a controller."""
 
     YES = "yes"
@@ -96,18 +96,18 @@ def _median(values: FloatArray, weight: FloatArray) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[Verdict, str]:
+def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[ReplayVerdict, str]:
     """Return the verdict, and in words what is missing for one."""
     judged, has_most = int(replay.settled.sum()), replay.share_filled <= MOST_FILLED
     exact = replay.is_exact and has_most
     is_equal = bool((replay.replayed_rad == replay.logged_rad).all())
     if is_equal and replay.logged_rad.std(axis=0).max() > CALM_RAD:
-        return Verdict.YES, ""
+        return ReplayVerdict.YES, ""
     if judged >= LEAST_UPDATES and any(axis.is_other(exact=exact) for axis in axes):
-        return Verdict.NO, ""
+        return ReplayVerdict.NO, ""
     moves, is_same = any(axis.moves for axis in axes), all(axis.is_same for axis in axes)
     if judged >= LEAST_UPDATES and moves and is_same and has_most:
-        return Verdict.YES, ""
+        return ReplayVerdict.YES, ""
     reasons = (
         (judged < LEAST_UPDATES, f"{judged} updates can be judged, and {LEAST_UPDATES} must: log longer"),
         (not has_most or replay.resampled, "the log lacks most updates: log every one"),
@@ -115,4 +115,4 @@ def judge(replay: LogReplay, axes: tuple[AxisErrors, AxisErrors]) -> tuple[Verdi
         (not replay.is_exact, "which inputs a step read is not in its row: log those of the step"),
     )
     missing = "too many rows are lost for so calm a flight: log one along a curve"
-    return Verdict.CANNOT_TELL, next((reason for holds, reason in reasons if holds), missing)
+    return ReplayVerdict.CANNOT_TELL, next((reason for holds, reason in reasons if holds), missing)
