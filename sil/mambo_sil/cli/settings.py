@@ -4,7 +4,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -180,6 +180,10 @@ def design(
     ],
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
+    sensors: Annotated[
+        Literal["flow-deck"] | None,
+        typer.Option(help="What measures the position, in place of the sensors in the vehicle's file."),
+    ] = None,
 ) -> None:
     """Derive settings from a drone; write a controller.toml that says the reason of each.
 
@@ -187,9 +191,12 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.drone.vehicles.vehicle_sections import FlowDeckSensors
     from mambo_sil.model.derive.derived_settings import controller_text
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
+    if sensors is not None:
+        drone = drone.model_copy(update={"sensors": FlowDeckSensors()})
     text = controller_text(drone, source)
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
