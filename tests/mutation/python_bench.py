@@ -101,7 +101,14 @@ ROOMS: Final = {
         tests=("tests/model/derive/test_derived_margins.py",),
     ),
     "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),
-    "axes": Room((f"{_MARGINS}/axis_margins.py",), (f"{_MARGIN_TESTS}/test_axis_margins.py",)),
+    "axes": Room(
+        source=(f"{_MARGINS}/axis_margins.py",),
+        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("axis_margins", "margin_figures")),
+    ),
+    "figures": Room(
+        source=tuple(f"{_MARGINS}/{name}.py" for name in ("margin_figures", "margins_record")),
+        tests=(f"{_MARGIN_TESTS}/test_margin_figures.py",),
+    ),
     "drones": Room(
         source=(f"{_MARGINS}/corners.py", f"{_MARGINS}/many_drones.py"),
         tests=(f"{_MARGIN_TESTS}/test_corners.py", f"{_MARGIN_TESTS}/test_many_drones.py"),
@@ -109,7 +116,7 @@ ROOMS: Final = {
     "hover": Room(
         source=(f"{_MARGINS}/hover_loop.py",),
         tests=tuple(
-            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "axis_margins", "linear", "control")
+            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "close_loop", "axis_margins")
         ),
     ),
     "margins": Room(
@@ -117,7 +124,7 @@ ROOMS: Final = {
         tests=(_MARGIN_TESTS,),
         without=(
             *("loop_margins.py", "axis_margins.py", "corners.py", "many_drones.py", "hover_loop.py"),
-            *("margins_plots.py", "margins_report.py"),
+            *("margin_figures.py", "margins_record.py", "margins_plots.py", "margins_report.py"),
         ),
     ),
 }
