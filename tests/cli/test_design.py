@@ -29,8 +29,9 @@ def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
-    wrote, roll, pitch = said.splitlines()
+    wrote, flown, roll, pitch = said.splitlines()
     assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml"
+    assert flown == "flown for 10 s: stays at its target (true state)"
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")
     assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
@@ -70,10 +71,11 @@ def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
 
 @pytest.mark.long
 def test_it_warns_of_slow_motors() -> None:
-    """A Mambo with motors of 0.12 s is unstable through its sensors, and they are named."""
+    """A Mambo with motors of 0.12 s crashes and is unstable through its sensors, and they are named."""
     text = run("vehicles", "mambo")[0]
     Path("slow.toml").write_text(re.sub(r"(?m)^lag_s = .*", "lag_s = 0.12", text), "utf-8")
-    _, said = run("design", "slow.toml")
+    _, said = run("design", "slow.toml", code=1)
+    assert "flown for 10 s: CRASHES after " in said
     assert "UNSTABLE" in said
     warning = "warning: a loop tolerates less than 1.5 times the gain or 30 ms more delay; the main cause is "
     assert warning in unwrapped(said)
@@ -92,7 +94,7 @@ def test_tune_starts_from_it() -> None:
 def test_to_stdout_it_prints_the_file_alone() -> None:
     """Which is that of -o."""
     text, said = run("design", "generic", "-o", "-")
-    assert [line.partition(":")[0] for line in said.splitlines()] == ["roll", "pitch"]
+    assert [line.partition(":")[0] for line in said.splitlines()] == ["flown for 10 s", "roll", "pitch"]
     run("design", "generic", "-o", "made/generic.toml")
     assert Path("made/generic.toml").read_text("utf-8") == text
     assert controller_toml.parse(text, "stdout") == load("made/generic.toml")
