@@ -10,6 +10,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.errors import FlightError
 from mambo_sil.experiment.margins.corners import at_ends, corners, uncertain
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.experiment.margins.many_drones import hovering_flight
@@ -87,10 +88,13 @@ def swings(settings: Settings, drone: VehicleFile) -> bool:
 
 
 def unstable(settings: Settings, drone: VehicleFile) -> bool:
-    """Return whether margins call one of the axes unstable."""
+    """Return whether margins call one of the axes unstable, or say that the height is not held."""
     sensors = SENSORS_OF[drone.sensors.kind][-1]
     flight = hovering_flight(drone, sensors, settings.horizon.update_period_s)
-    (loops,) = hover_loops(settings, flight)
+    try:
+        (loops,) = hover_loops(settings, flight)
+    except FlightError:
+        return True
     return not all(axis.stable for axis in measure_loops(loops, flight, count=30))
 
 
