@@ -128,6 +128,49 @@ def test_a_drone_without_settings_is_refused(old: str, new: str, said: str) -> N
     assert not Path("controller.toml").exists()
 
 
+@pytest.mark.usefixtures("_no_tool")
+def test_without_a_compiler_the_file_is_written() -> None:
+    """And it says that nothing was flown."""
+    _, said = run("design", "crazyflie-flown")
+    assert "neither flown nor margins: no C compiler found" in said
+    assert load("controller.toml").cost.norm == "quadratic"
+
+
+def test_a_thrust_that_cannot_lift_is_refused() -> None:
+    """With key, value and rule; nothing is written."""
+    weak = (
+        "\n[altitude]\np_n_m = 1.0\nd_n_s_m = 0.5\nthrust_max_n = 1.962\n[thrust]\ngain = 0.3\nlag_s = 0.1\n"
+    )
+    Path("mine.toml").write_text(DRONE + weak, "utf-8")
+    for command in ("design", "margins", "fly"):
+        arguments = ("mine.toml",) if command == "design" else ("crazyflie", "--vehicle", "mine.toml")
+        assert run(command, *arguments, code=2)[1] == (
+            "mine.toml: altitude.thrust_max_n = 1.962 must be more than 3.27, the weight of body.mass_kg "
+            "over thrust.gain\n"
+        )
+    assert not Path("controller.toml").exists()
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("strong", "said"),
+    [
+        ("", "vehicle mine: altitude.thrust_max_n = 3.27 does not lift it with thrust.gain = 0.2, an end of"),
+        (
+            "\n[altitude]\np_n_m = 1.0\nd_n_s_m = 0.5\nthrust_max_n = 9.81\n",
+            "height: a drone that hovers with 3 times the expected thrust does not hold its height",
+        ),
+    ],
+)
+def test_intervals_that_no_controller_learns_have_no_margins(strong: str, said: str) -> None:
+    """Where the thrust may be a third of that in the file; the flight of the file's own drone is good."""
+    wide = "\n[thrust]\ngain = 0.6\nlag_s = 0.1\n[uncertainty]\nthrust_gain = 0.4\n"
+    Path("mine.toml").write_text(DRONE + strong + wide, "utf-8")
+    found = unwrapped(run("design", "mine.toml")[1])
+    assert "flown for 10 s: stays at its target (true state)" in found
+    assert f"no margins: {said}" in found
+
+
 def test_an_unknown_drone_is_refused() -> None:
     """With the names there are."""
     said = run("design", "crazyfly", code=2)[1]
