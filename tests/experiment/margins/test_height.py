@@ -82,8 +82,8 @@ def test_a_load_that_is_learnt_leaves_roll_and_pitch() -> None:
 
 def test_a_slow_thrust_that_is_learnt_leaves_roll_and_pitch() -> None:
     """Also if it is learnt by a controller whose model of the thrust lags much."""
-    slow = {"lag_s": 0.137, "response_time_s": 0.212, "velocity_weight_s": 0.24}
-    found, expected = (margins_of(height_settings(**slow), _loaded(load))[0].command for load in (1.2, 1.0))
+    slow = height_settings(lag_s=0.137, response_time_s=0.212, velocity_weight_s=0.24)
+    found, expected = (margins_of(slow, _loaded(load))[0].command for load in (1.2, 1.0))
     assert found.delay_s == pytest.approx(expected.delay_s, rel=0.01)
 
 
