@@ -4,11 +4,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from mambo_sil.experiment.margins.axis_margins import (
-    TILT_AXES,
     AxisMargins,
     HeightMargins,
     Margins,
@@ -18,7 +16,6 @@ from mambo_sil.experiment.margins.axis_margins import (
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.margin_figures import figure_rows, figure_table, number, verdict
 from mambo_sil.experiment.margins.margins_record import RESPONSES, ManyDrones, MarginSpread, MarginsSummary
-from mambo_sil.experiment.margins.response_file import Curve, write_responses
 
 LOOP = LoopMargins(
     gain_up=2.04,
@@ -222,12 +219,6 @@ def test_a_section_of_the_report_has_figures_and_says_what_is_missing(tmp_path: 
     assert section.content["rows"] == figure_table([roll(), height()])
     assert section.content["spreads"] == many_drones().table
     assert summary_of([roll()]).section(tmp_path).content["spreads"] == []
-    rad_s, flat = np.geomspace(0.2, 300.0, 50), np.full(50, 0.5 + 0.1j)
-    curves = [Curve(axis, "command", rad_s, flat) for axis in TILT_AXES]
-    write_responses(curves, tmp_path / RESPONSES)
-    drawn = summary_of([roll()]).section(tmp_path)
-    assert drawn.missing == []
-    assert drawn.content["pictures"]
     without = summary_of(None).section(tmp_path)
     assert (without.missing, without.content["pictures"], without.content["axes"]) == ([], [], [])
     assert without.content["rows"] == figure_table([])
