@@ -130,11 +130,15 @@ ROOMS: Final = {
     ),
     "measured": Room(
         source=tuple(f"{_MARGINS}/{name}.py" for name in ("hover_margins", "margins_run", "response_file")),
-        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("axis_margins", "height", "command")),
+        tests=tuple(
+            f"{_MARGIN_TESTS}/test_{name}.py"
+            for name in ("response_file", "axis_margins", "height", "command")
+        ),
     ),
     "derived flight": Room(
         source=("sil/mambo_sil/model/derive/derived_flight.py",),
         tests=("tests/model/derive/test_derived_flight.py",),
+        longest_s=4.0,
     ),
 }
 

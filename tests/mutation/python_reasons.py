@@ -18,12 +18,9 @@ _STEP: Final = 'step = HeldCommand.of(Signal(np.array([time_s[0], 0.0]), np.arra
 _RAMP: Final = "both axes have the same ramp"
 _STABLE: Final = "no loop that is unstable is known: 270 drawn at random have a radius below 1"
 _BOTH_AXES: Final = "a segment of one axis, which has both places"
-_CHANGE: Final = "change = 1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s)"
-_SHARES: Final = "shares = (shares / np.maximum(shares.max(axis=0), 1e-300)).max(axis=(1, 2))"
-_ALIVE: Final = "alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)"
 _ROOT: Final = "the root lies in the wider interval too"
 
-REASONS: Final[Mapping[Key, str]] = {
+PYTHON_REASONS: Final[Mapping[Key, str]] = {
     (
         "fences.py",
         "along = (way_m / np.where(rests, length_m, 1.0)[:, np.newaxis]).T",
@@ -317,47 +314,6 @@ REASONS: Final[Mapping[Key, str]] = {
                 "chosen, error = (richer, richer_error) if richer_error < WORTH * plain_error "
                 "else (plain, plain_error)",
                 "< -> <=",
-                _EQUAL,
-            ),
-        )
-    },
-    **{
-        ("axis_margins.py", line, change): reason
-        for line, change, reason in (
-            ("GROWTH_1_S: Final = 1e-3", "1e-3 -> 0.0011", _CHOICE),
-            ("_LEAST_SHARE: Final = 1e-3", "1e-3 -> 0.0011", _CHOICE),
-            ("_DEAD: Final = 1e-9", "1e-9 -> 1.1000000000000001e-09", _CHOICE),
-            ("stable = poles.growth_1_s < GROWTH_1_S", "< -> <=", _EQUAL),
-            ("slow = ticks <= updates[-1]", "<= -> <", _EQUAL),
-            ("slow = ticks <= updates[-1]", "1 -> 2", "answers to a gust are largest at low frequencies"),
-            (
-                _CHANGE,
-                "1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s) "
-                "-> (np.exp(-1j * ticks[:, np.newaxis] * update_period_s)) - (1.0)",
-                _SIZE,
-            ),
-            (_CHANGE, "-1j -> (1j)", _SIZE),
-            ("forced = transition @ forced + inputs", "+ -> -", _SIZE),
-            (_SHARES, "1e-300 -> 1.1000000000000002e-300", "any positive number"),
-            (_ALIVE, "> -> >=", _EQUAL),
-            (_ALIVE, "> -> >= #1", _EQUAL),
-            ("roots = roots[np.abs(roots) > GROWTH_1_S]", "> -> >=", _EQUAL),
-        )
-    },
-    **{
-        ("hover_loop.py", line, change): reason
-        for line, change, reason in (
-            ("_NEGLIGIBLE: Final = 1e-9", "1e-9 -> 1.1000000000000001e-09", _CHOICE),
-            ("whole = np.eye(self.transition.shape[1])", "1 -> 2", "a square matrix"),
-            ("moves = np.asarray((np.abs(loop.transition) > _NEGLIGIBLE).any(axis=0))", "> -> >=", _EQUAL),
-            (
-                "moved = np.asarray((np.abs(loop.inputs) > _NEGLIGIBLE).any(axis=(0, 2)))",
-                "> -> >=",
-                _EQUAL,
-            ),
-            (
-                "shown = np.asarray((np.abs(loop.outputs) > _NEGLIGIBLE).any(axis=(0, 1)))",
-                "> -> >=",
                 _EQUAL,
             ),
         )

@@ -11,8 +11,10 @@ import pytest
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.model.derive.derived_flight import _fault, fly_derived
 from mambo_sil.model.derive.derived_settings import controller_text
@@ -46,6 +48,11 @@ def test_a_drone_that_delivers_too_little_is_seen(learnt: str, words: str) -> No
     assert found.words.endswith("(through sensors mocap)")
 
 
+def test_a_height_is_judged_only_if_the_settings_hold_it() -> None:
+    """A drone whose own loop holds it lower, with 0.8 of the thrust, stays at its target."""
+    assert fly_derived(preset("crazyflie"), delivering(0.8)).good
+
+
 def test_a_drone_that_falls_is_seen() -> None:
     """A fifth of the expected thrust is less than can be learnt."""
     found = fly_derived(settings_for(delivering(1.0)), delivering(0.2))
@@ -61,6 +68,7 @@ def test_a_drone_that_oscillates_is_seen() -> None:
     found = fly_derived(settings_for(drone), drone)
     assert not found.good
     assert found.words.startswith("flown for 10 s: OSCILLATES, by 0.")
+    assert found.words.endswith(f"(through sensors {SENSORS_OF['mambo'][-1]})")
 
 
 TIME_S = np.arange(-1.0, 10.005, 0.01)

@@ -166,18 +166,26 @@ def test_a_warning_begins_where_a_loop_tolerates_too_little(axis: int) -> None:
             assert last.endswith("more delay (true state)")
 
 
-def test_the_cause_is_the_property_without_which_most_is_left() -> None:
+@pytest.mark.parametrize(
+    ("gain", "dead_time_s", "late_s", "begin"),
+    [(1.0, 0.1, 0.004, "dead_time_s of roll"), (1.5, 0.002, 0.1, "sensors.kind")],
+)
+def test_the_cause_is_the_property_without_which_most_is_left(
+    gain: float, dead_time_s: float, late_s: float, begin: str
+) -> None:
     """Of sensors and dead time; the settings are derived again, and sensors that stay are seen through."""
-    axis = {"gain": 1.0, "lag_s": 0.15, "dead_time_s": 0.1}
-    drone = changed(GENERIC, attitude={"roll": axis, "pitch": axis})
-    found = judge_margins(settings_for(of_gains(1.0, 1.0)), drone)
+    axis = {"gain": gain, "lag_s": 0.15, "dead_time_s": dead_time_s}
+    sensors = {"position_delay_s": late_s}
+    drone = changed(GENERIC, attitude={"roll": axis, "pitch": axis}, sensors=sensors)
+    found = judge_margins(settings_for(of_gains(gain / 2.5, gain / 2.5)), drone)
     left = {
-        words: min(map(_reserve, measure_drone(settings_for(other), other, sensors)))
-        for (words, other), sensors in zip(
+        words: min(map(_reserve, measure_drone(settings_for(other), other, seen)))
+        for (words, other), seen in zip(
             _without(drone, height=False), (SENSORS_OF["mocap"][-1], "none"), strict=True
         )
     }
     cause = max(left, key=lambda words: left[words])
+    assert cause.startswith(begin)
     assert found.warning is not None
     assert f"the main cause is {cause}: without it" in found.warning
 
@@ -237,3 +245,20 @@ def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dea
     assert f"the main cause is {cause}" in found.warning
     enough = "large enough" if without[cause] >= 1.0 else "still too small"
     assert found.warning.endswith(f"without it the margins are {enough}")
+
+
+def test_an_interval_is_taken_away_at_the_worst_ends_of_the_others() -> None:
+    """Roll, with settings for less gain, tolerates too little even without the dead time that it may have."""
+    axis = {"gain": 0.5, "lag_s": 0.15, "dead_time_s": 0.0}
+    widths = {"roll_gain": 0.1, "roll_dead_time_s": 0.035}
+    drone = blind(attitude={"roll": axis | {"gain": 1.3}, "pitch": axis}, uncertainty=widths)
+    settings = settings_for(of_gains(0.5, 0.5))
+    late, strong = (
+        min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "none")))
+        for ends in ({"gain": 0, "dead_time_s": 1}, {"gain": 1, "dead_time_s": 0})
+    )
+    assert late < strong < 1.0
+    assert str(judge_margins(settings, drone).warning).endswith(
+        "the main cause is the interval of attitude.roll.dead_time_s +- 0.035: "
+        "without it the margins are still too small"
+    )

@@ -1,0 +1,101 @@
+"""Why some faults of margins and of `design` change nothing that a test of their room can see."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from tests.mutation.reasons import Key
+
+_EQUAL: Final = "two numbers that are equal"
+_CHOICE: Final = "a choice, which has no definition"
+_SIZE: Final = "only its absolute value counts"
+_REPORT: Final = "a long test makes a report with pictures"
+_CHANGE: Final = "change = 1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s)"
+_SHARES: Final = "shares = (shares / np.maximum(shares.max(axis=0), 1e-300)).max(axis=(1, 2))"
+_ALIVE: Final = "alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)"
+_START: Final = "START: Final = Offset((-0.7, 0.7, 0.3))"
+_YAW: Final = "yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,"
+_REVERSED: Final = "folder / RESPONSES -> (RESPONSES) / (folder)"
+
+MARGIN_REASONS: Final[Mapping[Key, str]] = {
+    **{
+        ("axis_margins.py", line, change): reason
+        for line, change, reason in (
+            ("GROWTH_1_S: Final = 1e-3", "1e-3 -> 0.0011", _CHOICE),
+            ("_LEAST_SHARE: Final = 1e-3", "1e-3 -> 0.0011", _CHOICE),
+            ("_DEAD: Final = 1e-9", "1e-9 -> 1.1000000000000001e-09", _CHOICE),
+            ("stable = poles.growth_1_s < GROWTH_1_S", "< -> <=", _EQUAL),
+            ("slow = ticks <= updates[-1]", "<= -> <", _EQUAL),
+            ("slow = ticks <= updates[-1]", "1 -> 2", "answers to a gust are largest at low frequencies"),
+            (
+                _CHANGE,
+                "1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s) "
+                "-> (np.exp(-1j * ticks[:, np.newaxis] * update_period_s)) - (1.0)",
+                _SIZE,
+            ),
+            (_CHANGE, "-1j -> (1j)", _SIZE),
+            ("forced = transition @ forced + inputs", "+ -> -", _SIZE),
+            (_SHARES, "1e-300 -> 1.1000000000000002e-300", "any positive number"),
+            (_ALIVE, "> -> >=", _EQUAL),
+            (_ALIVE, "> -> >= #1", _EQUAL),
+            ("roots = roots[np.abs(roots) > GROWTH_1_S]", "> -> >=", _EQUAL),
+        )
+    },
+    **{
+        ("hover_loop.py", line, change): reason
+        for line, change, reason in (
+            ("_NEGLIGIBLE: Final = 1e-9", "1e-9 -> 1.1000000000000001e-09", _CHOICE),
+            ("whole = np.eye(self.transition.shape[1])", "1 -> 2", "a square matrix"),
+            ("moves = np.asarray((np.abs(loop.transition) > _NEGLIGIBLE).any(axis=0))", "> -> >=", _EQUAL),
+            (
+                "moved = np.asarray((np.abs(loop.inputs) > _NEGLIGIBLE).any(axis=(0, 2)))",
+                "> -> >=",
+                _EQUAL,
+            ),
+            (
+                "shown = np.asarray((np.abs(loop.outputs) > _NEGLIGIBLE).any(axis=(0, 1)))",
+                "> -> >=",
+                _EQUAL,
+            ),
+        )
+    },
+    **{
+        ("derived_flight.py", line, change): reason
+        for line, change, reason in (
+            (_START, "-0.7 -> (0.7)", _CHOICE),
+            (_START, "0.7 -> 0.77", _CHOICE),
+            (_START, "0.7 -> 0.77 #1", _CHOICE),
+            (_START, "0.3 -> 0.33", _CHOICE),
+            (_YAW, "2.0 -> 2.2", _CHOICE),
+            (_YAW, "* -> /", _CHOICE),
+            (_YAW, "/ -> *", _CHOICE),
+            (
+                "fault = _fault(trace, drone, axes=2 if settings.height is None else 3)",
+                "3 -> 4",
+                "there are three axes",
+            ),
+            ("judged = trace.time_s >= DURATION_S - JUDGED_S", ">= -> >", "a sample less of hundreds"),
+            (
+                "off_m = (seen_m[judged] - _target_m(trace)[judged]).mean(axis=0)[:, :axes]",
+                "seen_m[judged] - _target_m(trace)[judged] -> (_target_m(trace)[judged]) - (seen_m[judged])",
+                _SIZE,
+            ),
+            ("if not (tilt_rad < SWINGING_RAD and speed_m_s < SWINGING_M_S):", "< -> <=", _EQUAL),
+            ("if not (tilt_rad < SWINGING_RAD and speed_m_s < SWINGING_M_S):", "< -> <= #1", _EQUAL),
+            ("if abs(off_m[farthest]) > FAR_M:", "> -> >=", _EQUAL),
+        )
+    },
+    ("derived_margins.py", "if min(map(_reserve, axes)) >= 1.0:", ">= -> >"): _EQUAL,
+    (
+        "derived_margins.py",
+        "document: dict[str, Any] = drone.model_dump(exclude_none=True)",
+        "True -> False",
+    ): "a section that there is not, either way",
+    **{
+        ("margins_record.py", line, change): _REPORT
+        for line, change in (
+            ("if self.axes is not None and (folder / RESPONSES).is_file():", _REVERSED),
+            ("pictures = margin_panels(read_responses(folder / RESPONSES))", _REVERSED),
+            ("pictures = margin_panels(read_responses(folder / RESPONSES))", "/ -> *"),
+        )
+    },
+}
