@@ -12,6 +12,9 @@ _REPORT: Final = "a long test makes a report with pictures"
 _CHANGE: Final = "change = 1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s)"
 _SHARES: Final = "shares = (shares / np.maximum(shares.max(axis=0), 1e-300)).max(axis=(1, 2))"
 _ALIVE: Final = "alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)"
+_RESULTS: Final = "long tests write results: response.csv, drones.csv and pictures"
+_NO_LOAD: Final = "controllers without a height do not read the load"
+_LOADS: Final = "loads = hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0"
 _START: Final = "START: Final = Offset((-0.7, 0.7, 0.3))"
 _YAW: Final = "yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,"
 _REVERSED: Final = "folder / RESPONSES -> (RESPONSES) / (folder)"
@@ -98,4 +101,47 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
             ("pictures = margin_panels(read_responses(folder / RESPONSES))", "/ -> *"),
         )
     },
+    **{
+        ("hover_margins.py", line, change): reason
+        for line, change, reason in (
+            (
+                _LOADS,
+                "hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0 "
+                "-> (hover_thrust_n(flight.vehicle) / drone.weight_n)",
+                _NO_LOAD,
+            ),
+            (_LOADS, "1.0 -> 1.1", _NO_LOAD),
+            (
+                "delays, loads = np.broadcast_arrays(flight.link.delay_ticks, loads, "
+                "np.zeros(flight.flights))[:2]",
+                "zeros -> ones",
+                "only its shape counts",
+            ),
+            (
+                "controller = None if lifts else linear_controller(settings)",
+                "None if lifts else linear_controller(settings) -> (None)",
+                "the same system, made again for each drone",
+            ),
+        )
+    },
+    **{
+        ("margins_run.py", line, change): _RESULTS
+        for line, change in (
+            (
+                "new_results(folder, MarginsSummary.command, (*PICTURES, RESPONSES, DRONES))",
+                "command -> motors",
+            ),
+            (
+                "motors = not isinstance(flight.vehicle.loop, FirstOrderDrone)",
+                "not isinstance(flight.vehicle.loop, FirstOrderDrone) "
+                "-> (isinstance(flight.vehicle.loop, FirstOrderDrone))",
+            ),
+            ("curves = responses(loops, period_s, motors=motors)", "motors -> command"),
+            ("write_responses(curves, place / RESPONSES)", "place / RESPONSES -> (RESPONSES) / (place)"),
+            ("write_responses(curves, place / RESPONSES)", "/ -> *"),
+            ("write_drones(found, place / DRONES)", "place / DRONES -> (DRONES) / (place)"),
+            ("write_drones(found, place / DRONES)", "/ -> *"),
+        )
+    },
+    ("response_file.py", "_COUNT: Final = 600", "600 -> 601"): _CHOICE,
 }

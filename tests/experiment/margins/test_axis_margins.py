@@ -11,6 +11,7 @@ from scipy.linalg import block_diag, solve_discrete_lyapunov
 
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.experiment.margins.axis_margins import (
     Margins,
     frequencies,
@@ -32,6 +33,7 @@ from mambo_sil.experiment.margins.hover_loop import (
 )
 from mambo_sil.experiment.margins.hover_margins import Loops, hover_loops, measure_loops
 from mambo_sil.experiment.margins.loop_margins import sensitivity
+from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.flight.scenario import choose_sensors
@@ -262,3 +264,11 @@ def test_an_unstable_loop_has_no_margins_and_no_bounded_answer() -> None:
         assert {one.to_command for one in one.noise.values()} == {math.inf}
     assert (axes[0].gust_to_command_rad_s2_m, axes[0].sensed_variation_rad) == (math.inf, math.inf)
     assert (axes[1].gust_to_thrust, axes[1].sensed_variation_m_s2) == (math.inf, math.inf)
+
+
+def test_a_subject_has_the_axes_of_its_loops() -> None:
+    """None if its law is not linear."""
+    drone = vehicle_toml.preset("mambo")
+    _, found, _ = hovering("mambo", "none")
+    assert axes_on(MarginSubject("mine", preset("mambo"), drone)) == list(found)
+    assert axes_on(MarginSubject("mine", preset("mambo-1norm"), drone)) is None

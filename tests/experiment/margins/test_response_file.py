@@ -3,12 +3,14 @@
 import math
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pytest
 
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import ResultsError
+from mambo_sil.experiment.margins.axis_margins import AxisName, PlaceName
 from mambo_sil.experiment.margins.hover_margins import Loops, hover_loops
 from mambo_sil.experiment.margins.response_file import Curve, read_responses, responses, write_responses
 from mambo_sil.flight.loop import Flight
@@ -43,12 +45,19 @@ def test_curves_are_those_of_each_place(motors: bool) -> None:
         assert curve.sensitivity[::20] == pytest.approx(1.0 + answer, rel=1e-6)
 
 
+WRITTEN: Final[tuple[tuple[AxisName, PlaceName], ...]] = (
+    ("roll", "command"),
+    ("roll", "motors"),
+    ("height", "command"),
+)
+
+
 def test_a_file_is_read_back(tmp_path: Path) -> None:
     """With six digits; curves of an axis that is not known are left out."""
     rng = np.random.default_rng(1)
     curves = [
         Curve(axis, place, rng.uniform(0.1, 9.0, 7), rng.normal(0, 1, 7) + 1j * rng.normal(0, 1, 7))
-        for axis, place in (("roll", "command"), ("roll", "motors"), ("height", "command"))
+        for axis, place in WRITTEN
     ]
     write_responses(curves, tmp_path / "r.csv")
     text = (tmp_path / "r.csv").read_text("utf-8")
