@@ -15,6 +15,8 @@ _ALIVE: Final = "alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)"
 _RESULTS: Final = "long tests write results: response.csv, drones.csv and pictures"
 _NO_LOAD: Final = "controllers without a height do not read the load"
 _LOADS: Final = "loads = hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0"
+_MISSING: Final = "NumPy takes any negative length for the one that is missing"
+_LOWER: Final = "position_m[2] -= (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)"
 _START: Final = "START: Final = Offset((-0.7, 0.7, 0.3))"
 _YAW: Final = "yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,"
 _REVERSED: Final = "folder / RESPONSES -> (RESPONSES) / (folder)"
@@ -144,4 +146,96 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
         )
     },
     ("response_file.py", "_COUNT: Final = 600", "600 -> 601"): _CHOICE,
+    (
+        "derived_margins.py",
+        'seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"',
+        'sensors if other.sensors.kind == drone.sensors.kind else "none" -> ("none")',
+    ): "settings derived for sensors have about the same margins without these: no other cause is known",
+    (
+        "response_file.py",
+        "updates, ticks = (one[one > _FIRST_RAD_S] for one in frequencies(loop, update_period_s, _COUNT))",
+        "> -> >=",
+    ): _EQUAL,
+    **{
+        ("drone_jacobians.py", line, change): reason
+        for line, change, reason in (
+            ("SETTLE_S: Final = 0.3", "0.3 -> 0.33", _CHOICE),
+            ("_ROUNDING: Final = 1e-8", "1e-8 -> 1.1000000000000001e-08", _CHOICE),
+            ("_CHANGE: Final = 1e-5", "1e-5 -> 1.1000000000000001e-05", _CHOICE),
+            (
+                "position_m = np.zeros((3, n))",
+                "zeros -> ones",
+                "nothing depends on the place beside the height",
+            ),
+            (_LOWER, "1e-9 -> 1.1000000000000001e-09", "any small number"),
+            (
+                "change = _CHANGE * np.maximum(1.0, np.abs(np.concatenate([base, inputs])))",
+                "1.0 -> 1.1",
+                _CHOICE,
+            ),
+            (
+                'changes = np.einsum("rn,rc,s->rncs", change, np.eye(changed), signs).reshape(changed, -1)',
+                "1 -> 2",
+                _MISSING,
+            ),
+            (
+                "both = np.concatenate([_numbers(after), outputs]).reshape(-1, n, changed, 2)",
+                "1 -> 2",
+                _MISSING,
+            ),
+            ("found.append(array.reshape(-1, n))", "1 -> 2", _MISSING),
+            (
+                "return numbers[first - count : first].reshape(*array.shape[:-1], -1)",
+                "1 -> 2 #1",
+                _MISSING,
+            ),
+            ("scale[:rows] = change[:rows] / _CHANGE", "/ -> *", _CHOICE),
+            (
+                "scale[:rows] = change[:rows] / _CHANGE",
+                "change[:rows] / _CHANGE -> (_CHANGE) / (change[:rows])",
+                _CHOICE,
+            ),
+            (
+                "change = _CHANGE * np.maximum(1.0, np.abs(np.concatenate([base, inputs])))",
+                "np.abs(np.concatenate([base, inputs])) -> (np.concatenate([base, inputs]))",
+                _CHOICE,
+            ),
+            ("demand = np.zeros((signals.axes, inputs.shape[1]))", "zeros -> ones", "only its change counts"),
+            ("period = 1", "1 -> 2", "a multiple of the ticks after which all repeats"),
+            (
+                "settling = -(-round(SETTLE_S / vehicle.drone.step_s) // ticks) * ticks",
+                "// -> *",
+                "a longer rest",
+            ),
+            (
+                "suite = rebuild(suite, flight.flights, np.copy, "
+                "GivenDraws(np.zeros((_noises(flight), flight.flights))))",
+                "zeros -> ones",
+                "each tick has other draws",
+            ),
+            (
+                "suite = suite_of(replace(flight, sensors=given), (0,) * flight.flights, truth(state))",
+                "0 -> 1",
+                "nothing is drawn",
+            ),
+            ("rebuild(moving.suite, n, note, GivenDraws(np.zeros(0)))", "zeros -> ones", "not drawn from"),
+            (
+                "return _Moving(given, rebuild(moving.suite, n, take, GivenDraws(np.zeros(0))))",
+                "0 -> 1",
+                "each tick has other draws",
+            ),
+            (
+                "return _Moving(given, rebuild(moving.suite, n, take, GivenDraws(np.zeros(0))))",
+                "zeros -> ones",
+                "each tick has other draws",
+            ),
+            (
+                "size = np.abs(slopes) * (change / _CHANGE).T / scale[:, :, np.newaxis]",
+                "/ -> * #1",
+                _CHOICE,
+            ),
+            ("slopes = np.where(size > _ROUNDING, slopes, 0.0).swapaxes(0, 1)", "> -> >=", _EQUAL),
+            ("rebuild(moving.suite, n, note, GivenDraws(np.zeros(0)))", "0 -> 1", "not drawn from"),
+        )
+    },
 }

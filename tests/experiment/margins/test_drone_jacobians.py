@@ -1,5 +1,6 @@
 """Drones as linear systems against their simulation, tick by tick, from small random inputs."""
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,7 +13,7 @@ from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.loops import Demand, altitude_thrust
 from mambo_sil.drone.plant.vehicle import Moment, Vehicle, truth
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
-from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians
+from mambo_sil.experiment.margins.drone_jacobians import Signals, _hovering, drone_jacobians
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
 from mambo_sil.flight.trajectories import Hover
 
@@ -81,6 +82,7 @@ def test_outputs_are_those_of_a_simulation(vehicle: Vehicle, axes: int) -> None:
     given = np.random.default_rng(3).normal(0, 1e-6, (TICKS, 3 * axes))
     expected = simulated(vehicle, axes, given) - simulated(vehicle, axes, 0.0 * given)
     system = drone_jacobians(Flight(Hover(), vehicle=vehicle), axes).drone(0)
+    assert system.signals.true.stop == expected.shape[1]
     state, found = np.zeros(system.transition.shape[1]), []
     for tick, values in enumerate(given):
         phase = tick % len(system.transition)
@@ -92,3 +94,35 @@ def test_outputs_are_those_of_a_simulation(vehicle: Vehicle, axes: int) -> None:
         assert np.array(found)[:, column] == pytest.approx(
             expected[:, column], rel=0.0, abs=5e-3 * size + 3e-13
         )
+
+
+def loaded(mass: Any, thrust: Any) -> Vehicle:
+    """Return a Crazyflie, or several, with other masses and thrusts than those that its loops expect."""
+    vehicle = Vehicle.from_preset("crazyflie")
+    kept = vehicle.airframe
+    airframe = replace(kept, mass_kg=mass * kept.mass_kg, thrust_factor_n_s2=thrust * kept.thrust_factor_n_s2)
+    return replace(vehicle, airframe=airframe)
+
+
+def test_a_loaded_drone_rests_where_its_loop_carries_it() -> None:
+    """With 1.2 times the mass and 0.9 times the thrust, for half a second."""
+    vehicle = loaded(1.2, 0.9)
+    drone, state = vehicle.drone, _hovering(vehicle, 1, Signals(2))
+    start = state.body.copy()
+    for _ in range(round(0.5 / drone.step_s)):
+        true = truth(state)
+        thrust_n = altitude_thrust(drone, HEIGHT_REFERENCE_M, true.position_m[2], true.velocity_m_s[2])
+        state = vehicle.step(state, np.zeros((2, 1)), thrust_n, 0.0, seen=true)
+    assert state.body == pytest.approx(start, abs=1e-9)
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_drones_side_by_side_are_those_alone(axes: int) -> None:
+    """Each with its own mass and thrust."""
+    masses, thrusts = np.array([1.0, 1.2, 0.9]), np.array([1.0, 0.9, 1.1])
+    together = drone_jacobians(Flight(Hover(), vehicle=loaded(masses, thrusts), flights=3), axes)
+    for number, (mass, thrust) in enumerate(zip(masses.tolist(), thrusts.tolist(), strict=True)):
+        alone = drone_jacobians(Flight(Hover(), vehicle=loaded(mass, thrust)), axes).drone(0)
+        found = together.drone(number)
+        for name in ("transition", "inputs", "outputs", "feed"):
+            assert getattr(found, name) == pytest.approx(getattr(alone, name), rel=1e-6, abs=1e-7)
