@@ -17,6 +17,9 @@ _NO_LOAD: Final = "controllers without a height do not read the load"
 _LOADS: Final = "loads = hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0"
 _MISSING: Final = "NumPy takes any negative length for the one that is missing"
 _LOWER: Final = "position_m[2] -= (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)"
+_LONG: Final = "a long test notices it: draws do not depend on how many there are"
+_ALIKE: Final = "all drones have the same names"
+_DRAWN: Final = "drawn = [campaign.draw(number) for number in range(first, min(first + _BATCH, drones))]"
 _START: Final = "START: Final = Offset((-0.7, 0.7, 0.3))"
 _YAW: Final = "yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,"
 _REVERSED: Final = "folder / RESPONSES -> (RESPONSES) / (folder)"
@@ -236,6 +239,30 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
             ),
             ("slopes = np.where(size > _ROUNDING, slopes, 0.0).swapaxes(0, 1)", "> -> >=", _EQUAL),
             ("rebuild(moving.suite, n, note, GivenDraws(np.zeros(0)))", "0 -> 1", "not drawn from"),
+        )
+    },
+    (
+        "corners.py",
+        "document = drone.model_dump(exclude_none=True)",
+        "True -> False #1",
+    ): "a section that there is not, either way",
+    **{
+        ("many_drones.py", line, change): reason
+        for line, change, reason in (
+            ("FREQUENCIES: Final = 150", "150 -> 151", _CHOICE),
+            ("_BATCH: Final = 10", "10 -> 11", "drones do not depend on how many are measured at once"),
+            ("for first in range(0, drones, _BATCH):", "0 -> 1", _LONG),
+            (_DRAWN, "min -> max", _LONG),
+            (_DRAWN, "+ -> -", _LONG),
+            ("progress(first + len(drawn))", "+ -> -", "only shown"),
+            ("if np.isnan(values).all():", "all -> any", "all of the drones have motors, or none"),
+            ("for axis, name in enumerate(one.axis for one in drones[0].axes):", "0 -> 1", _ALIKE),
+            ("names = [axis.axis for axis in drones[0].axes]", "0 -> 1", _ALIKE),
+            (
+                'writer.writerow(["drone", *drones[0].values, *(f"{axis}_stable" for axis in names), *keys])',
+                "0 -> 1",
+                _ALIKE,
+            ),
         )
     },
 }
