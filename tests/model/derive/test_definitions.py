@@ -225,3 +225,13 @@ def test_a_flow_deck_has_a_noise_of_its_own() -> None:
 def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:
     """That settings allow."""
     assert settings_for(strong(1.00001)).limits.tilt_rad == 0.01
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.0, 1.1])
+def test_the_gain_of_the_thrust_is_that_of_the_file(gain: float) -> None:
+    """1, the default, is not written."""
+    drone = strong(2.0, thrust={"lag_s": 0.06, "gain": gain})
+    height = settings_for(drone).height
+    assert height is not None
+    assert height.thrust_gain == gain
+    assert ("thrust_gain" in controller_text(drone, "mine")) is (gain != 1.0)
