@@ -218,7 +218,7 @@ class Built:
         return Crazyflie(self.host)
 
     def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
-        """Return a drone with an app in which `right`, which stands once in one of its files, reads `wrong`."""
+        """Return a drone with an app in which `right`, found once in one of its files, reads `wrong`."""
         texts = {source: source.read_text("utf-8") for source in app_sources(self.folder)}
         assert sum(text.count(right) for text in texts.values()) == 1, f"the template moved on: {right}"
         changed = next(source for source, text in texts.items() if right in text)

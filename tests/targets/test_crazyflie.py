@@ -426,8 +426,8 @@ def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
         for title, label in re.findall(r'node: { title: "([^"]*)" label: "([^"]*)"', graph):
             if size := re.search(r"(\d+) bytes \(static\)", label):
                 frames[short(title)] = int(size[1])
-        for source, target in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
-            calls.setdefault(short(source), set()).add(short(target))
+        for caller, called in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
+            calls.setdefault(short(caller), set()).add(short(called))
 
     def deepest(function: str) -> int:
         return frames.get(function, 0) + max(
