@@ -72,7 +72,7 @@ class _Recorder:
         self._controller = QuadraticController(Quadratic(SETTINGS))
         self._random = random
         self.states: list[Array] = []
-        optimizer = self._controller.optimizer
+        optimizer = self._controller.parts.optimizer
         minimize = optimizer.minimize
 
         def record(state: Array, limit: Array | None = None) -> Array:

@@ -105,6 +105,8 @@ class Drone:
     is_open: bool = False
     failing_uploads: bool = False
     sends_parameters: bool = True
+    first_tick: int = 0
+    """Time of its logs in ms at the beginning of the clock."""
     arms: bool = True
     blocks: list[LogConfig] = field(default_factory=list)
     lost_callbacks: Caller = field(default_factory=Caller)
@@ -135,7 +137,8 @@ class Drone:
             for block in self.blocks:
                 if block.is_started:
                     values = {name: self.logged[name] for name in block.names}
-                    block.data_received_cb.call(round(1000 * self.clock.time_s), values, block)
+                    ticks = (self.first_tick + round(1000 * self.clock.time_s)) % 2**24
+                    block.data_received_cb.call(ticks, values, block)
 
     def lose(self, until_s: float = 1e9) -> None:
         """Lose the link until some time."""

@@ -23,6 +23,7 @@ def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Dr
     """Return a drone that is ready to fly, and put it and its clock under the scripts."""
     clock = Clock()
     logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
+    logged |= dict.fromkeys(scripts["radio"].PLACE, 0.0)
     logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
     logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
     logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
@@ -252,7 +253,7 @@ def test_ctrl_c_lands(
     assert landing - begun == pytest.approx(5.0, abs=0.1)
     assert stopped - landing == pytest.approx(3.0, abs=0.1)
     assert "Stopped by Ctrl-C" in capsys.readouterr().err
-    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.status,")
+    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.step,nmpc.x,")
 
 
 def test_a_second_ctrl_c_stops_the_motors(scripts: dict[str, ModuleType], drone: Drone) -> None:
@@ -302,11 +303,19 @@ def test_the_log_has_all_variables(scripts: dict[str, ModuleType]) -> None:
     """Those that identify and replay read, by their names."""
     assert run(scripts, "hover", "--log", "hover.csv") == 0
     header, *rows = Path("hover.csv").read_text("utf-8").splitlines()
-    assert {"ctrltarget.vx", "controller.roll", "nmpc.roll", "nmpc.lost", "stateEstimate.vy"} <= {
-        *header.split(",")
-    }
+    assert {"nmpc.step", "nmpc.targetVx", "nmpc.outRoll", "nmpc.lost", "nmpc.vy"} <= {*header.split(",")}
     assert len(rows) > 100
     assert "" not in rows[50].split(",")
+
+
+def test_the_clock_of_the_logs_may_begin_again(scripts: dict[str, ModuleType], drone: Drone) -> None:
+    """After 24 bits of ms: the rows stay in order."""
+    drone.first_tick = 2**24 - 5000
+    assert run(scripts, "hover", "--log", "hover.csv") == 0
+    _, *rows = Path("hover.csv").read_text("utf-8").splitlines()
+    ticks = np.array([int(row.split(",")[0]) for row in rows])
+    assert (np.diff(ticks) > 0).all()
+    assert ticks[0] < 2**24 < ticks[-1] < 2**24 + 60_000
 
 
 @pytest.mark.parametrize(
@@ -369,6 +378,6 @@ def test_scripts_have_the_prefix_and_what_given_accelerations_need(
     settings = with_option(with_option(SETTINGS, "code.prefix", "left"), "target.acceleration", "given")
     radio = modules_of(write(settings, tmp_path), monkeypatch)["radio"]
     assert radio.GROUP == "left"
-    assert radio.LOGGED[0][0] == "left.status"
-    assert "ctrltarget.ay" in radio.LOGGED[1]
+    assert radio.LOGGED[0][:2] == ("left.step", "left.x")
+    assert "left.targetAy" in radio.LOGGED[2]
     assert settings.short_digest == radio.DIGEST

@@ -154,7 +154,9 @@ class AltitudeGains(VehicleSection):
 
     p_n_m: Gain = Field(description="Thrust per metre of height error.")
     d_n_s_m: Gain = Field(description="Thrust per m/s of vertical speed, against it.")
-    thrust_max_n: Positive = Field(description="Largest total thrust; more than the weight.")
+    thrust_max_n: Positive = Field(
+        description="Largest demanded thrust; what it gives is more than the weight."
+    )
 
 
 class ThrustResponse(VehicleSection):
@@ -218,5 +220,11 @@ class MocapSensors(VehicleSection):
     attitude_noise_rad: Noise = Field(description="Standard deviation of roll, pitch and yaw.")
 
 
+class FlowDeckSensors(VehicleSection):
+    """A Crazyflie's flow deck: optical flow and range to the floor; what the app flies over on the desk."""
+
+    kind: Literal["flow-deck"] = Field("flow-deck", description="Optical flow and range, on a Crazyflie.")
+
+
 AnyAttitude = Annotated[MamboAttitude | CascadeAttitude | FirstOrderAttitude, Field(discriminator="kind")]
-AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors, Field(discriminator="kind")]
+AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors | FlowDeckSensors, Field(discriminator="kind")]
