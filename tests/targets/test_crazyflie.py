@@ -39,6 +39,7 @@ from tests.support.crazyflie import (
     link,
     send,
 )
+from tests.support.height_settings import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
 from tests.support.tools import require
@@ -338,6 +339,7 @@ SUBJECTS = {
     "given": with_option(SETTINGS, "target.acceleration", "given"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
+    "height": height_settings(acceleration="given"),
     "limits": with_option(SETTINGS, "limits.speed_m_s", 2.0),
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
 }
