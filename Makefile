@@ -27,10 +27,10 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -
 # Compilers, emulators and analysers that the tests want: Debian's packages, and the commands that show them.
 TOOL_PACKAGES = gcc g++ clang make cmake binutils python3-dev \
     gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc arduino-core-avr \
-    qemu-system-misc qemu-system-arm qemu-user \
+    qemu-system-misc qemu-system-arm qemu-user simavr \
     frama-c-base cppcheck libclang-rt-14-dev lld chromium
 TOOL_COMMANDS = gcc g++ clang make cmake nm \
-    arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr qemu-system-arm qemu-arm \
+    arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr qemu-system-arm qemu-arm simavr \
     frama-c cppcheck wasm-ld chromium
 
 ifeq ($(CI),true)

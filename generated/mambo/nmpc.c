@@ -32,6 +32,9 @@
 #if defined(__ASSOCIATIVE_MATH__)
 #error "build without -fassociative-math: it changes the order of operations"
 #endif
+#if defined(__NO_SIGNED_ZEROS__)
+#error "build without -fno-signed-zeros: the sign of a zero is one of the bits of a result"
+#endif
 /* 0: float and double are evaluated with their own precision; 16: and so is _Float16, which is not used here;
  * 1: float as double; 2: both as long double, as the x87 of an x86 does. */
 #if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)

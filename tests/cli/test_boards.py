@@ -135,7 +135,7 @@ def test_flying_on_the_mega_is_the_flight_of_this_machine(tmp_path: Path) -> Non
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
-    "command", [["fly", "--on", "mega"], ["same-bits", "--boards", "mega", "--steps", "100"]]
+    "command", [["fly", "--on", "mega"], ["same-bits", "--board", "mega", "--steps", "100"]]
 )
 def test_a_missing_emulator_is_named(
     command: list[str], tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
@@ -155,7 +155,7 @@ def test_a_missing_emulator_is_named(
         (["footprint", "--board", "teensy"], "did you mean teensy41?"),
         (["footprint", "mamba"], "did you mean mambo"),
         (["footprint", "--board", "odd.toml"], "odd.toml: title is missing; add it: the name of the board"),
-        (["same-bits", "--boards", "mambo,none"], "none is neither a board nor a file"),
+        (["same-bits", "--board", "mambo", "--board", "none"], "none is neither a board nor a file"),
     ],
 )
 def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str, tmp_path: Path) -> None:
@@ -176,9 +176,20 @@ def test_a_folder_of_other_work_is_refused_before_measuring(tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("_no_tool")
+def test_two_boards_are_measured_each_once() -> None:
+    """In the order in which they are named; without compilers each is missing."""
+    line = ["--board", "teensy41", "--board", "mega", "--board", "teensy41"]
+    missing = run("footprint", *line, code=2)[1].splitlines()
+    assert [text.partition(" found")[0] for text in missing] == [
+        "no compiler for PJRC Teensy 4.1",
+        "no compiler for Arduino Mega 2560",
+    ]
+
+
+@pytest.mark.usefixtures("_no_tool")
 def test_same_bits_compares_and_says_what_did_not_run() -> None:
     """The reference alone, where there is no compiler: a digest, and a reason for everything else."""
-    options = ["--boards", "mega,crazyflie", "--steps", "100"]
+    options = ["--board", "mega", "--board", "crazyflie", "--steps", "100"]
     result = json.loads(run("same-bits", *options, "--json")[0])
     assert (result["steps"], len(result["builds"])) == (100, 1 + 4 * 6)
     reference, *others = result["builds"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.command import run
+from tests.support.command import run, unwrapped
 
 COMMANDS = ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
 
@@ -34,7 +34,7 @@ def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
         "fly --trajectory '' -o a/b",
         "fly --repeat '' -o a/b",
         "footprint --board '' -o a/b",
-        "same-bits --boards ''",
+        "same-bits --board mambo --board ''",
         "campaign '' -o a/b",
         "regress '' -o a/b",
         "identify log.csv '' -o a/b",
@@ -52,6 +52,35 @@ def test_an_empty_name_is_refused(line: str, tmp_path: Path) -> None:
     said, talk = run(*shlex.split(line), code=2)
     assert (said, "must not be empty" in talk) == ("", True), talk
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("line", "option"),
+    [
+        ("generate -o a/b --output c/d", "--output"),
+        ("generate --prefix a --prefix b -o a/b", "--prefix"),
+        ("fly --seed 1 --wind gusts --seed=2 -o a/b", "--seed"),
+        ("fly --on mega --on crazyflie -o a/b", "--on"),
+        ("sweep --vary limits.tilt_rad=0.2:0.3:2 --board mega --board crazyflie -o a/b", "--board"),
+        ("same-bits --steps 100 --steps 200", "--steps"),
+        ("doctor --json --json", "--json"),
+    ],
+)
+def test_an_option_of_which_only_the_last_would_count_is_refused(
+    line: str, option: str, tmp_path: Path
+) -> None:
+    """Whatever its spelling; nobody learns otherwise that the first was ignored."""
+    said, talk = run(*shlex.split(line), code=2)
+    assert said == ""
+    assert option in talk
+    assert "is there more than once" in unwrapped(talk)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_option_that_may_be_there_again_has_all_its_values() -> None:
+    """Two keys of a sweep: the message is about the second."""
+    line = "sweep --vary limits.tilt_rad=0.2:0.3:2 --vary horizon.none=1:2:2"
+    assert "horizon.none is not a number" in unwrapped(run(*shlex.split(line), code=2)[1])
 
 
 @pytest.mark.parametrize(

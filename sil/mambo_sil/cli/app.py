@@ -60,9 +60,9 @@ mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen
 mambo-nmpc footprint
 mambo-nmpc footprint controller.toml --board crazyflie -o footprint
-mambo-nmpc footprint --board my-board.toml --json
+mambo-nmpc footprint --board mega --board my-board.toml --json
 mambo-nmpc footprint controller.toml --port /dev/ttyACM0 -o measured
-mambo-nmpc same-bits mambo --boards mambo,crazyflie
+mambo-nmpc same-bits mambo --board mambo --board crazyflie
 mambo-nmpc same-bits controller.toml --port /dev/ttyACM0
 mambo-nmpc sweep --vary cost.response_time_s=0.1:0.5:5 -o sweep
 mambo-nmpc sweep mambo-1norm --vary horizon.prediction=5:30:6 --vary optimizer.iterations=3:9:3 --fit

@@ -13,9 +13,9 @@ import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.cli.options import (
-    BOARD_NAMES,
     AsJson,
     Baud,
+    Boards,
     Drone,
     OptionalResults,
     PortName,
@@ -40,14 +40,7 @@ def footprint(
     source: Source = "mambo",
     *,
     scalar: Scalar = None,
-    board: Annotated[
-        str,
-        typer.Option(
-            help=f"{', '.join(BOARD_NAMES)}, all, or a board's TOML file; with --port by default the one "
-            "that the firmware names.",
-            autocompletion=complete_boards,
-        ),
-    ] = "all",
+    board: Boards = None,
     optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
     port: PortName = None,
     baud: Baud = None,
@@ -58,7 +51,8 @@ def footprint(
 
     Before you choose a board, and in a CI that keeps its budget.
 
-    With --port also cycles and stack of the same steps on the board there; exit 1 if its bits differ.
+    With --port also cycles and stack of the same steps on the board there, by default the one that the
+    firmware names; exit 1 if its bits differ.
     """
     from mambo_sil.board.footprint.footprint_report import FootprintSummary, page, summarise, text
     from mambo_sil.board.footprint.measure import measure_boards
@@ -222,9 +216,7 @@ def same_bits(
     source: Source = "mambo",
     *,
     scalar: Scalar = None,
-    board: Annotated[
-        str, typer.Option("--boards", help="Boards, separated by commas, or all.", metavar="NAME,NAME")
-    ] = "all",
+    board: Boards = None,
     steps: Annotated[
         int | None,
         typer.Option(
@@ -253,7 +245,7 @@ def same_bits(
 
     demand_port(port, baud)
     settings = load(source, scalar)
-    chosen = [one for name in board.split(",") for one in load_boards(name)]
+    chosen = load_boards(board)
     count = episode_count(method_of(settings)) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
     with contextlib.ExitStack() as stack:

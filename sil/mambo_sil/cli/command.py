@@ -95,16 +95,22 @@ class RootGroup(TyperGroup):
 
 
 class Command(TyperCommand):
-    """A command, which refuses the empty value of a script's unset variable."""
+    """A command, which refuses the empty value of a script's unset variable and an option given twice."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # as above
-        """Parse a command line; raises BadParameter for an empty argument or value of an option."""
+        """Parse a command line.
+
+        Raises BadParameter for an empty argument or value of an option, and for an option that is there again
+        though only its last value would count.
+        """
         given, _, parameters = self.make_parser(ctx).parse_args(list(args))
         for parameter in parameters:
             value = given.get(parameter.name or "")
+            named: Any = parameter  # typer hides the class of parameters
             if "" in (value if isinstance(value, list | tuple) else (value,)):
-                named: Any = parameter  # typer hides the class of parameters
                 raise typer.BadParameter("must not be empty", ctx, named)
+            if parameters.count(parameter) > 1 and not named.multiple:
+                raise typer.BadParameter("is there more than once; give it once", ctx, named)
         return super().parse_args(ctx, args)
 
 

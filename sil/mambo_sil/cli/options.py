@@ -38,6 +38,17 @@ def complete_vehicles(incomplete: str) -> list[str]:
     return [name for name in VEHICLE_NAMES if name.startswith(incomplete)]
 
 
+Boards = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--board",
+        help=f"{', '.join(BOARD_NAMES)}, or a board's TOML file; again for another; by default all.",
+        metavar="NAME|FILE",
+        autocompletion=complete_boards,
+    ),
+]
+
+
 def _vehicle_option(about: str) -> Any:
     """Return the option --vehicle; `about` ends its help."""
     return typer.Option(
@@ -65,11 +76,11 @@ BAUD: Final = 500000
 Baud = Annotated[int | None, typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1)]
 
 
-def load_boards(name: str) -> "Sequence[Board]":
-    """Return the board called `name`, or every board for `all`."""
+def load_boards(names: "Sequence[str] | None") -> "Sequence[Board]":
+    """Return the boards called `names`, each once, or every board for None."""
     from mambo_codegen import boards
 
-    return [boards.load(one) for one in (boards.names() if name == "all" else (name,))]
+    return [boards.load(name) for name in dict.fromkeys(names or boards.names())]
 
 
 def demand_port(port: str | None, baud: int | None) -> None:

@@ -1,6 +1,7 @@
 """AVR: self-test on an emulated ATmega2560, life of the emulator process, stack analysis of AVR code."""
 
 import os
+import re
 import select
 import subprocess
 import sys
@@ -24,8 +25,10 @@ from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.errors import EmulationError, EmulatorError
 from mambo_sil.flight.controllers.controller_library import batch_source
 from tests.support.cases import settings_case
+from tests.support.height import height_case
 from tests.support.linking import link
 from tests.support.one_norm import ONE_NORM
+from tests.support.simavr import run_in_simavr
 from tests.support.tools import board_builder, only
 
 SELF_TEST = """
@@ -36,6 +39,16 @@ long run(void) { return nmpc_self_test(&scratch); }
 """
 EFFORT = "return (weight.tracking * distance_m) + (weight.effort * variation_rad);"
 WRONG = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
+DIGEST = """
+#include "nmpc_self_test.h"
+unsigned long run(void);
+unsigned long run(void)
+{
+    static nmpc_t scratch;
+    return nmpc_self_test_episode(&scratch, 1, nmpc_self_test_episode(&scratch, 0, 0UL));
+}
+"""
+COMPARISON = "#define NMPC_COMPARISON static\n"
 ABANDONED = """
 import sys
 from pathlib import Path
@@ -151,7 +164,11 @@ def test_the_emulator_dies_with_its_owner(one: Path) -> None:
 
 @pytest.mark.parametrize(
     ("here", "tool", "package"),
-    [("setpriv", "qemu-system-avr", "qemu-system-misc"), ("qemu-system-avr", "setpriv", "util-linux")],
+    [
+        ("setpriv", "qemu-system-avr", "qemu-system-misc"),
+        ("qemu-system-avr", "setpriv", "util-linux"),
+        ("[qs]e[mt]*", "avr-objdump", "binutils-avr"),
+    ],
 )
 def test_a_missing_tool_is_named(
     here: str, tool: str, package: str, one: Path, monkeypatch: pytest.MonkeyPatch
@@ -196,6 +213,64 @@ def test_a_program_for_another_part_is_refused(tmp_path: Path) -> None:
     assert bound_stack(load(elf), "run").bytes == 2
     with pytest.raises(EmulatorError, match=r"program\.elf: not built for an ATmega2560"):
         start(elf, "avr")
+
+
+SKIPPING = """
+__attribute__((naked)) unsigned long run(void)
+{{
+    __asm volatile ("ldi r22, 7\\n ldi r23, 0\\n ldi r24, 1\\n ldi r25, 1\\n" "{skip}\\n {skipped}\\n"
+                    "ldi r22, 42\\n ldi r24, 0\\n ldi r25, 0\\n ret");
+}}
+"""
+"""A function that returns 42 if the instruction `skip`, whose condition holds, skips `skipped`."""
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("skipped", ["ret", "icall"])
+@pytest.mark.parametrize("skip", ["sbrs r24, 0", "sbrc r24, 1", "cpse r24, r25", "sbic 0x1e, 1"])
+def test_a_skip_over_a_return_or_an_indirect_call_is_not_emulated(
+    skip: str, skipped: str, mega: Builder, tmp_path: Path
+) -> None:
+    """QEMU 7.2 repeats what is before it; the message has place, pair and remedy."""
+    elf = mega.guest({}, SKIPPING.format(skip=skip, skipped=skipped), ("run",), tmp_path)
+    with pytest.raises(EmulatorError) as refused:
+        start(elf, "avr")
+    pair = re.escape(f"`{skip}; {skipped}` in run+0x8: ")
+    assert re.search(rf"^program\.elf: {pair}.*QEMU repeats.*-fno-reorder-blocks", str(refused.value))
+
+
+@pytest.mark.parametrize(
+    ("skipped", "returned"), [("push r24", 42), ("rjmp .+8", 42), ("nop\\n ret", 0x01010007)]
+)
+def test_other_skips_are_emulated(skipped: str, returned: int, mega: Builder, tmp_path: Path) -> None:
+    """Over a push, a jump, or a return that is not directly behind."""
+    elf = mega.guest({}, SKIPPING.format(skip="sbrs r24, 0", skipped=skipped), ("run",), tmp_path)
+    assert start(elf, "avr").call("run") == returned
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "optimisation"), [("mambo", "-O2"), ("mambo-1norm", "-Os")])
+def test_a_second_emulator_has_the_digest_of_the_reference(
+    name: str, optimisation: str, tmp_path: Path
+) -> None:
+    """simavr, which has nothing in common with QEMU, starts the program from reset with avr-libc's code."""
+    settings = presets.load(name)
+    files = render(settings, with_digest=False) | {"digest.c": DIGEST}
+    assert run_in_simavr(files, optimisation, tmp_path) == self_test_digest(method_of(settings), 2)
+
+
+@pytest.mark.long
+def test_a_controller_that_qemu_would_not_run_is_refused_and_right(mega: Builder, tmp_path: Path) -> None:
+    """With comparisons as functions that return from two places; simavr has the digest of the reference."""
+    settings = height_case(1, "fixed")
+    files = render(settings, with_digest=False)
+    assert files["nmpc.c"].count(COMPARISON) == 1
+    files["nmpc.c"] = files["nmpc.c"].replace(COMPARISON, "#define NMPC_COMPARISON NMPC_INLINE\n")
+    elf = mega.guest(files, batch_source(), GUEST, tmp_path / "guest")
+    with pytest.raises(EmulatorError, match=r"`sbrs r25, 7; ret` in (absolute|larger)"):
+        EmulatedController(settings, elf, "avr")
+    found = run_in_simavr(files | {"digest.c": DIGEST}, "-O2", tmp_path / "simavr")
+    assert found == self_test_digest(method_of(settings), 2)
 
 
 def bound_assembly(assembly: str, folder: Path) -> StackReport:

@@ -137,6 +137,7 @@ def test_every_shipped_firmware_is_known(says: str, name: str) -> None:
     """By its own name, alone or confirmed by --board."""
     assert choose_board(ALL, "x", says).name == name
     assert choose_board([boards.load(name)], "x", says).name == name
+    assert choose_board([boards.load("rv32"), boards.load(name)], "x", says).name == name
 
 
 def test_a_board_of_ones_own_is_taken() -> None:
@@ -149,7 +150,7 @@ def test_a_board_of_ones_own_is_taken() -> None:
 @pytest.mark.parametrize("says", ["", "my board", "Cortex-M"])
 def test_a_firmware_that_names_no_board_is_refused(says: str) -> None:
     """Nor is a name taken that several boards have."""
-    with pytest.raises(BoardError, match=r"^--port x: .*; say with --board which one to compare it with$"):
+    with pytest.raises(BoardError, match=r"^--port x: .*; say with one --board which to compare it with$"):
         choose_board(ALL, "x", says)
 
 

@@ -1,6 +1,7 @@
 """An ATmega2560 emulated by QEMU, controlled over GDB's remote protocol; a plugin counts instructions."""
 
 import hashlib
+import itertools
 import mmap
 import os
 import re
@@ -20,11 +21,13 @@ from mambo_codegen.toolchain import Toolchain, host_toolchain
 from mambo_sil.board.emulation.arena import Arena
 from mambo_sil.board.emulation.executed import Executed
 from mambo_sil.board.emulation.gdb import GdbStub
+from mambo_sil.board.firmware.avr import DISASSEMBLER, SKIPS, decode
+from mambo_sil.board.firmware.elf import load
 from mambo_sil.errors import EmulationError, EmulatorError
 from mambo_sil.results.cache import build_cached
 
 _EMULATOR: Final = "qemu-system-avr"
-_TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux"}
+_TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux", DISASSEMBLER: "binutils-avr"}
 _PART: Final = "an ATmega2560"
 
 _FLASH_BYTES: Final = 0x40000
@@ -48,6 +51,12 @@ _ARGUMENTS: Final = range(8, 26)
 
 _TWO_WORDS: Final = ((0xFE0F, 0x9000), (0xFE0F, 0x9200), (0xFE0E, 0x940C), (0xFE0E, 0x940E))
 """Mask and opcode of the instructions of two words: lds, sts, jmp, call (DS40002198)."""
+_NOT_SKIPPED: Final = frozenset({"ret", "reti", "ijmp", "eijmp", "icall", "eicall"})
+"""Instructions over which QEMU 7.2 does not skip: it executes the basic block before them again.
+
+Where such an instruction is skipped, the translator leaves the program counter at the start of the block
+(target/avr/translate.c, `avr_tr_translate_insn`: no case for DISAS_LOOKUP and DISAS_EXIT).
+"""
 _COUNTING_SLOWDOWN: Final = 3
 
 
@@ -65,6 +74,7 @@ class AvrMachine:
             if shutil.which(tool) is None:
                 raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
         flash, data, self._symbols = _read_program(elf)
+        demand_skips(elf)
         used = max((start + len(content) for start, content in data), default=_RAM.start)
         self.arena = Arena(used, self.stack.start - len(_GUARD), _ALIGNMENT)
         if self.arena.free_bytes < 0:
@@ -141,6 +151,20 @@ class AvrMachine:
         if self.read(self.stack.start - len(_GUARD), len(_GUARD)) != _GUARD:
             raise EmulationError(f"{function} overflowed its stack of {_STACK_BYTES} B")
         return int.from_bytes(after[_RESULT], "little")
+
+
+def demand_skips(elf: Path) -> None:
+    """Raise EmulatorError if an AVR program has a skip directly before an instruction of `_NOT_SKIPPED`."""
+    image = load(elf)
+    lines = decode(image)
+    for line, after in itertools.pairwise(lines):
+        if line.mnemonic in SKIPS and after.mnemonic in _NOT_SKIPPED:
+            raise EmulatorError(
+                f"{elf.name}: `{line.text}; {after.text}` in {image.name_of(line.address)}: where the first "
+                "instruction skips the second, QEMU repeats what is before them, so it is not emulated; "
+                f"{_PART} and simavr run it. Another optimisation, such as -Os, or -fno-reorder-blocks in "
+                "compiler.flags of the board's file may avoid the pair"
+            )
 
 
 def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, int]]:

@@ -27,7 +27,7 @@ from mambo_sil.board.firmware.instructions import (
     Store,
 )
 
-_DISASSEMBLER: Final = "avr-objdump"
+DISASSEMBLER: Final = "avr-objdump"
 _RETURN: Final = "return address"
 _EXCEPTIONS: Final = {"__muldi3_6": frozenset({"r28", "r29"})}
 """Subroutine of libgcc's 64-bit multiplication, which writes registers of its caller (lib1funcs.S)."""
@@ -100,9 +100,9 @@ def _lines(text: str) -> list[Line]:
 
 
 def _objdump(image: Image) -> str:
-    command = shutil.which(_DISASSEMBLER)
+    command = shutil.which(DISASSEMBLER)
     if command is None:
-        raise image.error(f"{_DISASSEMBLER}, which decodes AVR code, is missing (Debian: binutils-avr)")
+        raise image.error(f"{DISASSEMBLER}, which decodes AVR code, is missing (Debian: binutils-avr)")
     done = subprocess.run(
         [command, "-f", "-d", "-z", str(image.path)],
         stdin=subprocess.DEVNULL,
@@ -112,7 +112,7 @@ def _objdump(image: Image) -> str:
         check=False,
     )
     if done.returncode != 0:
-        raise image.error(f"{_DISASSEMBLER} cannot decode its code: {done.stderr.strip()}")
+        raise image.error(f"{DISASSEMBLER} cannot decode its code: {done.stderr.strip()}")
     return done.stdout
 
 

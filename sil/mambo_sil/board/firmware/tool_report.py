@@ -83,6 +83,7 @@ def _needs() -> list[Finding]:
         ),
         _need("emulator", "unicorn", f"emulates {', '.join(on_others)}"),
         _need("emulator", "qemu-system-avr", f"emulates {', '.join(on_avr)}", "qemu-system-misc"),
+        _need("emulator", "simavr", "make test: a second AVR", "simavr"),
         _need("analyser", "pyelftools", "footprint: flash and RAM"),
         _need("analyser", "capstone", "footprint: stack bound"),
         _need("analyser", "nm", "make test: symbols of a build", "binutils"),

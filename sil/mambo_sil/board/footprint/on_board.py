@@ -50,23 +50,25 @@ class BoardMeasurement:
 def choose_board(candidates: Sequence[Board], port: str, says: str) -> Board:
     """Return the board to compare with: the only candidate, or the one that the firmware names.
 
-    Raises BoardError if it names none, or another than the only candidate.
+    Raises BoardError if it names none of them, or several, or another than the only candidate.
     """
-    named = boards.called(says)
     if len(candidates) == 1:
         (board,) = candidates
+        named = boards.called(says)
         if named and not board.is_called(says):
             raise BoardError(
                 f"--board {echo(board.name)} is not the board at {echo(port)}, whose firmware is that of "
                 f"{echo(says)}: give --board {named[0].name}, or no --board"
             )
         return board
-    if len(named) != 1:
+    meant = [one for one in candidates if one.is_called(says)]
+    if len(meant) != 1:
+        named_here = ", ".join(echo(one.name) for one in candidates)
         raise BoardError(
-            f"--port {echo(port)}: the firmware is that of {echo(says)}, which names none of "
-            f"{', '.join(boards.names())}; say with --board which one to compare it with"
+            f"--port {echo(port)}: the firmware is that of {echo(says)}, which names none of {named_here}; "
+            "say with one --board which to compare it with"
         )
-    return named[0]
+    return meant[0]
 
 
 def measure_on_board(
