@@ -16,7 +16,7 @@ from mambo_codegen.settings.model import Settings
 from tests.support.bundles import place
 
 SETTINGS = presets.preset("crazyflie")
-MODULES = ("fly", "figures", "radio", "simulated_drone")
+MODULES = ("heading", "radio", "figures", "checks", "fly", "simulated_drone", "offboard")
 
 
 def write(settings: Settings, folder: Path) -> Path:

@@ -1,6 +1,5 @@
 """The script that flies a Crazyflie from the desk: its calls to cflib, and its flights through a radio."""
 
-import importlib.util
 import math
 import re
 import sys
@@ -20,6 +19,7 @@ from tests.support.bundles import place
 from tests.support.height_settings import height_settings
 from tests.support.offboard import Flown, Radio, fly_offboard
 from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
+from tests.support.scripts import modules_of
 
 SETTINGS = presets.preset("crazyflie")
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "offboard.md"
@@ -37,7 +37,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def drone() -> Drone:
     """Return a drone at rest."""
     logged = {f"stateEstimate.{name}": value for name, value in STATE.items()}
-    return Drone(Clock(), {**logged, "supervisor.info": ARMED | CAN_FLY}, {})
+    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
+    logged |= {"supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
+    parameters = {"stabilizer.estimator": 2, "kalman.resetEstimation": 0, "kalman.initialYaw": 0.0}
+    return Drone(Clock(), logged, parameters)
 
 
 @pytest.fixture
@@ -49,14 +52,11 @@ def script(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> Modul
 def imported(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Import the script of a folder."""
     install(drone, monkeypatch)
-    spec = importlib.util.spec_from_file_location("offboard", folder / "offboard.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    vars(module)["time"] = drone.clock
+    scripts = modules_of(folder, monkeypatch)
+    for name in ("offboard", "radio"):
+        monkeypatch.setattr(scripts[name], "time", drone.clock)
     monkeypatch.setattr(sys, "argv", ["offboard.py", "radio://0/80/2M/E7E7E7E7E7"])
-    return module
+    return scripts["offboard"]
 
 
 def test_it_sends_angles_and_height_a_hundred_times_a_second(
