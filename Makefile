@@ -3,7 +3,7 @@
 # make test       set up everything, check style and types, run the tests; with CI=true also the long ones
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
 # make lowest     the tests that need no compiler, and those of a few commands, with the least versions of the dependencies
-# make thorough   the same with every case of the tests of which CI runs a sample
+# make thorough   the same with every case of the tests of which CI runs a sample, such as every fault of Python
 # make proofs     make all proofs with Frama-C anew; CI makes only those that are not in tests/verify/proven.txt
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
@@ -116,13 +116,13 @@ evidence: $(SETUP)
 	$(BIN)/python -m benchmarks.evidence
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.flights
-	$(BIN)/python -m benchmarks.commands
-	$(BIN)/python -m benchmarks.times
-	$(BIN)/python -m benchmarks.quadratic_times
+	$(BIN)/python -m benchmarks.speed.flight_times
+	$(BIN)/python -m benchmarks.speed.command_times
+	$(BIN)/python -m benchmarks.peers.times
+	$(BIN)/python -m benchmarks.peers.quadratic_times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.peers
+	$(BIN)/python -m benchmarks.peers.footprints
 
 # The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
 # Of DAQP the C is wanted, which only the source distribution has.

@@ -16,29 +16,17 @@ _ENDS: Final = ("recovered", "not recovered", "crashed")
 
 def read_footprints(folders: Mapping[str, str]) -> Callable[[Path], Figures]:
     """Return what reads the boards of `footprint`; `folders` are those of the results, by controller."""
-    return _reader(folders, "boards", _board)
-
-
-def _reader(
-    folders: Mapping[str, str], member: str, record: Callable[[Figures], Figures]
-) -> Callable[[Path], Figures]:
-    """Return what makes a record of every entry of a summary's list `member`, by controller."""
-
-    def read(results: Path) -> Figures:
-        return {
-            name: [record(entry) for entry in summary(results / folder)[member]]
-            for name, folder in folders.items()
-        }
-
-    return read
+    return lambda results: {
+        name: [_board(board) for board in summary(results / folder)["boards"]]
+        for name, folder in folders.items()
+    }
 
 
 def _board(board: Figures) -> Figures:
     """Return what tables show of a board."""
-    counts, time = board["instructions"], next(one for one in board["limits"] if one["name"] == "time")
+    counts = board["instructions"]
     return {
         "name": board["name"],
-        "title": board["title"],
         "core": board["core"],
         "compiler": board["compiler"],
         "fits": board["fits"],
@@ -49,7 +37,6 @@ def _board(board: Figures) -> Figures:
         "cycles": board["cycles"],
         "cycles_estimate": board["cycles_estimate"],
         "time_s": board["time_s_estimate"],
-        "share_of_budget": time["share"],
     }
 
 
@@ -116,25 +103,25 @@ def compilers(figures: Figures) -> str:
     return "\n".join(f"- {one}" for one in sorted(found))
 
 
+_COMPARED: Final = ("course", "fault", "largest_error_m")
+_SHOWN: Final = (
+    *(*_COMPARED, "turning", "statuses", "largest_command_rad", "largest_tilt_rad"),
+    *("band_m", "saturated_share", "recovery_s", "end"),
+)
+
+
 def read_faults(folders: Mapping[str, str]) -> Callable[[Path], Figures]:
-    """Return what reads the flights of `faults`; `folders` are those of the results, by controller."""
-    return _reader(folders, "flights", _fault)
+    """Return what reads the flights of `faults`: of the first controller in full, of the others the errors.
 
-
-def _fault(flight: Figures) -> Figures:
-    keys = (
-        *(
-            "course",
-            "fault",
-            "turning",
-            "statuses",
-            "largest_command_rad",
-            "largest_tilt_rad",
-            "largest_error_m",
-        ),
-        *("band_m", "saturated_share", "recovery_s", "end"),
-    )
-    return {key: flight[key] for key in keys}
+    `folders` are those of the results, by controller.
+    """
+    return lambda results: {
+        name: [
+            {key: flight[key] for key in (_COMPARED if number else _SHOWN)}
+            for flight in summary(results / folder)["flights"]
+        ]
+        for number, (name, folder) in enumerate(folders.items())
+    }
 
 
 def faults(controller: str) -> Callable[[Figures], str]:

@@ -15,14 +15,26 @@ from mambo_sil.experiment.campaign.statistics import Table, index_values, read_t
 from mambo_sil.experiment.campaign.store import DATABASE
 
 MOTOR_LAGS_S: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
+_SHOWN: Final = {
+    "iae_m_s": ("0.05", "0.5", "0.95"),
+    "seen_iae_m_s": ("0.5", "0.95"),
+    "command_variation_rad": ("0.5", "0.95"),
+}
+"""Quantiles in tables, by index."""
+
+
+def read_quantiles(results: Path) -> Figures:
+    """Return crashes and quantiles of each controller in a campaign."""
+    return _quantiles(summary(results / "campaign"))
 
 
 def read_campaign(results: Path) -> Figures:
     """Return statistics of each controller, improvements, and medians by motor lag."""
     folder = results / "campaign"
     found = summary(folder)
+    indices = [one["index"] for one in found["improvements"] if not one["index"].startswith("seen_")]
     return _quantiles(found) | {
-        "improvements": [one for one in found["improvements"] if not one["index"].startswith("seen_")],
+        "improvements": _improvements(found, indices),
         "motor_lags": _by_motor_lag(read_table(folder / DATABASE), list(found["controllers"])),
     }
 
@@ -30,31 +42,44 @@ def read_campaign(results: Path) -> Figures:
 def read_opponents(results: Path) -> Figures:
     """Return statistics of each controller by campaign, and improvements of both errors, seen and true."""
     found = {name: summary(results / name) for name in ("drawn", "slow-motors")}
-    compared = [one for one in found["drawn"]["improvements"] if one["index"] in ("iae_m_s", "seen_iae_m_s")]
+    compared = _improvements(found["drawn"], ("iae_m_s", "seen_iae_m_s"))
     return {name: _quantiles(one) for name, one in found.items()} | {"improvements": compared}
 
 
+def _improvements(found: Figures, indices: Sequence[str]) -> list[Figures]:
+    """Return the improvements of some indices; of the share of flights in which one is better no interval."""
+    return [
+        one | {"better": {"share": one["better"]["share"]}}
+        for one in found["improvements"]
+        if one["index"] in indices
+    ]
+
+
 def _quantiles(found: Figures) -> Figures:
-    """Return crashes and quantiles of each controller in the record of a campaign."""
-    shown = ("iae_m_s", "seen_iae_m_s", "command_variation_rad")
+    """Return crashes, and the quantiles that tables show, of each controller in the record of a campaign."""
     return {
         "flights": found["flights"],
         "controllers": {
-            name: {"crashed": one["crashed"], "quantiles": {key: one["quantiles"][key] for key in shown}}
+            name: {
+                "crashed": one["crashed"],
+                "quantiles": {
+                    index: {share: one["quantiles"][index][share] for share in shares}
+                    for index, shares in _SHOWN.items()
+                },
+            }
             for name, one in found["controllers"].items()
         },
     }
 
 
 def _by_motor_lag(flights: Table, names: Sequence[str]) -> list[Figures]:
-    """Return median IAE and crashes of each controller, and where `mambo` is better, by motor lag."""
+    """Return median IAE and crashes of each controller, and where `mambo` beats the PD with feed-forward."""
     rows = []
     for low, high in pairwise(MOTOR_LAGS_S):
         inside = (flights["motor_lag_s"] >= low) & (flights["motor_lag_s"] < high)
         if not inside.any():
             continue
         iae = {name: index_values(flights, name, "iae_m_s")[inside] for name in names}
-        variation = {name: index_values(flights, name, "command_variation_rad")[inside] for name in names}
         rows.append(
             {
                 "from_s": low,
@@ -62,12 +87,7 @@ def _by_motor_lag(flights: Table, names: Sequence[str]) -> list[Figures]:
                 "flights": int(inside.sum()),
                 "median_iae_m_s": {name: _median(values) for name, values in iae.items()},
                 "crashed": {name: int(np.isinf(values).sum()) for name, values in iae.items()},
-                "mambo_better": {
-                    name: float((iae["mambo"] < values).mean())
-                    for name, values in iae.items()
-                    if name != "mambo"
-                },
-                "median_command_variation_rad": {name: _median(values) for name, values in variation.items()},
+                "mambo_better": float((iae["mambo"] < iae["pd-feedforward"]).mean()),
             }
         )
     return rows
@@ -89,16 +109,16 @@ def campaign(figures: Figures) -> str:
         crashed, quantiles = one["crashed"], one["quantiles"]
         interval = f"{_percent(crashed['low'])} .. {_percent(crashed['high'])}"
 
-        def shares(index: str, *wanted: str, quantiles: Any = quantiles) -> str:
-            return ", ".join(three(quantiles[index][share]) for share in wanted)
+        def shares(index: str, quantiles: Any = quantiles) -> str:
+            return ", ".join(three(quantiles[index][share]) for share in _SHOWN[index])
 
         rows.append(
             {
                 f"{figures['flights']} flights": title(name),
                 "crashed (95 %)": f"{crashed['count']}, {_percent(crashed['share'])} % ({interval})",
-                "IAE, m s: 5 %, median, 95 % of the flights": shares("iae_m_s", "0.05", "0.5", "0.95"),
-                "as estimated: median, 95 %": shares("seen_iae_m_s", "0.5", "0.95"),
-                "variation, rad: median, 95 %": shares("command_variation_rad", "0.5", "0.95"),
+                "IAE, m s: 5 %, median, 95 % of the flights": shares("iae_m_s"),
+                "as estimated: median, 95 %": shares("seen_iae_m_s"),
+                "variation, rad: median, 95 %": shares("command_variation_rad"),
             }
         )
     return table(rows)
@@ -125,9 +145,7 @@ def campaign_motor_lag(figures: Figures) -> str:
         for name, median in one["median_iae_m_s"].items():
             lost = one["crashed"][name]
             row[f"{title(name)}: median IAE, m s"] = three(median) + (f", {lost} crashed" if lost else "")
-        row["`mambo` better than PD with feed-forward"] = (
-            f"{_percent(one['mambo_better']['pd-feedforward'])} %"
-        )
+        row["`mambo` better than PD with feed-forward"] = f"{_percent(one['mambo_better'])} %"
         rows.append(row)
     return table(rows)
 

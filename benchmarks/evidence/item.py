@@ -1,7 +1,7 @@
 """One item of evidence: its commands, its figures, the tables and pictures in docs/evidence, and its stamp.
 
-The stamp docs/evidence/data/NAME.json holds the figures without rounding, from which the tables are written
-again without a flight, the commit at which they were made, and ids of what they depend on.
+The stamp docs/evidence/data/NAME.json holds the figures of the tables without rounding, from which they are
+written again without a flight, the commit at which they were made, and ids of what they depend on.
 """
 
 import json
@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -134,7 +134,35 @@ def restamp(item: Item, say: Callable[[str], None]) -> None:
 
 
 def _write_stamp(item: Item, stamp: Figures) -> None:
-    item.stamp.write_text(json.dumps(stamp, indent=1, allow_nan=False) + "\n", "utf-8")
+    item.stamp.write_text(record_lines(stamp) + "\n", "utf-8")
+
+
+def record_lines(value: Any, level: int = 0) -> str:
+    """Return JSON with a line for each entry of the stamp, and in its figures for each record.
+
+    A record is a list of plain values, or an object whose members are plain or hold plain values only.
+    """
+    if not isinstance(value, dict | list) or (level > 1 and _is_record(value)):
+        return json.dumps(value, allow_nan=False)
+    parts = [record_lines(member, level + 1) for member in _members(value)]
+    if isinstance(value, dict):
+        parts = [f"{json.dumps(name)}: {part}" for name, part in zip(value, parts, strict=True)]
+    first, last = "{}" if isinstance(value, dict) else "[]"
+    inside = ",".join(f"\n{' ' * (level + 1)}{part}" for part in parts)
+    return f"{first}{inside}\n{' ' * level}{last}" if parts else f"{first}{last}"
+
+
+def _members(value: Any) -> Collection[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+
+
+def _is_plain(value: Any) -> bool:
+    """Return whether a value has no list and no object inside."""
+    return not any(isinstance(member, dict | list) for member in _members(value))
+
+
+def _is_record(value: Any) -> bool:
+    return _is_plain(value) or (isinstance(value, dict) and all(map(_is_plain, value.values())))
 
 
 def write_tables(item: Item) -> list[str]:

@@ -27,6 +27,7 @@ from benchmarks.evidence.campaign_tables import (
     opponents_ratios,
     read_campaign,
     read_opponents,
+    read_quantiles,
 )
 from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
@@ -81,14 +82,14 @@ def _regress(item: str, suite: str, *sources: str) -> tuple[str, ...]:
 
 
 def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], str]]) -> Item:
-    """Return the item of a campaign, NAME.toml beside this file; the first one has pictures."""
+    """Return the item of a campaign, NAME.toml beside this file; the first has a picture and more tables."""
     drawn = name == "campaign"
     return Item(
         name=name,
         commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
         controllers=_FLOWN,
         paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/{name}.toml", *((_STYLE,) if drawn else ())),
-        read=read_campaign,
+        read=read_campaign if drawn else read_quantiles,
         tables=tables,
         pictures={f"{name}.png": "campaign/campaign.png"} if drawn else {},
     )
@@ -167,9 +168,9 @@ ITEMS: Final = (
     ),
     Item(
         name="spread",
-        commands=("python -m benchmarks.spread",),
+        commands=("python -m benchmarks.flights.spread",),
         controllers=_FLOWN,
-        paths=(*_FLIGHT, "benchmarks/spread.py"),
+        paths=(*_FLIGHT, "benchmarks/flights/spread.py"),
         read=read_printed,
         tables={"spread": spread},
     ),
@@ -211,18 +212,18 @@ ITEMS: Final = (
     _campaign("campaign-quick-motors", "--flights 100 ", {"campaign-quick-motors": campaign}),
     Item(
         name="limits",
-        commands=(f"python -m benchmarks.limits {RESULTS}/limits/pictures",),
+        commands=(f"python -m benchmarks.flights.limits {RESULTS}/limits/pictures",),
         controllers=("mambo", "crazyflie", "mambo-1norm", "table1"),
-        paths=(*_FLIGHT, "benchmarks/limits.py", _STYLE),
+        paths=(*_FLIGHT, "benchmarks/flights/limits.py", _STYLE),
         read=read_printed,
         tables={"limits": printed},
         pictures={f"limits-{name}.png": f"pictures/limits-{name}.png" for name in ("step", "fence")},
     ),
     Item(
         name="height",
-        commands=(f"python -m benchmarks.height {RESULTS}/height/pictures",),
+        commands=(f"python -m benchmarks.flights.height {RESULTS}/height/pictures",),
         controllers=(f"{_HERE}/height.toml",),
-        paths=(*_FLIGHT, "benchmarks/height.py", f"{_HERE}/height.toml", _STYLE),
+        paths=(*_FLIGHT, "benchmarks/flights/height.py", f"{_HERE}/height.toml", _STYLE),
         read=read_printed,
         tables={"height": printed},
         pictures={"height-helix.png": "pictures/height-helix.png"},
@@ -275,11 +276,11 @@ ITEMS: Final = (
     ),
     Item(
         name="adapters",
-        commands=(f"python -m benchmarks.adapters {RESULTS}/adapters/flights",),
+        commands=(f"python -m benchmarks.simulators.adapters {RESULTS}/adapters/flights",),
         controllers=("design crazyflie", "design crazyflie-l250"),
         paths=(
             *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
-            *("benchmarks/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),
+            *("benchmarks/simulators/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),
         ),
         read=read_adapters,
         tables={},
@@ -300,8 +301,7 @@ ITEMS: Final = (
                 "sil/mambo_sil/flight/controllers",
             ),
             *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
-            *("benchmarks/simulators", "benchmarks/rotorpy_crazyflie.toml"),
-            *(f"{_HERE}/simulator_pictures.py", _STYLE),
+            *("benchmarks/simulators", f"{_HERE}/simulator_pictures.py", _STYLE),
         ),
         read=read_simulators,
         tables={

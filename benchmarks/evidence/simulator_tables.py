@@ -15,6 +15,8 @@ from mambo_sil.results.number_format import three_digits
 SIMULATORS: Final = ("crazyflow", "rotorpy")
 LARGEST_IS_BEST: Final = ("heading", "payload")
 """Missions whose score is a height."""
+UNREST_IN: Final = "eight"
+"""The mission of which a table shows how much the command changes."""
 L250: Final = ("cf2x_L250, first principles", "cf2x_L250, fitted")
 PRESET: Final = "ours, preset `crazyflie`"
 NEAREST: Final = "ours, `design` of the nearest drone"
@@ -50,10 +52,15 @@ Cell = Mapping[str, Any]
 
 
 def read_simulators(results: Path) -> Figures:
-    """Return the scores by simulated drone, controller and mission."""
+    """Return the scores by simulated drone, controller and mission; the unrest of one mission only."""
     found: Figures = {}
     for name in SIMULATORS:
         found |= json.loads((results / name / "figures.json").read_text("utf-8"))
+    for challengers in found.values():
+        for cells in challengers.values():
+            for mission, cell in cells.items():
+                if mission != UNREST_IN:
+                    del cell["unrest_rad"]
     return found
 
 
@@ -116,9 +123,8 @@ def unrest(figures: Figures) -> str:
     for title in titles:
         row = {"change of a command in 10 ms, mrad": title}
         for drone, challengers in figures.items():
-            row[drone] = (
-                three_digits(1e3 * challengers[title]["eight"]["unrest_rad"]) if title in challengers else "-"
-            )
+            cells = challengers.get(title)
+            row[drone] = three_digits(1e3 * cells[UNREST_IN]["unrest_rad"]) if cells else "-"
         rows.append(row)
     return table(rows)
 

@@ -150,7 +150,6 @@ def read_suite(names: Sequence[str]) -> Callable[[Path], Figures]:
 def _flight(flight: Figures) -> Figures:
     """Return what tables show of a flight of a suite."""
     return {
-        "name": flight["name"],
         "group": flight["group"],
         "failed": not all(check["holds"] for check in flight["checks"]),
         "iae_m_s": flight["metrics"]["iae_m_s"],

@@ -239,7 +239,7 @@ def fly_log(world: SimulatedCrazyflie) -> list[LogRow]:
 def challengers_of(world: SimulatedCrazyflie, folder: Path) -> dict[str, Challenger]:
     """Return the controllers by title; writes the log, and the drone that `identify` found in it."""
     name = f"{world.drone}-{world.model}"
-    text, found = identified(fly_log(world), folder / f"{name}.csv")
+    text, found = identified(fly_log(world), folder / f"{name}.csv", world.mass_kg)
     (folder / f"{name}.toml").write_text(text, "utf-8")
     derived = Controller.from_vehicle(VEHICLES[world.drone]).settings
     calm = identified_settings(text.partition(SENSORS)[0])

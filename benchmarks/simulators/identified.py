@@ -44,7 +44,7 @@ def manoeuvre(height_m: float) -> FloatArray:
     return targets
 
 
-def identified(rows: Sequence[LogRow], path: Path) -> tuple[str, Settings]:
+def identified(rows: Sequence[LogRow], path: Path, mass_kg: float) -> tuple[str, Settings]:
     """Return the vehicle.toml of a log, with the sensors, and the settings that `design` derives from it.
 
     Writes the log to `path`. Raises ValueError if the log is not good enough.
@@ -55,7 +55,7 @@ def identified(rows: Sequence[LogRow], path: Path) -> tuple[str, Settings]:
     summary, _ = identify(logs, left_out)
     if not summary.good:
         raise ValueError(f"{path}: {summary.verdicts}")
-    text = vehicle_text(summary) + SENSORS
+    text = vehicle_text(summary, mass_kg) + SENSORS
     return text, identified_settings(text)
 
 

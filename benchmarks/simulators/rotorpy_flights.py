@@ -30,7 +30,7 @@ from mambo_sil.model.derive.derived_settings import controller_text
 
 SEEDS: Final = (0, 1, 2, 3, 4)
 CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")
-DRONE: Final = vehicle_toml.read(Path(__file__).parents[1] / "rotorpy_crazyflie.toml")
+DRONE: Final = vehicle_toml.read(Path(__file__).with_name("rotorpy_crazyflie.toml"))
 MASS_KG: Final = float(quad_params["mass"])
 State = dict[str, Any]
 
@@ -157,7 +157,7 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
 
 def measure(folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """Return the scores by challenger and mission, and the paths of the first seed on the circle (k, 3)."""
-    text, found = identified(fly_log(), folder / "rotorpy.csv")
+    text, found = identified(fly_log(), folder / "rotorpy.csv", MASS_KG)
     (folder / "rotorpy.toml").write_text(text, "utf-8")
     described = controller_toml.parse(controller_text(DRONE, DRONE.name), DRONE.name)
     challengers: dict[str, Challenger | Geometric] = {

@@ -1,7 +1,7 @@
 """The search for the gains of the altitude loop `pid`."""
 
-from benchmarks.altitude import CURVES, DURATION_S, judge
-from benchmarks.feedforward import drawn_flights
+from benchmarks.gains.altitude import CURVES, DURATION_S, judge
+from benchmarks.gains.feedforward import drawn_flights
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw, pid_altitude_gains
 

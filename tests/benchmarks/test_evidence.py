@@ -1,5 +1,6 @@
 """Tables and pictures of the manual are those of this code, and README says what they say."""
 
+import json
 import re
 import subprocess
 import sys
@@ -19,12 +20,13 @@ from benchmarks.evidence.item import (
     differences,
     make,
     read_stamp,
+    record_lines,
     restamp,
     run,
 )
 from benchmarks.evidence.items import ITEMS
 from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
-from benchmarks.ours import ONE_NORM
+from benchmarks.peers.ours import ONE_NORM
 from mambo_codegen import __version__
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -60,8 +62,9 @@ def test_a_release_has_figures_as_new_as_its_code(item: Item) -> None:
 
 @pytest.mark.parametrize("item", ITEMS, ids=NAMES)
 def test_tables_are_those_of_the_figures(item: Item) -> None:
-    """No table was edited by hand, and all commands of the item are in its stamp."""
+    """No table was edited by hand; the stamp has all commands of the item, and a line a record."""
     stamp = read_stamp(item)
+    assert item.stamp.read_text("utf-8") == record_lines(stamp) + "\n"
     assert stamp["commands"] == list(item.commands)
     for name, text in item.texts(stamp["figures"]).items():
         assert (DATA / name).read_text("utf-8") == text, f"{name}: run python -m benchmarks.evidence"
@@ -114,22 +117,40 @@ def test_a_changed_file_changes_the_id_of_its_folder(tmp_path: Path, monkeypatch
     assert sources.git("ls-files") == ""
 
 
+def test_a_record_is_a_line() -> None:
+    """Of figures; of what stands beside them each entry is one, so that two changes seldom meet in a line."""
+    stamp = {"paths": {"a": "1", "b": "2"}, "figures": {"x": [{"y": [1, 2], "z": {"w": 0.1}}, {"y": []}]}}
+    assert json.loads(record_lines(stamp)) == stamp
+    assert record_lines(stamp).splitlines() == [
+        *("{", ' "paths": {', '  "a": "1",', '  "b": "2"', " },"),
+        *(
+            ' "figures": {',
+            '  "x": [',
+            '   {"y": [1, 2], "z": {"w": 0.1}},',
+            '   {"y": []}',
+            "  ]",
+            " }",
+            "}",
+        ),
+    ]
+
+
 def test_restamping_runs_nothing_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures and the commit at which they were made stay; what has changed since is listed."""
     require("git", "git")
     monkeypatch.setattr(evidence, "DATA", tmp_path)
-    made = Item("made", (), ("mambo",), ("benchmarks/spread.py",), lambda _: {"x": 1}, {})
+    made = Item("made", (), ("mambo",), ("benchmarks/flights/spread.py",), lambda _: {"x": 1}, {})
     assert changes(made) == ["everything: it was never made"]
     said: list[str] = []
     make(made, said.append)
     stamp = read_stamp(made)
     assert (changes(made), stamp["restamped"]) == ([], [])
     now = replace(made, paths=("benchmarks/markdown.py",), commands=("python -c 'raise SystemExit(2)'",))
-    assert changes(now) == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    assert changes(now) == ["benchmarks/flights/spread.py", "benchmarks/markdown.py"]
     restamp(now, said.append)
     after = read_stamp(now)
     assert changes(now) == []
-    assert after["restamped"] == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    assert after["restamped"] == ["benchmarks/flights/spread.py", "benchmarks/markdown.py"]
     assert [after[key] for key in ("figures", "commit")] == [stamp[key] for key in ("figures", "commit")]
     assert "restamped, nothing was run; the figures are those of commit" in said[-1]
 
@@ -229,29 +250,6 @@ def test_readme_says_what_the_evidence_says() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     assert len([row for row in rows(text) if len(numbers(row[1:])) >= 4]) >= 3
     assert unfounded(text) == []
-
-
-def test_readme_says_what_the_crazyflie_takes() -> None:
-    """Flash, RAM, time and instructions of preset mambo, and those in fixed point on the Mambo."""
-    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    takes = r"\*\*([\d.]+) KB of flash, (\d+) bytes of RAM and (\d+) to (\d+) us a step\*\*"
-    found = re.search(rf"{takes}, modelled from (\d+) instructions", text)
-    assert found is not None, "README no longer says it in these words: change this test with it"
-    footprints = read_stamp(next(item for item in ITEMS if item.name == "footprint"))["figures"]
-    board = next(one for one in footprints["mambo"] if one["name"] == "crazyflie")
-    low_us, high_us = (1e6 * time_s for time_s in board["time_s"])
-    assert found.groups() == (
-        f"{board['flash_bytes'] / 1000:.1f}",
-        str(board["ram_bytes"]),
-        f"{low_us:.0f}",
-        f"{high_us:.0f}",
-        f"{board['instructions']['mean']:.0f}",
-    )
-    counts = [
-        next(f"{one['instructions']['mean']:.0f}" for one in footprints[name] if one["name"] == "mambo")
-        for name in ("mambo --scalar fixed", "mambo")
-    ]
-    assert f"[{counts[0]} instructions instead of {counts[1]}]" in text
 
 
 def test_a_wrong_figure_in_readme_is_found() -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import astuple
 
-from benchmarks.feedforward import (
+from benchmarks.gains.feedforward import (
     DRAWS_PER_GAIN,
     FIRST,
     SLACK,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.height import (
+from benchmarks.flights.height import (
     DRONE,
     LOOPS,
     SETTINGS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.limits import (
+from benchmarks.flights.limits import (
     SPEEDS_M_S,
     WALL_M,
     LimitsCase,

@@ -5,8 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.quadratic_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from benchmarks.peers.quadratic_times import (
+    OURS,
+    SETTINGS,
+    Array,
+    build,
+    one_pass,
+    share_limited,
+    write_problem,
+)
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
@@ -46,6 +54,6 @@ def test_our_contender_has_the_bits_of_the_reference(tmp_path: Path) -> None:
     drawn = states(400)
     assert 0.1 < share_limited(drawn) < 0.9
     moves, _ = one_pass(build(OURS, tmp_path, "-O2", tmp_path / "ours.so"), drawn)
-    products = arithmetic(DESIGN)
+    products = QuadraticArithmetic(DESIGN)
     optimizer = QuadraticOptimizer(DESIGN, products, AttitudeModel(DESIGN, products).command_limit)
     assert np.array_equal(moves, optimizer.minimize(drawn))

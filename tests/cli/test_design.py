@@ -45,7 +45,7 @@ def test_a_log_gives_settings_with_two_commands() -> None:
     drone = ("--vehicle", "crazyflie-flown", "--sensors", "mocap", "--no-pictures")
     flown = ("--trajectory", "eight.csv", "--duration-s", "30", "-o", "log")
     run("fly", "crazyflie", *drone, *flown)
-    run("identify", "log/trace.csv", "-o", "identified")
+    run("identify", "log/trace.csv", "-o", "identified", "--mass-kg", "0.03")
     run("design", "identified/vehicle.toml")
     errors = {}
     for source in ("controller.toml", "mambo", "crazyflie"):

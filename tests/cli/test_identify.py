@@ -57,6 +57,10 @@ def test_a_log_becomes_a_model() -> None:
     assert vehicle["body"]["drag_1_s"] == summary["model"]["drag_1_s"]
     for name in ("roll_trim_rad", "pitch_trim_rad"):
         assert vehicle["attitude"][name] == summary["model"][name]
+    _, talk = run("design", "out/vehicle.toml", code=2)
+    assert "out/vehicle.toml: body.mass_kg is missing; add it" in talk
+    text = Path("out/vehicle.toml").read_text("utf-8")
+    Path("out/vehicle.toml").write_text(text.replace("# mass_kg = ", "mass_kg = 0.03"), "utf-8")
     uncertainty = load("out/vehicle.toml").uncertainty
     assert uncertainty is not None
     assert uncertainty.roll_gain == float(f"{summary['roll']['first_order']['gain']['within']:.2g}")
@@ -72,7 +76,8 @@ def test_a_vehicle_that_is_data_is_identified_again() -> None:
     run("identify", "--manoeuvre", "eight.csv")
     drone = ("crazyflie", "--vehicle", "crazyflie-flown")
     run("fly", *drone, "--trajectory", "eight.csv", "--duration-s", "30", "--no-pictures", "-o", "flight")
-    run("identify", "flight/trace.csv", "-o", "out")
+    run("identify", "flight/trace.csv", "-o", "out", "--mass-kg", "0.03")
+    assert load("out/vehicle.toml").body.mass_kg == 0.03
     truth, found = load("crazyflie-flown").attitude, load("out/vehicle.toml").attitude
     assert isinstance(truth, FirstOrderAttitude)
     assert isinstance(found, FirstOrderAttitude)
@@ -87,7 +92,7 @@ def test_the_screen_says_what_is_written() -> None:
     """The vehicle of a loop with an integrator has none: its gain, lag and dead time are printed, too."""
     run("identify", "--manoeuvre", "eight.csv")
     run("fly", "--trajectory", "eight.csv", "--duration-s", "20", "--no-pictures", "-o", "flight")
-    said, _ = run("identify", "flight/trace.csv", "-o", "out")
+    said, _ = run("identify", "flight/trace.csv", "-o", "out", "--mass-kg", "0.1")
     settings, vehicle = controller_toml.read(Path("out/model.toml")), load("out/vehicle.toml").attitude
     assert isinstance(vehicle, FirstOrderAttitude)
     columns = (re.split(" {2,}", line) for line in said.splitlines())
@@ -165,6 +170,8 @@ def test_a_contradiction_is_mended_as_the_message_says() -> None:
     [
         ("identify", "name a flight log, or --manoeuvre FILE"),
         ("identify a.csv --manoeuvre b.py", "is used without logs"),
+        ("identify --mass-kg 0.03 --manoeuvre b.py", "is used without logs"),
+        ("identify a.csv --mass-kg 0", "--mass-kg"),
         ("identify a.csv --columns roll_rad", "must be SIGNAL=COLUMN"),
         ("identify --manoeuvre b.txt", "must end in .csv"),
         ("identify no.csv", "there is no such file"),

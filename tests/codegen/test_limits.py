@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw
-from mambo_codegen.methods.shared.limits_arithmetic import ROOT_ERROR, limits_arithmetic
+from mambo_codegen.methods.shared.limits_arithmetic import ROOT_ERROR, LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, LIMITS, NEAR_SHARE
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -67,7 +67,7 @@ def test_an_inverse_square_root_keeps_to_its_error(scalar: str) -> None:
     """Over all magnitudes that occur, the relative error stays below ROOT_ERROR."""
     method = method_of(limited(scalar=scalar))
     assert method.limiting is not None
-    arithmetic = limits_arithmetic(method, method.limiting)
+    arithmetic = LimitsArithmetic(method, method.limiting)
     rng = np.random.default_rng(1)
     if scalar == "fixed":
         squares = np.floor(2.0 ** rng.uniform(0, 62, 200_000)).astype(np.int64)
@@ -86,7 +86,7 @@ def test_an_inverse_square_root_keeps_to_its_error_for_every_float32() -> None:
     """Every number from 1 to 4; times a power of 4, from 1e-30 to 1e30, the result is scaled exactly."""
     method = method_of(limited(scalar="float32"))
     assert method.limiting is not None
-    arithmetic = limits_arithmetic(method, method.limiting)
+    arithmetic = LimitsArithmetic(method, method.limiting)
     first, last = np.array([1.0, 4.0], np.float32).view(np.uint32)
     for start in range(int(first), int(last), 1 << 21):
         numbers = np.arange(start, min(start + (1 << 21), int(last)), dtype=np.uint32).view(np.float32)

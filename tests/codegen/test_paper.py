@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods.one_norm import cost
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.paper import Array, Paper
@@ -52,7 +52,7 @@ def test_errors_cost_and_gradient_are_those_of_the_paper(index: int) -> None:
     """The recurrence gives the errors of a roll-out, with and without lag, exact and printed."""
     settings, paper, case = situation(index)
     method = OneNorm(settings)
-    predictor = Predictor(method, arithmetic(method))
+    predictor = Predictor(method, OneNormArithmetic(method))
     weights = np.array([[settings.cost.tracking_weight, settings.cost.effort_weight]])
     acceleration = case.target[None, 4:] * settings.horizon.prediction_step_s**2 if method.tracker else None
     prediction = predictor.prepare(
@@ -124,7 +124,7 @@ def test_the_tracker_is_that_of_the_paper(index: int, kind: str) -> None:
     method, paper, rng = OneNorm(settings), Paper(settings), np.random.default_rng(index)
     constants = method.tracker
     assert constants is not None
-    tracker = Tracker(constants, arithmetic(method))
+    tracker = Tracker(constants, OneNormArithmetic(method))
     motion = tracker.update(unknown_motion(np.zeros((1, 2))), np.zeros((1, 2)))
     acceleration, jerk, given = np.zeros(2), np.zeros(2), np.zeros(2)
     step_squared_s2, update_s = settings.horizon.prediction_step_s**2, settings.horizon.update_period_s

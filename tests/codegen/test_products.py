@@ -28,3 +28,10 @@ def test_a_product_is_infix_in_floating_point_and_a_call_in_fixed_point() -> Non
 def test_an_operand_has_brackets_only_if_it_is_infix(product: str, operand: str) -> None:
     """A call, and a value that is written alone, need none."""
     assert term(product) == operand
+
+
+def test_an_acceleration_is_weighed_only_if_something_weighs_it() -> None:
+    """With a height it is times a weight, or over it, which is times the inverse; else it stays alone."""
+    assert products(fixed=False, weighs=True)["weighed"]("limit") == "limit * weight"
+    assert products(fixed=True, weighs=True)["over_weight"]("move") == "factor_product(move, inverse)"
+    assert FLOAT["weighed"]("limit") == FIXED["over_weight"]("limit") == "limit"

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.settings.model import Settings
@@ -70,7 +70,7 @@ def compare_with_a_simulated_program(settings: Settings, n: int, seed: int) -> N
     """Minimise from n states, within, at and far beyond the limits, and compare with all active sets."""
     method = Quadratic(settings)
     limits = method.attitude.command_limit_m_step2
-    optimizer = QuadraticOptimizer(method, arithmetic(method), limits)
+    optimizer = QuadraticOptimizer(method, QuadraticArithmetic(method), limits)
     rng = np.random.default_rng(seed)
     sizes = 10.0 ** rng.uniform(-2, 1.5, (n, 1, 1)) * limits[None, :, None]
     largest = np.abs(method.law.rows).max(axis=1)
@@ -109,7 +109,7 @@ def test_one_move_is_the_clamped_law() -> None:
     settings = settings_of(TWO_MOVES | {"horizon.ramp_s": 0.0, "code.scalar": "float64"})
     method = Quadratic(settings)
     limits = method.attitude.command_limit_m_step2
-    optimizer = QuadraticOptimizer(method, arithmetic(method), limits)
+    optimizer = QuadraticOptimizer(method, QuadraticArithmetic(method), limits)
     states = np.random.default_rng(0).normal(0, 1, (5000, 2, 8)) * [0.3, 0.01, 1e-3, 1e-5, *[1e-3] * 4]
     free = np.einsum("nak,ak->na", states, method.law.rows[:, 0])
     assert 0.1 < np.mean(np.abs(free) > limits) < 0.9

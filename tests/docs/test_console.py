@@ -49,7 +49,6 @@ NOT_RUN = {
         "needs a board; tests of their own fly it in QEMU",
     ),
     "how-to/platformio.md": ("needs PlatformIO",),
-    "how-to/replay.md": ("needs the log of a Crazyflie",),
     "how-to/rotorpy.md": ("it installs",),
     "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),
@@ -57,7 +56,6 @@ NOT_RUN = {
         "needs a Crazyflie",
         "needs the firmware of Bitcraze, and a Crazyflie",
         "needs a Crazyflie",
-        "needs the log of a Crazyflie",
     ),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }

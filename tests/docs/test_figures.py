@@ -101,6 +101,12 @@ def ratio_of_pid(index: str) -> float:
     )
 
 
+def frozen() -> str:
+    """Return the largest error of preset `mambo` on the eight if its state is frozen for 5 s, in m."""
+    found = (one for one in figures("faults")["mambo"] if one["course"] == "eight")
+    return next(f"{one['largest_error_m']:.0f}" for one in found if one["fault"] == "state frozen, 5 s")
+
+
 FIXED = "mambo --scalar fixed"
 BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
 WORK = "docs/evidence/constant-work.md"
@@ -124,6 +130,8 @@ FIGURES = [
         r"for `mambo`, (\d+) for `mambo-1norm`",
         lambda: instructions("crazyflie", "mambo-1norm"),
     ),
+    Figure("README.md", r"\*\*(\S+) KB of flash", lambda: f"{board('crazyflie')['flash_bytes'] / 1000:.1f}"),
+    Figure("README.md", r"KB of flash, (\d+) bytes of RAM", lambda: str(board("crazyflie")["ram_bytes"])),
     Figure("README.md", r"(\d+ to \d+) us a step\*\*", lambda: step_us("crazyflie")),
     Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie")),
     Figure("README.md", r"\[(\d+) instructions instead of", lambda: instructions("mambo", FIXED)),
@@ -143,6 +151,7 @@ FIGURES = [
         r"(\S+) mm with Mellinger",
         lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
     ),
+    Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
     Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("first")["pd"])),
     Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
     Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),

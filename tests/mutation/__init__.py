@@ -1,1 +1,1 @@
-"""The mutation tester of the C: small faults, and what notices them."""
+"""The mutation testers of C and Python: small faults, and what notices them."""

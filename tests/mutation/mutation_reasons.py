@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from tests.mutation.reasons import Reason, reasons
@@ -41,7 +41,7 @@ def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
     """Tell whether a factor of fixed point, a number more or less, rounds to the same steps on all paths."""
 
     def holds(settings: Settings) -> bool:
-        optimizer, products = settings.optimizer, arithmetic(OneNorm(settings))
+        optimizer, products = settings.optimizer, OneNormArithmetic(OneNorm(settings))
         if settings.code.scalar != "fixed" or optimizer.iterations > _MOST_WALKED:
             return False
         constant = products.numbers.constant

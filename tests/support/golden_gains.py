@@ -36,8 +36,13 @@ def constants() -> dict[str, dict[str, Any]]:
     return found
 
 
+def _lines(found: dict[str, Any]) -> str:
+    """Return constants as JSON, a line each."""
+    return "{\n" + ",\n".join(f'  "{key}": {json.dumps(value)}' for key, value in found.items()) + "\n }"
+
+
 if __name__ == "__main__":
-    text = json.dumps(constants(), indent=1)
+    text = "{\n" + ",\n".join(f' "{name}": {_lines(found)}' for name, found in constants().items()) + "\n}"
     if sys.argv[1:] == ["--write"]:
         GOLDEN.write_text(text + "\n", "utf-8")
     else:

@@ -124,42 +124,107 @@ class Lifting:
     """A drone that is moved up and down, and how it is measured."""
 
     hover_command: float = 33550.0
-    """Command that carries the weight at first; the thrust is in proportion."""
+    """Command that carries the weight at first."""
     lag_s: float = 0.07
+    falling: float = 1.0
+    """Lag of a falling thrust over that of a rising one."""
+    of_speed: bool = False
+    """Whether it is the rotor speed that lags, whose square is the thrust; else the thrust lags."""
+    power: float = 1.0
+    """Exponent of the thrust over its command; 1 if they are in proportion."""
     delay_s: float = 0.01
+    drag_1_s: float = 0.4
     battery_sag_1_s: float = 0.0
     step_m: float = 0.25
-    """Height above and below the middle, by turns; 0 is hover."""
+    """Height of a step up or down; 0 is hover."""
+    step_s: float = 1.5
+    """Time between steps."""
+    level_s: float = 0.0
+    """Time of level flight before the steps, tilting by 0.1 rad."""
     duration_s: float = 20.0
+    age_s: float = 0.0
+    """Age of the measured height."""
     noise_m: float = 0.001
     gusts_m_s2: float = 0.03
 
+    @property
+    def gain(self) -> float:
+        """Thrust over mass per unit of the command at hover, in the middle of what is fitted, from 2 s on."""
+        middle_s = 0.5 * (2.0 + self.duration_s)
+        fresh = 1.0 - self.battery_sag_1_s * middle_s
+        return float(G / self.hover_command * fresh ** (1.0 / self.power))
+
+    @property
+    def late_s(self) -> float:
+        """Lag, dead time and age together."""
+        return 0.5 * self.lag_s * (1.0 + self.falling) + self.delay_s + self.age_s
+
 
 def lift(truth: Lifting, seed: int = 1) -> dict[str, Array]:
-    """Move a level drone up and down by a PD controller; return the columns of a log."""
+    """Move a drone up and down by a PD controller on what is measured; return the columns of a log.
+
+    The velocity is that of the measured heights behind a filter of 30 ms. The slower the drone, the lower are
+    the gains.
+    """
     random = default_rng(seed)
     tick_s, ticks = 0.002, 5
-    rows = round(truth.duration_s / (ticks * tick_s))
-    time_s = ticks * tick_s * np.arange(rows, dtype=np.float64)
-    keep, share = np.exp(-tick_s / truth.lag_s), 1.0 / truth.hover_command
-    queue = [truth.hover_command] * (round(truth.delay_s / tick_s) + 1)
+    row_s = ticks * tick_s
+    rows = round(truth.duration_s / row_s)
+    time_s = row_s * np.arange(rows, dtype=np.float64)
+    frequency_rad_s = min(3.9, 0.42 / (truth.late_s + 0.03))
+    rising, falling = (float(np.exp(-tick_s / (truth.lag_s * share))) for share in (1.0, truth.falling))
+    queue = [1.0] * (round(truth.delay_s / tick_s) + 1)
+    heights_m = [1.0] * (round(truth.age_s / tick_s) + 1)
+    tilts_rad = np.where(time_s < truth.level_s, 0.1 * np.sin(1.2 * time_s), 0.0)
+    steps = np.floor((time_s - truth.level_s) / truth.step_s) % 2
+    targets_m = 1.0 + truth.step_m * np.where(time_s < truth.level_s, 0.0, steps)
     draws = random.normal(size=(rows, 1 + ticks))
-    height, climb, thrust, gust = 1.0, 0.0, 1.0, 0.0
+    gusts = truth.gusts_m_s2 * np.sqrt(tick_s) * draws[:, 1:]
+    height, climb, state, gust, seen_climb = 1.0, 0.0, 1.0, 0.0, 0.0
+    noises_m = (truth.noise_m * draws[:, 0]).tolist()
+    seen = height + noises_m[0]
     table = np.empty((rows, 2))
-    for row, (noise, *pushes) in enumerate(draws.tolist()):
-        target = 1.0 + truth.step_m * np.sign(np.sin(2.0 * np.pi * time_s[row] / 3.1))
-        wanted = 1.0 + (15.0 * (target - height) - 7.0 * climb) / G
-        sent = truth.hover_command * min(max(wanted, 0.2), 1.8)
-        table[row] = sent, height + truth.noise_m * noise
+    inputs = zip(targets_m.tolist(), np.cos(tilts_rad).tolist(), noises_m, gusts.tolist(), strict=True)
+    for row, (target_m, level, noise_m, pushes) in enumerate(inputs):
+        before, seen = seen, heights_m[-1] + noise_m
+        seen_climb += row_s / (row_s + 0.03) * ((seen - before) / row_s - seen_climb)
+        wanted = frequency_rad_s * (frequency_rad_s * (target_m - seen) - 1.8 * seen_climb)
+        sent = min(max((1.0 + wanted / G) / level, 0.2), 1.8)
+        table[row] = truth.hover_command * sent, seen
         for tick, push in enumerate(pushes):
-            queue = [sent, *queue[:-1]]
-            fresh = 1.0 - truth.battery_sag_1_s * (time_s[row] + tick * tick_s)
-            thrust = keep * thrust + (1.0 - keep) * share * queue[-1]
-            gust += truth.gusts_m_s2 * np.sqrt(tick_s) * push - 0.5 * tick_s * gust
-            climb += tick_s * (G * (fresh * thrust - 1.0) + gust)
+            queue = [sent**truth.power, *queue[:-1]]
+            target = queue[-1] ** 0.5 if truth.of_speed else queue[-1]
+            keep = rising if target > state else falling
+            state = keep * state + (1.0 - keep) * target
+            thrust = state * state if truth.of_speed else state
+            fresh = 1.0 - truth.battery_sag_1_s * tick_s * (ticks * row + tick)
+            gust += push - 0.5 * tick_s * gust
+            climb += tick_s * (G * (fresh * thrust * level - 1.0) + gust - truth.drag_1_s * climb)
             height += tick_s * climb
-    level = dict.fromkeys(NAMES[:4], np.zeros(rows))
-    return {"time_s": time_s} | level | {"thrust_command": table[:, 0], "z_m": -table[:, 1]}
+            heights_m = [height, *heights_m[:-1]]
+    flat = dict.fromkeys(NAMES[:4], np.zeros(rows)) | {"roll_rad": tilts_rad}
+    return {"time_s": time_s} | flat | {"thrust_command": table[:, 0], "z_m": -table[:, 1]}
+
+
+def draw_lifting(random: Generator) -> Lifting:
+    """Draw a drone, with or without each of the ways in which it may depart from a thrust that lags."""
+    often = random.uniform(size=5) < (0.4, 0.4, 0.3, 0.4, 0.3)
+    return Lifting(
+        hover_command=float(np.exp(random.uniform(np.log(0.3), np.log(4e4)))),
+        lag_s=float(np.exp(random.uniform(np.log(0.03), np.log(0.18)))),
+        falling=float(random.uniform(0.6, 1.4)) if often[0] else 1.0,
+        of_speed=bool(often[1]),
+        power=float(random.uniform(0.7, 1.6)) if often[2] else 1.0,
+        delay_s=float(random.uniform(0.0, 0.03)),
+        drag_1_s=float(random.uniform(0.0, 0.8)),
+        battery_sag_1_s=float(random.uniform(0.0, 0.001)),
+        step_s=float(random.uniform(1.2, 2.5)),
+        level_s=20.0 if often[3] else 0.0,
+        duration_s=40.0 if often[3] else 20.0,
+        age_s=float(random.uniform(0.0, 0.04)),
+        noise_m=float(np.exp(random.uniform(np.log(0.0005), np.log(0.004)))),
+        gusts_m_s2=float(random.uniform(0.0, 0.06)),
+    )
 
 
 def _eight(times_s: Array, flown: Flown) -> Array:

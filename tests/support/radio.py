@@ -20,6 +20,9 @@ SIZES: Final = {
     "refused": 4,
     "step": 2,
     "age": 2,
+    "takeOvers": 2,
+    "grounded": 1,
+    "level": 1,
     "info": 2,
     "state": 1,
 }
@@ -105,6 +108,8 @@ class Drone:
     is_open: bool = False
     failing_uploads: bool = False
     sends_parameters: bool = True
+    first_tick: int = 0
+    """Time of its logs in ms at the beginning of the clock."""
     arms: bool = True
     blocks: list[LogConfig] = field(default_factory=list)
     lost_callbacks: Caller = field(default_factory=Caller)
@@ -135,7 +140,8 @@ class Drone:
             for block in self.blocks:
                 if block.is_started:
                     values = {name: self.logged[name] for name in block.names}
-                    block.data_received_cb.call(round(1000 * self.clock.time_s), values, block)
+                    ticks = (self.first_tick + round(1000 * self.clock.time_s)) % 2**24
+                    block.data_received_cb.call(ticks, values, block)
 
     def lose(self, until_s: float = 1e9) -> None:
         """Lose the link until some time."""

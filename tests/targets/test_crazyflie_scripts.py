@@ -11,35 +11,14 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings.controller_toml import with_option
-from tests.support.radio import ARMED, CAN_FLY, FLYING, Clock, Drone, install
-from tests.support.scripts import SETTINGS, modules_of, run, without, write
-
-PLACE = (1.0, -0.5, 0.1)
-"""Where the drone stands: x, y, height of the floor."""
+from tests.support.radio import ARMED, CAN_FLY, FLYING, Drone
+from tests.support.scripts import PLACE, SETTINGS, at_call, interrupt, modules_of, ready, run, without, write
 
 
 @pytest.fixture
 def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
     """Return a drone that is ready to fly, and put it and its clock under the scripts."""
-    clock = Clock()
-    logged: dict[str, float] = dict.fromkeys(scripts["radio"].LOGGED, 0.0)
-    logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
-    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
-    logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
-    parameters = {
-        "nmpc.settings": int(SETTINGS.short_digest[:8], 16),
-        "nmpc.selfTest": 0,
-        "nmpc.on": 0,
-        "stabilizer.estimator": 2,
-        "stabilizer.controller": 1,
-        "kalman.resetEstimation": 0,
-        "kalman.initialYaw": 0.5,
-    }
-    found = Drone(clock, logged, parameters)
-    install(found, monkeypatch)
-    for name in ("fly", "radio"):
-        monkeypatch.setattr(scripts[name], "time", clock)
-    return found
+    return ready(scripts, monkeypatch)
 
 
 PREPARED = ["set_value", "stop"]
@@ -54,8 +33,9 @@ def test_a_figure_is_uploaded_and_flown_by_the_high_level_commander(
     assert run(scripts, figure, "--height", "0.6") == 0
     flown = ["upload", "define_trajectory", "takeoff", "go_to", "start_trajectory"]
     assert drone.names() == [*PREPARED, *flown, *LANDED]
-    assert drone.of("takeoff")[0][1] == (pytest.approx(0.7), 2.0, None)
-    assert drone.of("go_to")[0][1] == pytest.approx((1.0, -0.5, 0.7, math.radians(30.0), 2.0))
+    assert drone.of("takeoff")[0][1] == (pytest.approx(0.4), 1.5, None)
+    assert drone.of("go_to")[0][1] == pytest.approx((1.3, -0.5, 0.4, math.radians(30.0), 1.5))
+    assert drone.of("go_to")[1][1] == pytest.approx((1.0, -0.5, 0.7, math.radians(30.0), 2.0))
     pieces = uploaded(drone)
     assert drone.of("define_trajectory")[0][1] == (1, 0, len(pieces))
     (begun, _), (landing, (floor, *_)) = drone.of("start_trajectory")[0], drone.of("land")[0]
@@ -107,7 +87,7 @@ def test_goto_goes_along_x_and_back(scripts: dict[str, ModuleType], drone: Drone
     assert drone.names() == [*PREPARED, "takeoff", "go_to", *LANDED]
     moves = drone.of("go_to")
     assert [arguments[0] for _, arguments in moves] == [1.3, 1.0, 1.5, 1.0]
-    assert all(after - before > arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves))
+    assert all(after - before >= arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves))
 
 
 def test_a_stream_sends_full_states(scripts: dict[str, ModuleType], drone: Drone) -> None:
@@ -223,23 +203,6 @@ def test_all_reasons_are_told_at_once(
     assert ("Kalman" in error, "3.00 V" in error, "locked" in error) == (True, True, True)
 
 
-def interrupt() -> None:
-    """Press Ctrl-C."""
-    raise KeyboardInterrupt
-
-
-def at_call(drone: Drone, name: str, after_s: float, *events: Callable[[], None]) -> None:
-    """Let events happen some time after the first call with a name, half a second apart."""
-
-    def watch() -> None:
-        if drone.of(name):
-            drone.clock.sleeping.remove(watch)
-            begun = drone.of(name)[0][0]
-            drone.clock.events.extend((begun + after_s + 0.5 * k, event) for k, event in enumerate(events))
-
-    drone.clock.sleeping.append(watch)
-
-
 def test_ctrl_c_lands(
     scripts: dict[str, ModuleType], drone: Drone, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -253,7 +216,7 @@ def test_ctrl_c_lands(
     assert landing - begun == pytest.approx(5.0, abs=0.1)
     assert stopped - landing == pytest.approx(3.0, abs=0.1)
     assert "Stopped by Ctrl-C" in capsys.readouterr().err
-    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.status,")
+    assert Path("eight.csv").read_text("utf-8").startswith("Timestamp,nmpc.step,nmpc.x,")
 
 
 def test_a_second_ctrl_c_stops_the_motors(scripts: dict[str, ModuleType], drone: Drone) -> None:
@@ -303,11 +266,19 @@ def test_the_log_has_all_variables(scripts: dict[str, ModuleType]) -> None:
     """Those that identify and replay read, by their names."""
     assert run(scripts, "hover", "--log", "hover.csv") == 0
     header, *rows = Path("hover.csv").read_text("utf-8").splitlines()
-    assert {"ctrltarget.vx", "controller.roll", "nmpc.roll", "nmpc.lost", "stateEstimate.vy"} <= {
-        *header.split(",")
-    }
+    assert {"nmpc.step", "nmpc.targetVx", "nmpc.outRoll", "nmpc.lost", "nmpc.vy"} <= {*header.split(",")}
     assert len(rows) > 100
     assert "" not in rows[50].split(",")
+
+
+def test_the_clock_of_the_logs_may_begin_again(scripts: dict[str, ModuleType], drone: Drone) -> None:
+    """After 24 bits of ms: the rows stay in order."""
+    drone.first_tick = 2**24 - 5000
+    assert run(scripts, "hover", "--log", "hover.csv") == 0
+    _, *rows = Path("hover.csv").read_text("utf-8").splitlines()
+    ticks = np.array([int(row.split(",")[0]) for row in rows])
+    assert (np.diff(ticks) > 0).all()
+    assert ticks[0] < 2**24 < ticks[-1] < 2**24 + 60_000
 
 
 @pytest.mark.parametrize(
@@ -370,5 +341,6 @@ def test_scripts_have_the_prefix_and_what_given_accelerations_need(
     settings = with_option(with_option(SETTINGS, "code.prefix", "left"), "target.acceleration", "given")
     radio = modules_of(write(settings, tmp_path), monkeypatch)["radio"]
     assert radio.GROUP == "left"
-    assert {"left.status", "ctrltarget.ay"} <= {*radio.LOGGED}
+    assert radio.LOGGED[0][:2] == ("left.step", "left.x")
+    assert "left.targetAy" in radio.LOGGED[2]
     assert settings.short_digest == radio.DIGEST

@@ -15,24 +15,24 @@ from tests.support.scripts import SETTINGS, modules_of, run, without, write
 def test_a_simulated_flight_makes_the_same_calls(
     arguments: tuple[str, ...], scripts: dict[str, ModuleType], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It follows what they ask for, lands, and leaves the log of a flight, in metres and degrees."""
+    """It follows what they ask for, a hop of 0.3 m first, lands, and leaves the log of a flight, in metres and radians."""
     assert run(scripts, *arguments, "--simulate", "--laps", "1") == 0
     printed = capsys.readouterr().out
     assert "simulated on crazyflie through motion capture" in printed
     assert "it landed" in printed
     rows = np.genfromtxt("flight.csv", delimiter=",", names=True)
     for axis in "xy":
-        error = rows[f"ctrltarget{axis}"] - rows[f"stateEstimate{axis}"]
+        error = rows[f"nmpctarget{axis.upper()}"] - rows[f"nmpc{axis}"]
         assert np.abs(error).max() < 0.02
-    extent = {"eight": (0.99, 0.49), "circle": (0.99, 0.99), "goto": (0.99, 0.0), "hover": (0.0, 0.0)}[
+    extent = {"eight": (0.99, 0.49), "circle": (0.99, 0.99), "goto": (0.99, 0.0), "hover": (0.3, 0.0)}[
         arguments[0]
     ]
     for axis, most in zip("xy", extent, strict=True):
-        assert rows[f"ctrltarget{axis}"].max() == pytest.approx(most, abs=0.02)
+        assert rows[f"nmpctarget{axis.upper()}"].max() == pytest.approx(most, abs=0.02)
     assert rows["stateEstimatez"].max() == pytest.approx(0.8, abs=0.05)
     assert rows["stateEstimatez"][-1] == pytest.approx(0.0, abs=0.02)
     if "--heading" in arguments:
-        assert np.median(rows["stateEstimateyaw"]) == pytest.approx(120.0, abs=1.0)
+        assert np.degrees(np.median(rows["nmpcinYaw"])) == pytest.approx(120.0, abs=1.0)
 
 
 def test_the_simulated_planner_moves_as_the_firmware_s(scripts: dict[str, ModuleType], folder: Path) -> None:

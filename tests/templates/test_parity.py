@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.one_norm import cost
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
@@ -36,7 +36,7 @@ class SubBlocks:
     def __init__(self, settings: Settings) -> None:
         extension = build_extension(settings)
         self.method = OneNorm(settings)
-        self.products = arithmetic(self.method)
+        self.products = OneNormArithmetic(self.method)
         self.numbers = self.products.numbers
         self.scalar = self.numbers.scalar
         self.ffi, self.lib = extension.ffi, extension.lib

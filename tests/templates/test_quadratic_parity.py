@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
@@ -27,7 +27,7 @@ class SubBlocks:
         extension = build_extension(settings)
         self.ffi, self.lib = extension.ffi, extension.lib
         self.method = Quadratic(settings)
-        self.products = arithmetic(self.method)
+        self.products = QuadraticArithmetic(self.method)
         self.numbers = self.products.numbers
         self.scalar = self.numbers.scalar
         self.controller = self.ffi.new("nmpc_t *")

@@ -96,6 +96,27 @@ def input_scales(method: Method) -> InputScales:
     )
 
 
+def scale_constants(method: Method, scales: InputScales) -> list[tuple[str, float, str]]:
+    """Return the scales that have a constant in the C: its name, the scale and its quantity."""
+    tracker, has_height = method.tracker, method.has_height
+    found = [
+        ("TARGET_M", scales.target_position_m, "position"),
+        ("TARGET_M_S", scales.target_velocity_m_s, "velocity"),
+        ("ATTITUDE_RAD", scales.attitude_rad, "angle"),
+        ("YAW_RAD", scales.yaw_rad, "yaw"),
+    ]
+    if not has_height:
+        found.append(("THRUST_M_S2", scales.thrust_acceleration_m_s2, "thrust"))
+        found.append(("HOVER_M_S2", scales.hover_m_s2, "thrust"))
+    if tracker:
+        ending = "M_S2" if tracker.is_given else "CHANGE_M_S"
+        level = "TARGET_M_S2" if tracker.is_given else ending
+        found.append((level, scales.target_motion, tracker.input_quantity))
+        if has_height:
+            found.append((f"CLIMB_{ending}", scales.climb_motion, tracker.input_quantity))
+    return found
+
+
 def episode_count(method: Method) -> int:
     """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
     states, iterations = method.work

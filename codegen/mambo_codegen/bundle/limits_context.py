@@ -1,7 +1,6 @@
 """What the templates of the limits insert."""
 
 import math
-from collections.abc import Mapping
 from typing import Final
 
 from mambo_codegen.methods.interface import Method
@@ -13,11 +12,10 @@ from mambo_codegen.methods.shared.limits_arithmetic import (
     STARTS,
     TERMS,
     TURN_BITS,
+    limits_shifts,
 )
 from mambo_codegen.methods.shared.limits_constants import (
     LEAST_TURN_M2_S2,
-    ROOT_BITS,
-    SHARE_BITS,
     SPELLING,
     TURN_SHARE,
     stored_quantities,
@@ -70,27 +68,3 @@ def _target_bounds(method: Method, others: list[str]) -> list[str]:
     if method.limiting is not None and method.limiting.turn_m_s_rad is not None:
         return others[:2]
     return others[-6:-4] if method.has_height else others[-2:]
-
-
-def limits_shifts(bits: Mapping[str, int]) -> dict[str, int]:
-    """Return the right shifts of the products of the limits in fixed point, by their names in the templates.
-
-    odd and braking_odd: whether an argument of a root needs one more bit, so that their number is even.
-    """
-    position, velocity, braking = bits["position"], bits["velocity"], bits["braking"]
-    square = braking + position
-    odd, braking_odd = square % 2, braking % 2
-    return {
-        "approach": bits["approach"] + position - velocity,
-        "ratio": SHARE_BITS + velocity - position - bits["approach"],
-        "knee": bits["knee"] + braking - position,
-        "odd": odd,
-        "speed": ((square + odd) // 2) - velocity,
-        "least": bits["approach"] + velocity - braking - 1,
-        "braking_odd": braking_odd,
-        "quotient": velocity + SHARE_BITS - ((braking + braking_odd) // 2) - ROOT_BITS,
-        "stopping": (2 * ROOT_BITS) - position,
-        "tilt": bits["slope"] + bits["angle"] - braking,
-        "rate": bits["rate"] + velocity - bits["thrust"],
-        "turn": bits["slope"] + bits["angle"] - velocity,
-    }

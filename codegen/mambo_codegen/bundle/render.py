@@ -10,7 +10,14 @@ from typing import Any, Final
 import jinja2
 
 from mambo_codegen import __version__, boards
-from mambo_codegen.bundle.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, kept_digest
+from mambo_codegen.bundle.digest import (
+    TICKS,
+    TICKS_PER_INPUT,
+    episode_count,
+    input_scales,
+    kept_digest,
+    scale_constants,
+)
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -24,12 +31,13 @@ from mambo_codegen.bundle.products import products, term
 from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
-from mambo_codegen.methods import method_of
+from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
+from mambo_codegen.methods.shared.members import limits_members, state_members, target_members
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS, Representation
+from mambo_codegen.numbers.representation import STATE, TARGET, THRUST, WEIGHTS, Representation
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
@@ -155,7 +163,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        products(fixed=numbers.formats is not None)
+        products(fixed=numbers.formats is not None, weighs=method.has_height)
         | {"height": None}
         | method.context
         | {
@@ -188,6 +196,10 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             **limits_context(method),
             "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
             "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
+            "state_members": state_members(method),
+            "limits_members": limits_members(method),
+            "fuzz_target": _target_inputs(method, len(method.state)),
+            "proof_target": _target_inputs(method, len(method.state) - method.has_height),
             "level_columns": len(method.level_target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
@@ -204,7 +216,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "held": TICKS_PER_INPUT,
             "self_test_steps": TICKS * episode_count(method),
             "self_test_digest": kept_digest(method) if with_digest else None,
-            "spread": input_scales(method),
+            "spread": (scales := input_scales(method)),
+            "scale_constants": scale_constants(method, scales),
             "boards": [
                 {
                     "name": board.name,
@@ -224,6 +237,15 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "rule_flags": " ".join(RULE_FLAGS),
         }
     )
+
+
+def _target_inputs(method: Method, first: int) -> list[tuple[str, int]]:
+    """Return the members of a target and their indices among inputs from `first` on.
+
+    Without a height the thrust stands between velocity and acceleration.
+    """
+    thrust = len(TARGET) if not method.has_height else math.inf
+    return [(name, first + k + (k >= thrust)) for k, name in enumerate(target_members(method))]
 
 
 def _settings_id(settings: Settings) -> str:

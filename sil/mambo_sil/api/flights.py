@@ -116,7 +116,7 @@ def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:
     rule = f"be {', '.join(map(spell, CURVES))} or an object with the methods target and acceleration"
     require(is_trajectory(trajectory), "trajectory", trajectory, rule)
     flown = cast("Trajectory", trajectory)
-    require(bool(np.isfinite(flown.target(0.0)).all()), "trajectory", trajectory, "be finite at 0 s")
+    require(bool(np.isfinite(flown.target(np.zeros(1))).all()), "trajectory", trajectory, "be finite at 0 s")
     return flown
 
 

@@ -55,6 +55,8 @@ mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
 mambo-nmpc fly --vehicle my-drone.toml -o my-drone
 mambo-nmpc fly --repeat worst.json -o again
+mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
+mambo-nmpc fly controller.toml --app crazyflie --events my-events.toml -o events
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen
@@ -70,6 +72,7 @@ mambo-nmpc vehicles
 mambo-nmpc vehicles generic > my-drone.toml
 mambo-nmpc vehicles --schema > vehicle.schema.json
 mambo-nmpc design crazyflie
+mambo-nmpc design crazyflie --sensors flow-deck -o flow.toml
 mambo-nmpc design identified/vehicle.toml -o controller.toml
 mambo-nmpc faults mambo -o faults
 mambo-nmpc faults --scalar fixed

@@ -4,7 +4,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -108,6 +108,14 @@ def identify(
             metavar="SIGNAL=COLUMN,...",
         ),
     ] = "",
+    mass_kg: Annotated[
+        float | None,
+        typer.Option(
+            help="Mass with battery, for vehicle.toml: no log shows it. Without it the file has none.",
+            min=0.001,
+            max=100,
+        ),
+    ] = None,
     manoeuvre: Annotated[
         Path | None,
         typer.Option(
@@ -122,8 +130,9 @@ def identify(
     When you have a drone that flies: its log becomes the model for which `design` derives settings.
     """
     if manoeuvre is not None:
-        if logs or columns:
-            raise typer.BadParameter("is used without logs and without --columns", param_hint="--manoeuvre")
+        if logs or columns or mass_kg is not None:
+            words = "is used without logs, --columns and --mass-kg"
+            raise typer.BadParameter(words, param_hint="--manoeuvre")
         from mambo_sil.model.identify.manoeuvre import write_manoeuvre
 
         typer.echo(write_manoeuvre(manoeuvre))
@@ -151,7 +160,7 @@ def identify(
             draw_fit(folder / CURVES, summary.split_s, summary.verdicts, folder / "fit")
             if summary.good:
                 (folder / MODEL).write_text(model_text(summary), "utf-8")
-                (folder / VEHICLE).write_text(vehicle_text(summary), "utf-8")
+                (folder / VEHICLE).write_text(vehicle_text(summary, mass_kg), "utf-8")
             summary.write(folder)
     show(summary, identify_text(summary), as_json=as_json)
     models = (MODEL, VEHICLE) if summary.good else ()
@@ -171,6 +180,10 @@ def design(
     ],
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
+    sensors: Annotated[
+        Literal["flow-deck"] | None,
+        typer.Option(help="What measures the position, in place of the sensors in the vehicle's file."),
+    ] = None,
 ) -> None:
     """Derive settings from a drone; write a controller.toml that says the reason of each.
 
@@ -178,9 +191,12 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.drone.vehicles.vehicle_sections import FlowDeckSensors
     from mambo_sil.model.derive.derived_settings import controller_text
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
+    if sensors is not None:
+        drone = drone.model_copy(update={"sensors": FlowDeckSensors()})
     text = controller_text(drone, source)
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):

@@ -7,7 +7,7 @@
 
 within plus or minus the largest thrust. The integral rests where the error is large or the thrust at its
 limit.
-Source of the gains of `pid`: the search in benchmarks/altitude.py.
+Source of the gains of `pid`: the search in benchmarks/gains/altitude.py.
 """
 
 from dataclasses import dataclass

@@ -108,7 +108,7 @@ def nears_limit(trace: Trace, speed_limit_m_s: float) -> bool:
 
 
 def _update(flight: Flight, scenario: Scenario) -> int:
-    """Return the first update of a flight that is not before the time of its fence."""
+    """Return the update of a flight that is nearest to the time of its fence."""
     return int(np.searchsorted(flight.times_s(), scenario.fence_time_s - flight.update_period_s / 2.0))
 
 

@@ -24,8 +24,10 @@ SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
     "none": ("none",),
     "mambo": ("none", "mambo", "mambo-derotated"),
     "mocap": ("none", "mocap"),
+    "flow-deck": ("none",),
 }
-"""Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default."""
+"""Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default. A
+flow deck is simulated on the desk alone."""
 PdName = Literal["pd", "pd-feedforward", "pid-feedforward"]
 """The laws without a model: the stock PD of the paper, the PD with feed-forward of the target's velocity and
 acceleration, and the PID with feed-forward, low-pass and feedback of the tilt."""

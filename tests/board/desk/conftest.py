@@ -9,13 +9,26 @@ from mambo_codegen.settings.controller_toml import parse
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.desk import desk_library
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import FlowDeckSensors
 from mambo_sil.model.derive.derived_settings import controller_text
 
 
 @pytest.fixture(scope="session")
 def app() -> Path:
     """Return the library of the app with the settings that `design crazyflie` writes."""
-    text = controller_text(vehicle_toml.load("crazyflie"), "crazyflie")
+    return built(vehicle_toml.load("crazyflie"))
+
+
+@pytest.fixture(scope="session")
+def flow_app() -> Path:
+    """Return the library of the app with the settings that `design crazyflie --sensors flow-deck` writes."""
+    return built(vehicle_toml.load("crazyflie").model_copy(update={"sensors": FlowDeckSensors()}))
+
+
+def built(drone: VehicleFile) -> Path:
+    """Return the library of the app with derived settings."""
+    text = controller_text(drone, drone.name)
     return desk_library.build(parse(text, "controller.toml"), host_toolchain())
 
 

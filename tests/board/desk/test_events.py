@@ -9,15 +9,13 @@ from mambo_sil.board.desk.desk_events import broken, fly_events, measure
 
 CLOCKS_MS = (3, 7, 9)
 """Offsets of the clock of camera or flow deck, each with a seed of its own."""
-RATTLING = (
-    *("flow-low", "flow-hover", "flow-high", "flow-noise", "noise-0-2-mm", "noise-0-5-mm", "noise-1-mm"),
-    *("noise-4-mm", "packets-out-of-order", "flow-ends"),
-)
+RATTLING = (*("noise-0-2-mm", "noise-0-5-mm", "noise-1-mm", "noise-4-mm", "packets-out-of-order"),)
 """Commands that rattle take the thrust, since the mixer serves attitude first: not cured yet."""
+FLOW = ("flow-low", "flow-hover", "flow-high", "flow-noise", "flow-ends")
 HEADING = ("heading-30-degrees",)
 """The app cannot know the heading: scripts must ask for it."""
 ONLY_WITH_A_HEIGHT = ("floor-then-land", "mass-in-grams", "table-above-its-height", "table-at-its-height")
-NOT_THE_PRESETS = (*RATTLING, *HEADING, *ONLY_WITH_A_HEIGHT)
+NOT_THE_PRESETS = (*RATTLING, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT)
 NAMES = [
     pytest.param(name, marks=[pytest.mark.xfail(strict=True)] * (name in (*RATTLING, *HEADING)))
     for name in events_file.EVENTS.names()
@@ -35,10 +33,16 @@ def breaks(library: Path, name: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_event_keeps_its_bounds(name: str, app: Path) -> None:
-    """With the settings that `design crazyflie` writes."""
+def test_an_event_keeps_its_bounds(name: str, app: Path, flow_app: Path) -> None:
+    """With the settings that `design crazyflie` writes, over a flow deck with those for it."""
     assert events_file.load(name).bounds
-    assert breaks(app, name) == []
+    assert breaks(flow_app if name in FLOW else app, name) == []
+
+
+@pytest.mark.parametrize("name", FLOW)
+def test_settings_for_cameras_break_over_a_flow_deck(name: str, app: Path) -> None:
+    """So the others are there for a reason."""
+    assert breaks(app, name) != []
 
 
 @pytest.mark.parametrize("name", sorted({*events_file.EVENTS.names()} - {*NOT_THE_PRESETS}))

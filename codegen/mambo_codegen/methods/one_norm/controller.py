@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.one_norm import cost
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.shared.inputs import Inputs, Status, choose
-from mambo_codegen.methods.shared.limits import LimitsLaw, LimitsMemory, forgotten_target, no_limits
+from mambo_codegen.methods.shared.limits import LimitsMemory, forgotten_target, limits_law
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.gravity import hover_thrust
@@ -82,7 +82,7 @@ class OneNormController:
     """
 
     def __init__(self, constants: OneNormConstants, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
-        settings, products = constants.settings, arithmetic(constants)
+        settings, products = constants.settings, OneNormArithmetic(constants)
         self._constants = constants
         self.settings = settings
         self._numbers, self._inputs = constants.numbers, Inputs(constants)
@@ -92,7 +92,7 @@ class OneNormController:
         )
         self._predictor = Predictor(constants, products)
         self._tracker = Tracker(constants.tracker, products) if constants.tracker else None
-        self._limits = LimitsLaw(constants, constants.limiting) if constants.limiting else None
+        self._limits = limits_law(constants)
         self._outage_steps = constants.outage_steps
         self._rprop = Rprop(settings, products)
         self._minimize = minimize
@@ -108,9 +108,7 @@ class OneNormController:
             iterations=np.zeros(n, np.int64),
             converged=np.zeros(n, np.bool_),
             target=unknown_motion(np.zeros((n, 2), computed)),
-            limits=self._limited(np.repeat(self._limits.defaults, n, axis=0))
-            if self._limits
-            else no_limits(np.zeros((n, 2), computed)),
+            limits=self._limits.memory(np.repeat(self._limits.defaults, n, axis=0)),
             missed=np.zeros(n, np.int64),
             sent_rad=np.zeros((n, 2), computed),
             tilt_rad=np.zeros((n, 2), computed),
@@ -132,11 +130,8 @@ class OneNormController:
 
         Returns a status (n,); bad limits change nothing. Raises ValueError without limits in the settings.
         """
-        if self._limits is None:
-            raise ValueError("the settings have no limits")
-        given, old = self._limits.quantize(limits), self.memory.limits
-        good = self._limits.check(given)
-        new = replace(old, bounds=self._limits.bounds(given))
+        given, good = self._limits.read(limits)
+        new = replace(self.memory.limits, bounds=self._limits.memory(given).bounds)
         memory, tilt = self.memory, new.bounds.tilt_rad[:, None]
         limited = replace(
             memory,
@@ -175,8 +170,11 @@ class OneNormController:
         thrusts = np.where(good, thrusts, self._inputs.limits.thrust_least)
         if self.settings.model.thrust == "hover":
             thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
-        limits, within = self._limit(states, targets)
-        motion = self._track(targets, limits, within)
+        limits, motion, within = self._limits.aim(
+            self.memory.limits, self.memory.target, states[:, 0:2], targets, good
+        )
+        if self._tracker is not None:
+            motion = self._tracker.update(motion, within[:, self._tracker.columns])
         searched = self._search(states, within, thrusts, motion.acceleration_m_step2)
         new = replace(
             self.memory,
@@ -195,7 +193,7 @@ class OneNormController:
         )
         held = replace(self.memory, sent_rad=self.memory.command_rad)  # without the rate feedback
         new = self.memory = self._after_outage(status, choose(good, new, held))
-        to_si = self._numbers.to_si
+        to_si, has_limits = self._numbers.to_si, self._constants.has_limits
         return OneNormStep(
             status=status,
             command_rad=to_si(new.sent_rad, "angle"),
@@ -204,17 +202,16 @@ class OneNormController:
             plan_rad=to_si(new.plan_rad, "angle"),
             iterations=new.iterations,
             converged=new.converged,
-            limits=to_si(self.stored_limits, *self._constants.limits_stored) if self._limits else None,
-            missed=new.missed if self._limits else None,
-            active=new.limits.active if self._limits else None,
+            limits=to_si(self.stored_limits, *self._constants.limits_stored) if has_limits else None,
+            missed=new.missed if has_limits else None,
+            active=new.limits.active if has_limits else None,
         )
 
     @property
     def stored_limits(self) -> Real:
         """All numbers of nmpc_bounds_t (n, k), in their order; k is 0 without limits."""
-        if self._limits is None:
-            return np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
-        return np.concatenate(self._limits.stored(self.memory.limits, has_command=False), axis=1)
+        none = np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
+        return np.concatenate([none, *self._limits.stored(self.memory.limits, has_command=False)], axis=1)
 
     @property
     def outcome(self) -> dict[str, NDArray[Any]]:
@@ -233,7 +230,7 @@ class OneNormController:
             "cost": memory.cost,
             "gradient": memory.gradient,
             "plan_rad": memory.plan_rad,
-        } | (limits if self._limits else {})
+        } | (limits if self._constants.has_limits else {})
 
     def _command(self, moves_rad: Real, tilt_rad: Real) -> Real:
         """Return the commands (n, 2): the first moves, and what the rates of the attitude add."""
@@ -244,20 +241,9 @@ class OneNormController:
         added = np.where(memory.has_tilt[:, None], moves_rad + change, moves_rad)
         return clamp(added, self._tilt_limit())
 
-    def _limited(self, limits: Real) -> LimitsMemory:
-        """Return the memory of limits (n, 7), of the quantities LIMITS."""
-        assert self._limits is not None
-        bounds = self._limits.bounds(limits)
-        return replace(no_limits(bounds.centre_m), bounds=bounds)
-
-    def _limit(self, state: Real, target: Real) -> tuple[LimitsMemory, Real]:
-        """Return what limits keep, and the targets within them."""
-        memory = self.memory.limits
-        return self._limits.limit(memory, state[:, 0:2], target) if self._limits else (memory, target)
-
-    def _tilt_limit(self) -> Any:
-        """Return the tilt limit, or one for each controller (n, 1)."""
-        return self.memory.limits.bounds.tilt_rad[:, None] if self._limits else self._inputs.limits.tilt
+    def _tilt_limit(self) -> Real:
+        """Return the tilt limits (n, 1)."""
+        return self.memory.limits.bounds.tilt_rad[:, None]
 
     def _held(self, command: Real) -> OneNormMemory:
         """Return the memory of controllers that hold commands (n, 2) and have forgotten the target."""
@@ -283,14 +269,6 @@ class OneNormController:
         level = replace(self._held(np.zeros_like(memory.sent_rad)), missed=missed)
         return choose(bad & (missed == self._outage_steps), level, memory)
 
-    def _track(self, target: Real, limits: LimitsMemory, within: Real) -> TargetMotion:
-        """Return what is known of targets, of which `within` stands for `target`."""
-        if self._tracker is None:
-            return self.memory.target
-        motion, before = self.memory.target, self.memory.limits
-        seen = self._limits.forget_braking(motion, before, limits, target) if self._limits else motion
-        return self._tracker.update(seen, within[:, self._tracker.columns])
-
     def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory
         acceleration = None if self._tracker is None else target_acceleration
@@ -300,8 +278,7 @@ class OneNormController:
             return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)
 
         start = memory.plan_rad
-        if self._limits:
-            self._rprop.limit = self._tilt_limit()[:, :, None]
+        self._rprop.limit = self._tilt_limit()[:, :, None]
         if self.settings.optimizer.warm_start == "last_command":
             start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
         return self._minimize(self._rprop, evaluate, start)

@@ -26,7 +26,7 @@ from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 @dataclass(frozen=True)
 class HeightState:
-    """The height of n controllers, (n,) each; up is positive.
+    """The height of n controllers, (n,) each; up is positive. Without a height zeros.
 
     height_m, velocity_m_step, disturbance_m_step2, gain: estimates; of the last two the settings choose one.
     thrust, lagged, command: sa, sc, su of the model of the thrust in nmpc.c, m/step^2.
@@ -59,6 +59,25 @@ class HeightBounds:
     ceiling_m: Real
     up_m: Real
     down_m: Real
+
+
+@dataclass(frozen=True)
+class Lift:
+    """What a step knows of the height of n controllers.
+
+    lies:   (n,) whether the drone lies on the floor.
+    weight: (n,) by how much more the measured tilt counts than in hover; None if no more.
+    """
+
+    state: HeightState
+    lies: Rows
+    weight: Real | None
+
+
+def unknown_height(like: Real) -> HeightState:
+    """Return zeros for the height of controllers, with the shape (n,) and the type of `like`."""
+    no, still = np.zeros_like(like), unknown_motion(like[:, None])
+    return HeightState(no, no, no, no, no, no, no, still, no, no)
 
 
 class HeightAxis:
@@ -119,8 +138,15 @@ class HeightAxis:
         self._least_speed = constant(SMALLEST_LIMIT, "velocity")
         self._most_speeds = np.array([constant(value, "velocity") for value in found.most_m_s])
 
-    def bounds(self, limits: Real) -> HeightBounds:
-        """Derive what the steps need from good limits (n, 4), of the quantities HEIGHT_LIMITS."""
+    def hover(self, n: int) -> Real:
+        """Return level commands (n, 3) with the thrust of hover."""
+        level = np.zeros((n, 2), self._products.numbers.computed)
+        return np.column_stack([level, np.full(n, self._hover_m_s2)])
+
+    def bounds(self, limits: Real) -> HeightBounds | None:
+        """Derive what the steps need from good limits (n, 4), of HEIGHT_LIMITS; None without limits."""
+        if not limits.shape[1]:
+            return None
         products = self._products
         distance = products.reach_product(self._reach, products.speed_product(limits[:, 2:4]))
         return HeightBounds(limits[:, 0], limits[:, 1], distance[:, 0], distance[:, 1])
@@ -136,36 +162,39 @@ class HeightAxis:
         )
         return good
 
-    @property
-    def hover_m_s2(self) -> Any:
-        """The thrust over mass of hover."""
-        return self._hover_m_s2
-
     def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
-        """Return the height of drones with a steady thrust (n,) and the attitude of commands (n, 2)."""
-        zeros = np.zeros_like(thrust_m_s2)
-        share = self._cosine(command_rad)
-        command = self._vertical(share, thrust_m_s2)
-        return HeightState(
-            height_m=zeros,
-            velocity_m_step=zeros,
-            disturbance_m_step2=zeros,
-            gain=np.full_like(zeros, self._one),
+        """Return the height of drones with a steady thrust (n, 1) and the attitude of commands (n, 2)."""
+        unknown, share = unknown_height(thrust_m_s2[:, 0]), self._cosine(command_rad)
+        command = self._vertical(share, thrust_m_s2[:, 0])
+        return replace(
+            unknown,
+            gain=np.full_like(command, self._one),
             thrust=command,
             lagged=command,
             command=command,
-            target=unknown_motion(zeros[:, None]),
             share=share,
-            thrust_m_s2=thrust_m_s2,
+            thrust_m_s2=thrust_m_s2[:, 0],
         )
 
     def limited(self, thrust_m_s2: Real) -> Real:
-        """Return thrusts (n,) within their limits."""
+        """Return thrusts (n, 1) within their limits."""
         return confine(thrust_m_s2, *self._thrusts_m_s2)
 
     def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
-        """Change the last thrusts to `thrust_m_s2` (n,), within the limits."""
-        return replace(state, command=self._vertical(state.share, thrust_m_s2), thrust_m_s2=thrust_m_s2)
+        """Change the last thrusts to `thrust_m_s2` (n, 1), within the limits."""
+        thrust = thrust_m_s2[:, 0]
+        return replace(state, command=self._vertical(state.share, thrust), thrust_m_s2=thrust)
+
+    def observe(
+        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+    ) -> Lift:
+        """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""
+        state, lies = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
+        return Lift(state, lies, self.weight(self.lift(state, state.thrust)))
+
+    def command_weight(self, state: HeightState) -> Real:
+        """Return by how much more tilts (n,) count with the last command than in hover."""
+        return self.weight(self.lift(state, state.command))
 
     def advance(self, state: HeightState) -> HeightState:
         """Let the model of the thrust answer the last command over one control step."""
@@ -255,11 +284,11 @@ class HeightAxis:
         weight: Real = self._one + self._products.gravity_product(self._per_gravity, limited)
         return weight
 
-    def over_weight(self, acceleration: Real, weight: Real) -> Real:
+    def over_weight(self, acceleration: Real, weight: Real | None) -> Real:
         """Return accelerations (n, 2) over weights (n,), never too small by rounding."""
         return self._products.factor_product(acceleration, self._inverse("weight", weight)[:, None])
 
-    def _inverse(self, name: str, value: Real) -> Real:
+    def _inverse(self, name: str, value: Any) -> Real:
         """Return 1/value from products, as `Reciprocal` has it."""
         product, (start, slope, two_last, two, steps) = self._products.factor_product, self._lines[name]
         found: Real = start - product(slope, value)

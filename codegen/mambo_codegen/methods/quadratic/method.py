@@ -8,14 +8,16 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
 from mambo_codegen.methods.quadratic import formats, law
-from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
+from mambo_codegen.methods.quadratic.step import REST_M_S
+from mambo_codegen.methods.quadratic.step_choices import step_choices
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.numbers.representation import THRUST
@@ -130,7 +132,7 @@ class Quadratic(QuadraticConstants, Method):
         return {
             "quadratic": True,
             "attitude": self.attitude,
-            "move_limits": AttitudeModel(self, arithmetic(self)).command_limit.tolist(),
+            "move_limits": AttitudeModel(self, QuadraticArithmetic(self)).command_limit.tolist(),
             "observer": self.observer,
             "law": self.law,
             **height_context(self.height),
@@ -148,6 +150,7 @@ class Quadratic(QuadraticConstants, Method):
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
+            "step": step_choices(self),
             "rest_m_step": REST_M_S * period_s,
             "trims": [
                 f" {'-' if trim_rad > 0 else '+'} NMPC_{name}_TRIM_COMMAND_RAD" if trim_rad else ""

@@ -69,6 +69,11 @@ class Constants(ABC):
         return feedback_steps(self.settings)
 
     @property
+    def has_limits(self) -> bool:
+        """Whether speed, braking or place are limited."""
+        return self.limiting is not None
+
+    @property
     def has_height(self) -> bool:
         """Whether the controller has the height for a third axis, and commands the thrust."""
         return self.settings.height is not None

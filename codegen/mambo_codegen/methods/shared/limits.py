@@ -6,13 +6,14 @@ for the target's, and the limited desired velocity for the target's velocity. `l
 
 from dataclasses import dataclass, replace
 from enum import IntFlag
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.inputs import choose
-from mambo_codegen.methods.shared.limits_arithmetic import limits_arithmetic
+from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
@@ -58,7 +59,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class LimitsMemory:
-    """What the limits of n controllers keep between two steps; zeros without limits.
+    """What the limits of n controllers keep between two steps; without limits zeros, but for the tilt limit.
 
     command_limit: (n, 2) acceleration of a command at the tilt limit, right and forward, m/step^2; zeros with
                    the 1-norm.
@@ -87,18 +88,54 @@ def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
     )
 
 
-def no_limits(like: Real) -> LimitsMemory:
-    """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
-    pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
-    bounds, active = Bounds(pair, pair, one, one, one, one, one, one), np.zeros(len(like), np.int64)
-    return LimitsMemory(bounds, pair, pair, active, pair, one)
+def _memory(bounds: Bounds) -> LimitsMemory:
+    """Return the memory of controllers with `bounds` before the first step."""
+    pair, one = np.zeros_like(bounds.centre_m), np.zeros_like(bounds.tilt_rad)
+    return LimitsMemory(bounds, pair, pair, np.zeros(len(one), np.int64), pair, one)
+
+
+class NoLimits:
+    """No limits of speed, braking and place: every target stays as it is."""
+
+    brake: Final = False
+
+    def __init__(self, constants: Constants) -> None:
+        self._tilt, self.defaults = constants.limits.tilt, np.zeros((1, 0), constants.numbers.computed)
+
+    def memory(self, limits: Real) -> LimitsMemory:
+        """Return the memory of controllers with limits (n, 0)."""
+        pair, one = np.zeros((len(limits), 2), limits.dtype), np.zeros(len(limits), limits.dtype)
+        tilt_rad = np.full_like(one, self._tilt)
+        return _memory(Bounds(pair, pair, one, one, one, one, one, tilt_rad))
+
+    def read(self, limits: ArrayLike) -> tuple[Real, Rows]:
+        """Raise ValueError: there is nothing to set."""
+        del limits
+        raise ValueError("the settings have no limits")
+
+    def aim(
+        self, memory: LimitsMemory, motion: TargetMotion, position: Real, target: Real, follows: Rows
+    ) -> tuple[LimitsMemory, TargetMotion, Real]:
+        """Return memory, motions and targets as they are."""
+        del position, follows
+        return memory, motion, target
+
+    def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
+        """Return no columns: there is no nmpc_bounds_t."""
+        del memory, has_command
+        return []
 
 
 class LimitsLaw:
-    """The constants of the limits, in the scalar type of the controller."""
+    """The constants of the limits, in the scalar type of the controller.
+
+    brake: whether a controller brakes and comes to rest after an outage.
+    """
+
+    brake: Final = True
 
     def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
-        self._products = limits_arithmetic(constants, limits)
+        self._products = LimitsArithmetic(constants, limits)
         self._numbers, self._ranges = constants.numbers, constants.limits
         self._quantities = limits.quantities
         constant = self._numbers.constant
@@ -114,6 +151,15 @@ class LimitsLaw:
             self._turn = constant(limits.turn_m_s_rad, "slope")
             self._least_turn = constant(LEAST_TURN_M2_S2, "velocity")
         self.defaults: Real = self.quantize([limits.limits])
+
+    def memory(self, limits: Real) -> LimitsMemory:
+        """Return the memory of controllers with good limits (n, k) before the first step."""
+        return _memory(self.bounds(limits))
+
+    def read(self, limits: ArrayLike) -> tuple[Real, Rows]:
+        """Return limits (n, k) as numbers, and whether they may be set (n,), but for those of the height."""
+        given = self.quantize(limits)
+        return given, self.check(given)
 
     def quantize(self, limits: ArrayLike) -> Real:
         """Return limits (n, k), of the constants' quantities, as numbers."""
@@ -251,6 +297,17 @@ class LimitsLaw:
         cut = (sign * velocity) > most
         return np.where(cut, sign * most, velocity), np.any(cut, axis=1)
 
+    def aim(
+        self, memory: LimitsMemory, motion: TargetMotion, position: Real, target: Real, follows: Rows
+    ) -> tuple[LimitsMemory, TargetMotion, Real]:
+        """Return memory, motions of targets, and targets (n, k) within the limits, where they are followed.
+
+        position (n, 2) is that of the drone, follows (n,) whether a controller follows its target.
+        """
+        after, within = self.limit(memory, position, target)
+        motion = choose(follows, self.forget_braking(motion, memory, after, target), motion)
+        return choose(follows, after, memory), motion, np.where(follows[:, None], within, target)
+
     def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
         memory, fastest = self._turn_speed(memory, target[:, 2:4])
@@ -297,6 +354,11 @@ class LimitsLaw:
         """Return the acceleration (n, 2) of a desired velocity, m/s^2; 0 where it has jumped."""
         rate = self._products.rate_product(velocity - previous)
         return np.where(np.abs(rate) <= self._jump, rate, np.zeros_like(rate))
+
+
+def limits_law(constants: Constants) -> LimitsLaw | NoLimits:
+    """Return the limits of a controller."""
+    return LimitsLaw(constants, constants.limiting) if constants.limiting else NoLimits(constants)
 
 
 def _held(half_width: Real, target: Real, centre: Real) -> tuple[Real, Rows]:

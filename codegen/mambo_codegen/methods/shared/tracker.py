@@ -1,26 +1,13 @@
 """Target tracker: the target's acceleration and its rate, estimated by an alpha-beta filter."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_codegen.methods.shared.arithmetic import Arithmetic
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
-from mambo_codegen.numbers.representation import Representation
-
-
-class TrackerArithmetic(Protocol):
-    """The products of the tracker, and the representation of its numbers."""
-
-    numbers: Representation
-
-    def target_product(self, factor: Any, value: Real) -> Real:
-        """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
-
-    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
-        """Return gain * acceleration, m/step^2."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +35,7 @@ def unknown_motion(like: Real) -> TargetMotion:
 class Tracker:
     """The constants of the tracker, in the scalar type of the controller."""
 
-    def __init__(self, constants: TrackerConstants, arithmetic: TrackerArithmetic) -> None:
+    def __init__(self, constants: TrackerConstants, arithmetic: Arithmetic) -> None:
         constant = arithmetic.numbers.constant
         self._arithmetic, self.is_given = arithmetic, constants.is_given
         self.columns = slice(4, 6) if constants.is_given else slice(2, 4)

@@ -195,12 +195,15 @@ def replay(
     ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Compare the commands in a log with those of the compiled controller; exit 1 if it is not what flew.
+    """Compare the commands in a log with those of the compiled controller.
+
+    Exit 0 if it is what flew, 1 if it is not, 2 if the log does not tell.
 
     After a flight: whether the firmware has these settings, and gets the inputs that you believe.
     """
     from mambo_sil.model.identify.columns import parse_columns
-    from mambo_sil.model.replay.log_replay import SIGNALS, replay_log, write_curves
+    from mambo_sil.model.replay.log_replay import replay_log, write_curves
+    from mambo_sil.model.replay.logged_inputs import SIGNALS
     from mambo_sil.model.replay.replay_plots import draw_replay
     from mambo_sil.model.replay.replay_report import (
         CURVES,
@@ -221,4 +224,4 @@ def replay(
     show(summary, replay_text(summary), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {', '.join((CURVES, *PICTURES, SUMMARY))}", err=True)
     if not summary.good:
-        raise typer.Exit(1)
+        raise typer.Exit(2 if summary.good is None else 1)

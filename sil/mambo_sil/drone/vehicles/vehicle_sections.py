@@ -218,5 +218,11 @@ class MocapSensors(VehicleSection):
     attitude_noise_rad: Noise = Field(description="Standard deviation of roll, pitch and yaw.")
 
 
+class FlowDeckSensors(VehicleSection):
+    """A Crazyflie's flow deck: optical flow and range to the floor; what the app flies over on the desk."""
+
+    kind: Literal["flow-deck"] = Field("flow-deck", description="Optical flow and range, on a Crazyflie.")
+
+
 AnyAttitude = Annotated[MamboAttitude | CascadeAttitude | FirstOrderAttitude, Field(discriminator="kind")]
-AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors, Field(discriminator="kind")]
+AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors | FlowDeckSensors, Field(discriminator="kind")]

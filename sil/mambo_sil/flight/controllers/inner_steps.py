@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.optimizer import Evaluate, Rprop, Search
@@ -40,7 +40,7 @@ class InnerSteps:
     def step_sizes_rad(self, settings: Settings) -> Real:
         """Return RPROP's step sizes (i, n, control, 2) after the update of each iteration."""
         method = OneNorm(settings)
-        rprop = Rprop(settings, arithmetic(method))
+        rprop = Rprop(settings, OneNormArithmetic(method))
         size = np.full(self.plan_rad[0].shape, rprop.initial_step)
         before = np.zeros_like(size)
         sizes = []

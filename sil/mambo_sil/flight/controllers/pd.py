@@ -6,7 +6,7 @@ Pounds et al. It neither knows that the target moves nor that it turns.
 
 `PdFeedForwardController` does. `PidFeedForwardController` adds all that helps without a model: integral,
 feed-forward of the jerk, low-pass and feedback of the tilt. Source of their gains: the search in
-benchmarks/feedforward.py.
+benchmarks/gains/feedforward.py.
 """
 
 from dataclasses import dataclass

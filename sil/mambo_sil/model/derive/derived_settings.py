@@ -15,6 +15,7 @@ from mambo_codegen.settings.key import spell
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import (
     FirstOrderAttitude,
+    FlowDeckSensors,
     MamboSensors,
     MocapSensors,
     NoSensors,
@@ -36,6 +37,7 @@ QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
 LATE_VELOCITY_M_S: Final = 0.15
 LEAST_POSITION_M: Final = 0.001
+FLOW_POSITION_M: Final = 0.04
 """Noise densities of the observer."""
 
 QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.13, 1.5, 1.15
@@ -157,6 +159,13 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
             ", and half the time that a position is held" if held_s else ""
         )
         yield Derived("observer", "age_s", _round(min(sensors.position_delay_s + held_s, 0.2)), words)
+    elif isinstance(sensors, FlowDeckSensors):
+        words = "A flow deck's position is an integral: with less, commands rattle and take the thrust"
+        yield Derived("observer", "position_noise", FLOW_POSITION_M, words)
+        words = "Learns wind within tenths of a second"
+        yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
+        yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
+        yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
     elif isinstance(sensors, NoSensors):
         words = (
             "No sensors in the file: calm with those of the Mambo and with motion capture, best with neither"

@@ -31,25 +31,37 @@ class Column:
 
 KNOWN: Final[dict[str, tuple[Column, ...]]] = {
     TIME: (Column(TIME), Column("Timestamp", 0.001)),
-    "roll_command_rad": (Column("roll_command_rad"), Column("controller.roll", DEGREE)),
-    "pitch_command_rad": (Column("pitch_command_rad"), Column("controller.pitch", DEGREE)),
+    "roll_command_rad": (
+        *(Column("roll_command_rad"), Column("controller.roll", DEGREE), Column("nmpc.outRoll")),
+    ),
+    "pitch_command_rad": (
+        *(Column("pitch_command_rad"), Column("controller.pitch", DEGREE), Column("nmpc.outPitch")),
+    ),
     "roll_rad": (
         *(Column("seen_roll_rad"), Column("roll_rad")),
         *(Column("stateEstimate.roll", DEGREE), Column("stabilizer.roll", DEGREE)),
+        Column("nmpc.inRoll"),
     ),
     "pitch_rad": (
         *(Column("seen_pitch_rad"), Column("pitch_rad")),
         *(Column("stateEstimate.pitch", DEGREE), Column("stabilizer.pitch", DEGREE)),
+        Column("nmpc.inPitch"),
     ),
     "yaw_rad": (
         *(Column("seen_yaw_rad"), Column("yaw_rad")),
         *(Column("stateEstimate.yaw", -DEGREE), Column("stabilizer.yaw", -DEGREE)),
+        Column("nmpc.inYaw", -1.0),
     ),
-    "x_m": (Column("seen_x_m"), Column("x_m"), Column("stateEstimate.x")),
-    "y_m": (Column("seen_y_m"), Column("y_m"), Column("stateEstimate.y", -1.0)),
-    "z_m": (Column("seen_z_m"), Column("z_m"), Column("stateEstimate.z", -1.0)),
-    "vx_m_s": (Column("seen_vx_m_s"), Column("vx_m_s"), Column("stateEstimate.vx")),
-    "vy_m_s": (Column("seen_vy_m_s"), Column("vy_m_s"), Column("stateEstimate.vy", -1.0)),
+    "x_m": (Column("seen_x_m"), Column("x_m"), Column("stateEstimate.x"), Column("nmpc.x")),
+    "y_m": (Column("seen_y_m"), Column("y_m"), Column("stateEstimate.y", -1.0), Column("nmpc.y", -1.0)),
+    "z_m": (Column("seen_z_m"), Column("z_m"), Column("stateEstimate.z", -1.0), Column("nmpc.z", -1.0)),
+    "vx_m_s": (Column("seen_vx_m_s"), Column("vx_m_s"), Column("stateEstimate.vx"), Column("nmpc.vx")),
+    "vy_m_s": (
+        Column("seen_vy_m_s"),
+        Column("vy_m_s"),
+        Column("stateEstimate.vy", -1.0),
+        Column("nmpc.vy", -1.0),
+    ),
     "thrust_acceleration_m_s2": (Column("thrust_acceleration_m_s2"),),
     "thrust_command": (
         Column("thrust_command"),

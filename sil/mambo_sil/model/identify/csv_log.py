@@ -28,6 +28,11 @@ SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.025
 would be read as a late one."""
 
 
+COUNTER_BITS: Final = (24, 32)
+"""Counters of ms: that of the Crazyflie's log packets, which ends after 4.7 hours, and that of its clock."""
+WRAP_SHARE: Final = 64.0
+"""A fall from the last to the first of this many parts of a counter's range is an end of the counter."""
+
 LONGEST_OPTIONAL_PERIOD_S: Final = 0.1
 """Median time between two samples of position, velocity or yaw beyond which they are left out."""
 
@@ -142,7 +147,7 @@ def _log(
     name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArray], remarks: list[str]
 ) -> FlightLog:
     """Return the log of the columns' values with `remarks` on its rows; raises LogError."""
-    time_s = columns[TIME].factor * values[TIME]
+    time_s = columns[TIME].factor * _unwrapped(values[TIME])
     timed = np.isfinite(time_s)
     faults, signals = [], {}
     for signal, column in columns.items():
@@ -159,6 +164,18 @@ def _log(
     if faults:
         raise LogError(tuple(faults))
     return demand_one_clock(FlightLog(name, signals, tuple(remarks)), columns[TIME].text, _FASTER)
+
+
+def _unwrapped(ticks: FloatArray) -> FloatArray:
+    """Return the ticks (k,) of a clock, going on where its counter of 24 or 32 bits began again at 0."""
+    timed = np.isfinite(ticks)
+    before, after = ticks[timed][:-1], ticks[timed][1:]
+    passed = np.zeros(len(ticks))
+    for bits in COUNTER_BITS:
+        end, near = 2.0**bits, 2.0**bits / WRAP_SHARE
+        wraps = (before > end - near) & (before < end) & (after < near)
+        passed[timed] += np.cumsum(np.append(0.0, end * wraps))
+    return ticks + passed
 
 
 def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:

@@ -53,18 +53,20 @@ class ThrustResult:
     reasons: list[str]
     """Why the verdict is not "good"."""
     command_change: Number
-    """Standard deviation of the command, behind the lag, over its mean."""
+    """Rms change of the lagged command over its mean, in windows, where it is largest."""
     held_out_r2: Number
     gain: Interval | None
-    """Acceleration in m/s^2 per unit of the command, at the beginning of the logs."""
+    """Thrust over mass in m/s^2 per unit of the command at hover, in the middle of the logs."""
     lag_s: Interval | None
     """Lag with dead time and the age of the measured height."""
     hover_command: Number
-    """Command that carries the weight, at the beginning of the logs."""
+    """Command that carries the weight, in the middle of the logs."""
     battery_sag_1_s: Interval | None
-    """Share of the thrust at the beginning that is lost per second."""
+    """Share of the thrust in the middle that is lost per second."""
     weight_g: Number
-    """The weight as the heights show it: 1 if the thrust is in proportion to its command."""
+    """Effect of a change of the command over that which hover tells: 1 if they are in proportion."""
+    drag_1_s: Number
+    """Drag of the climb, as deceleration over speed."""
     scaled: bool
     """Whether the command is thrust over mass in m/s^2; else it has a unit of its own."""
 
@@ -180,7 +182,8 @@ def thrust_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         ("lag of the thrust", f"{_plus_minus(lag, 1e3, 0)} ms"),
         ("thrust command of hover", three_digits(thrust.hover_command)),
         ("sag of the battery", f"{_plus_minus(sag, 100.0, 3)} % of the thrust per second"),
-        ("height explained", f"R2 {thrust.held_out_r2:.3f}; weight {thrust.weight_g:.2f} g"),
+        ("drag of the climb", f"{thrust.drag_1_s:.2f} 1/s"),
+        ("height explained", f"R2 {thrust.held_out_r2:.3f}; changes {thrust.weight_g:.2f} of hover's gain"),
     ]
 
 

@@ -20,6 +20,10 @@ ADVICE: Final = (
     "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
 )
 
+UNKNOWN_MASS: Final = (
+    "# mass_kg =  # with battery: no log shows it; write it here, or identify with --mass-kg"
+)
+
 
 def identify_text(summary: IdentifySummary) -> str:
     """Return an identification as text: the model with its 95 % intervals, then what the logs showed."""
@@ -65,8 +69,8 @@ def model_text(summary: IdentifySummary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def vehicle_text(summary: IdentifySummary) -> str:
-    """Return a vehicle.toml of kind first_order; both axes must have a model."""
+def vehicle_text(summary: IdentifySummary, mass_kg: float | None) -> str:
+    """Return a vehicle.toml of kind first_order, with a mass if it is known; both axes must have a model."""
     motion = summary.motion
     share, drag = "1.0  # not identified", "0.0  # not identified"
     trims: list[str] = []
@@ -92,7 +96,7 @@ def vehicle_text(summary: IdentifySummary) -> str:
         *_heading(summary),
         "",
         "[body]",
-        "mass_kg = 0.1  # not identified: write that of the drone; it matters for payload and pushes",
+        UNKNOWN_MASS if mass_kg is None else f"mass_kg = {mass_kg!r}  # as told to identify",
         f"drag_1_s = {drag}",
         "",
         "[attitude]",

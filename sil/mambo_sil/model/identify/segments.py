@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -82,7 +82,7 @@ class Segment:
     height_m: FloatArray | None = None
     """(m,), up positive; None where the log has none."""
     thrust: HeldCommand | None = None
-    """The commanded thrust; None where the log has none."""
+    """The commanded thrust, at least 0: rotors do not pull down; None where the log has none."""
     thrust_in_m_s2: bool = False
     """Whether `thrust` is over mass; else it has a unit of its own."""
     begun_s: float = 0.0
@@ -133,6 +133,9 @@ def _cut_stretch(
     thrust_m_s2 = None if thrust is None else _onto(time_s, thrust)
     height_m = -_onto(time_s, log.signals[HEIGHT]) if HEIGHT in log.signals else None
     sent = log.signals.get(THRUST_COMMAND, thrust)
+    thrust_command = None
+    if sent is not None:
+        thrust_command = HeldCommand.of(replace(sent, value=np.maximum(sent.value, 0.0)))
     return [
         Segment(
             log.name,
@@ -143,7 +146,7 @@ def _cut_stretch(
             None if velocity is None else velocity[:, a:b],
             None if thrust_m_s2 is None else thrust_m_s2[a:b],
             None if height_m is None else height_m[a:b],
-            None if sent is None else HeldCommand.of(sent),
+            thrust_command,
             THRUST_COMMAND not in log.signals,
             float(log.signals[COMMANDS[0]].time_s[0]),
         )

@@ -31,7 +31,10 @@ GROUNDED: Final = "grounded"
 LEVELLED: Final = "levelled"
 """Whether its caller flew level instead of the tilt that it computed."""
 OF_HEIGHTS: Final = (START_THRUST, GROUNDED, LEVELLED)
-OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS, *OF_HEIGHTS)
+UPDATE: Final = "update"
+"""The number of the update that the row is of, counted modulo `UPDATES`."""
+UPDATES: Final = 2**16
+OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS, UPDATE, *OF_HEIGHTS)
 """Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
 pitch is positive with the nose up."""
 

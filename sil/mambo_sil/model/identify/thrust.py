@@ -1,12 +1,15 @@
-"""The response of the height to the thrust command: gain, lag, hover command, and the sag of the battery.
+"""The response of the height to the thrust command: lag, hover command, gain, and the sag of the battery.
 
-In windows of two seconds, with c the command behind a first-order lag, times cos roll cos pitch:
+In windows of 1.2 s, with c the command behind a dead time and a first-order lag, times cos roll cos pitch:
 
-    height = constant + constant t + double integral of (gain (1 - sag t) c - weight)
+    climb' = slope (c - hover) - drag climb
 
-t being the time since the beginning of the log. The weight is fitted, too, because the thrust need not be in
-proportion to its command: gain is the slope at hover. Constants, gain, sag and weight are solved linearly
-inside the search for the lag, which holds the dead time, and the age of the height, too.
+Both sides are integrated twice. Slope and drag are solved linearly inside the search for lag and dead time;
+without the drag the slope would be too low, and the lag too short. The hover command is a constant of each
+window and holds what changes slowly, the weight, the battery and gusts, which the controller answers: so its
+answer does not pass for a response. Through the hover commands of all windows goes a line: its value in the
+middle of the logs is their hover command, the gain is g over it, and its slope is the sag. The sum of lag and
+dead time is known better than either: it is the lag that is reported. It holds the age of the height, too.
 """
 
 from collections.abc import Sequence
@@ -14,66 +17,67 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.model.identify.identify_record import ThrustResult, Verdict
+from mambo_sil.model.identify.identify_record import ThrustResult
 from mambo_sil.model.identify.response import (
     NORMAL_95,
-    SURPLUS_S,
     WIDENING,
     Interval,
-    filter_command,
     newey_west,
 )
-from mambo_sil.model.identify.segments import PERIOD_S, Segment
+from mambo_sil.model.identify.segments import Segment
+from mambo_sil.model.identify.thrust_windows import SIZE, WINDOW_S, Windows, cut_windows
+from mambo_sil.results.number_format import three_digits
 
-WINDOW_S: Final = 2.0
-LEAST_WINDOWS, GOOD_WINDOWS = 4, 7
-"""Windows below which the thrust is refused, and weak."""
-_TRIED_S: Final = np.geomspace(0.005, 0.4, 25)
-_CHANGE: Final = 0.01
-"""Lags that are tried first; change of the logarithm of the lag for its derivative."""
-_CORRELATION: Final = 100
-"""Samples over which what is left is taken as correlated."""
+LEAST_S, GOOD_S = 8.0, 14.0
+"""Time in windows below which the thrust is refused, and weak."""
+_HOVER_CORRELATION: Final = 13
+"""Windows over which the hover commands are taken as correlated: 8 s, because gusts last for seconds."""
+_BLOCK: Final = 8
+"""Windows that are fitted, or held out, together: 5 s."""
+
+_STARTS: Final = np.log([[0.05, 0.02], [0.15, 0.005]])
+_LOW, _HIGH = np.log([0.003, 0.0005]), np.log([0.5, 0.2])
+"""Logarithms of lag and dead time: starts and bounds of the search."""
+_STEP: Final = 0.02
+"""Change of these logarithms for their derivatives."""
 
 LEAST_CHANGE, GOOD_CHANGE = 0.03, 0.05
-"""Standard deviation of the lagged command over its mean below which the thrust is refused, and weak."""
-LEAST_R2, GOOD_R2 = 0.8, 0.9
-"""Share of the height that the model must explain on the half that was held out."""
-SURPLUS_GAIN: Final = 0.02
-"""Added to the half-width of the gain, over it: rotors are no first-order lag of the thrust, and a log has
-fewer samples than the loop that commands it."""
+"""Change of the thrust, over hover, below which the thrust is refused, and weak."""
+LEAST_R2, GOOD_R2 = 0.5, 0.8
+"""Share of the changes of height that the model must explain in the windows that were held out."""
+SURPLUS_GAIN: Final = 0.01
+"""Added to the half-width of the gain, over it: a steady vertical wind of 0.1 m/s^2 looks like it."""
+SURPLUS_LAG_S: Final = 0.01
+"""Added to that of the lag: the noise of the height comes back through the altitude loop."""
 SAG_WIDENING: Final = 2.5
 """Factor on the interval of the sag besides: slow gusts look like it."""
-VAGUE_SHARE, VAGUE_LAG_S = 0.1, 0.05
-"""Half-widths of the intervals of the gain, over it, and of the lag beyond which the thrust is weak."""
-WEIGHTS_G, GOOD_WEIGHTS_G = (0.5, 2.0), (0.9, 1.1)
-"""Bounds on a plausible weight, and on that of a thrust in proportion to its command."""
+VAGUE_LAG_S, UNKNOWN_LAG_S = 0.05, 0.1
+"""Half-widths of the interval of the lag beyond which the thrust is weak, and refused."""
+LAGS_S: Final = (0.005, 0.5)
+"""Bounds on a plausible sum of lag and dead time."""
+STEP_M: Final = 0.12
+"""Range of the height from which on it has been flown up and down."""
 STEPS: Final = "fly steps of height, as 0.25 m up and down every 1.5 s, for 20 s"
-
-
-@dataclass(frozen=True, eq=False)
-class _Window:
-    """Heights of a window without their mean and mean climb (m,), and what drives them (m, 3)."""
-
-    rates: FloatArray
-    height_m: FloatArray
+WEIGHTS_G, GOOD_WEIGHTS_G = (0.5, 2.0), (0.85, 1.15)
+"""Bounds on slope times hover command over g, and on that of a thrust in proportion to its command."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Gain, gain times sag, and weight (3,) at a lag, and the error of each window."""
+    """Logarithms of lag and dead time (2,); slope and drag (2,)."""
 
-    lag_s: float
+    logs: FloatArray
     values: FloatArray
-    errors: list[FloatArray]
 
     @property
-    def power(self) -> float:
-        """The sum of the squares of the errors."""
-        return sum(float(each @ each) for each in self.errors)
+    def times_s(self) -> FloatArray:
+        """Lag and dead time (2,)."""
+        return np.asarray(np.exp(self.logs))
 
 
 def fit_thrust(segments: Sequence[Segment]) -> ThrustResult | None:
@@ -81,146 +85,189 @@ def fit_thrust(segments: Sequence[Segment]) -> ThrustResult | None:
     shown = [each for each in segments if each.height_m is not None and each.thrust is not None]
     if not shown:
         return None
-    windows = _windows(shown, _TRIED_S[0])
-    if len(windows) < LEAST_WINDOWS:
-        why = f"{WINDOW_S * len(windows):.0f} s of flight; {WINDOW_S * LEAST_WINDOWS:.0f} s are needed"
-        return ThrustResult("refused", [why], np.nan, np.nan, None, None, np.nan, None, np.nan, scaled=False)
-    fit, half = _fit(shown), _fit(shown, first_half=True)
-    held_out = _windows(shown, half.lag_s)[len(half.errors) :]
-    r2 = 1.0 - sum(map(_power, _errors(held_out, half.values))) / sum(
-        _power(each.height_m) for each in held_out
-    )
-    change = _change(shown, fit.lag_s)
-    gain, lag, sag = _intervals(shown, fit)
-    weight_g = float(fit.values[2]) / GRAVITY_M_S2
-    refused = _refusals(change, r2, weight_g, gain)
-    weak = [f"the model explains {r2:.2f} of the height held out; gusts?"] if r2 < GOOD_R2 else []
-    weak += _weaknesses(change, weight_g, gain, lag, len(windows))
-    verdict: Verdict = "refused" if refused else "weak" if weak else "good"
+    windows = cut_windows(shown, _STARTS[0])
+    flown_s = 0.5 * WINDOW_S * sum(len(each.middle_s) for each in windows)
+    if flown_s < LEAST_S:
+        return _refused(f"{flown_s:.0f} s of flight; {LEAST_S:.0f} s are needed", np.nan)
+    hover_command, change = _changes(windows)
+    heights_m = [each.height_m[each.counted] for each in shown if each.height_m is not None]
+    moved_m = max(float(np.ptp(each)) for each in heights_m)
+    if change < LEAST_CHANGE:
+        return _refused(_calm(hover_command, change, moved_m), change)
+    fit = _fit(shown)
+    r2, lag = _held_out_r2(shown), _lag(shown, fit)
+    hover, sag = _hover(cut_windows(shown, fit.logs), fit)
+    weight_g = float(fit.values[0]) * hover.value / GRAVITY_M_S2
+    if why := _refusal(moved_m, r2, weight_g, lag):
+        return _refused(why, change, r2)
+    weak = _weaknesses(change, r2, weight_g, lag, flown_s)
+    gain = GRAVITY_M_S2 / hover.value
     return ThrustResult(
-        verdict=verdict,
-        reasons=refused or weak,
+        verdict="weak" if weak else "good",
+        reasons=weak,
         command_change=change,
         held_out_r2=r2,
-        gain=None if refused else gain,
-        lag_s=None if refused else lag,
-        hover_command=np.nan if refused else float(fit.values[2]) / gain.value,
-        battery_sag_1_s=None if refused else sag,
+        gain=Interval(gain, gain * (hover.within / hover.value + SURPLUS_GAIN)),
+        lag_s=lag,
+        hover_command=hover.value,
+        battery_sag_1_s=sag,
         weight_g=weight_g,
+        drag_1_s=float(fit.values[1]),
         scaled=all(each.thrust_in_m_s2 for each in shown),
     )
 
 
-def _refusals(change: float, r2: float, weight_g: float, gain: Interval) -> list[str]:
-    """Return why a fit is no use."""
-    if change < LEAST_CHANGE:
-        return [
-            f"the thrust changes by {change:.1%} of hover (rms), {LEAST_CHANGE:.0%} are needed: "
-            f"in hover gain and weight are one number; {STEPS}"
-        ]
-    if r2 < LEAST_R2 or gain.value <= 0.0:
-        return [f"the model explains {r2:.2f} of the height held out; {LEAST_R2} is needed; {STEPS}"]
+def _refused(why: str, change: float, r2: float = np.nan) -> ThrustResult:
+    """Return the record of logs that do not show the thrust."""
+    nothing = (None, None, np.nan, None, np.nan, np.nan)
+    return ThrustResult("refused", [why], change, r2, *nothing, scaled=False)
+
+
+def _calm(hover_command: float, change: float, moved_m: float) -> str:
+    """Return why a log whose thrust hardly changes is no use, and what to fly: not what was flown."""
+    if hover_command <= 0.0:
+        return "the thrust that was sent is not positive: check its column and sign"
+    why = (
+        f"the thrust changes by {change:.1%} of hover (rms in {WINDOW_S:g} s), {LEAST_CHANGE:.0%} are needed"
+    )
+    if moved_m >= STEP_M:
+        return f"{why}: the height moved by {moved_m:.2f} m; fly higher or quicker steps of height"
+    return f"{why}: this log shows the command of hover, {three_digits(hover_command)}, and no lag; {STEPS}"
+
+
+def _refusal(moved_m: float, r2: float, weight_g: float, lag: Interval) -> str:
+    """Return why a fit is no use, or nothing."""
+    if r2 < LEAST_R2 or weight_g <= 0.0:
+        why = f"the thrust explains {max(r2, 0.0):.2f} of the height held out, {LEAST_R2} is needed: "
+        if moved_m < STEP_M:
+            return f"{why}{STEPS}"
+        return (
+            f"{why}gusts or noise are as large as its effect, or the columns are not the height and the "
+            "thrust that was sent, on one clock"
+        )
     if not WEIGHTS_G[0] <= weight_g <= WEIGHTS_G[1]:
-        return [f"the weight would be {weight_g:.2f} g: check the units of height and time"]
-    return []
+        return f"the weight would be {weight_g:.2f} g: check the units of height and time"
+    if not LAGS_S[0] < lag.value < LAGS_S[1]:
+        why = f"the lag would be {1e3 * lag.value:.0f} ms"
+        return f"{why}: if height and thrust are on one clock, fly quicker steps"
+    if lag.within > UNKNOWN_LAG_S:
+        return (
+            f"the lag is known within {1e3 * lag.within:.0f} ms, {1e3 * UNKNOWN_LAG_S:.0f} ms are needed; "
+            "fly longer, with quicker changes of height, in calm air"
+        )
+    return ""
 
 
-def _weaknesses(change: float, weight_g: float, gain: Interval, lag: Interval, windows: int) -> list[str]:
+def _weaknesses(change: float, r2: float, weight_g: float, lag: Interval, flown_s: float) -> list[str]:
     """Return why a fit is not good."""
     found = []
+    if r2 < GOOD_R2:
+        found.append(f"the model explains {r2:.2f} of the height held out; gusts?")
     if change < GOOD_CHANGE:
-        found.append(f"the thrust changes by {change:.1%} of hover (rms); {GOOD_CHANGE:.0%} are better")
-    if windows < GOOD_WINDOWS:
-        found.append(f"{WINDOW_S * windows:.0f} s of flight; {WINDOW_S * GOOD_WINDOWS:.0f} s are better")
-    if gain.within > VAGUE_SHARE * gain.value:
-        found.append(f"the gain is known within {gain.within / gain.value:.0%}")
+        found.append(
+            f"the thrust changes by {change:.1%} of hover (rms in {WINDOW_S:g} s); {GOOD_CHANGE:.0%} are "
+            "better"
+        )
+    if flown_s < GOOD_S:
+        found.append(f"{flown_s:.0f} s of flight; {GOOD_S:.0f} s are better")
     if lag.within > VAGUE_LAG_S:
         found.append(f"the lag is known within {1e3 * lag.within:.0f} ms")
     if not GOOD_WEIGHTS_G[0] <= weight_g <= GOOD_WEIGHTS_G[1]:
-        found.append(f"the weight would be {weight_g:.2f} g: the thrust is not in proportion to its command")
+        found.append(
+            f"a change of the command has {weight_g:.2f} times the effect that hover tells: the thrust is "
+            "not in proportion to its command"
+        )
     return found
 
 
-def _fit(segments: Sequence[Segment], *, first_half: bool = False) -> _Fit:
-    """Return the best fit to all windows, or to the first half of them."""
+def _fit(segments: Sequence[Segment], *, half: bool = False) -> _Fit:
+    """Return the best fit to all windows, or to every second block of them."""
 
-    def at(lag_s: float) -> _Fit:
-        windows = _windows(segments, lag_s)
-        windows = windows[: len(windows) // 2] if first_half else windows
-        rates = np.concatenate([each.rates for each in windows])
-        values = np.linalg.lstsq(rates, np.concatenate([each.height_m for each in windows]), rcond=None)[0]
-        return _Fit(lag_s, values, _errors(windows, values))
+    def solve(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rates, heights_m = _stack(cut_windows(segments, logs))
+        if half:
+            fitted = _blocks(len(heights_m)) == 0
+            rates, heights_m = rates[:, fitted], heights_m[fitted]
+        slopes, changes = rates.reshape(2, -1).T, heights_m.ravel()
+        values = np.linalg.lstsq(slopes, changes, rcond=None)[0]
+        return np.asarray(values), np.asarray(changes - slopes @ values)
 
-    powers = [at(lag_s).power for lag_s in _TRIED_S]
-    best = min(max(int(np.argmin(powers)), 1), len(_TRIED_S) - 2)
-    bounds = np.log(_TRIED_S[best - 1]), np.log(_TRIED_S[best + 1])
-    found = minimize_scalar(lambda log: at(np.exp(log)).power, bounds=bounds, method="bounded")
-    return at(float(np.exp(found.x)))
-
-
-def _power(values: FloatArray) -> float:
-    return float(values @ values)
-
-
-def _errors(windows: Sequence[_Window], values: FloatArray) -> list[FloatArray]:
-    """Return measured less modelled height (m,) of each window."""
-    return [each.height_m - each.rates @ values for each in windows]
-
-
-def _intervals(segments: Sequence[Segment], fit: _Fit) -> tuple[Interval, Interval, Interval]:
-    """Return gain, lag and sag, with intervals as those of the angles."""
-    after, before = (_windows(segments, fit.lag_s * np.exp(sign * _CHANGE)) for sign in (1.0, -1.0))
-    slopes = [
-        np.column_stack([here.rates, (late.rates - early.rates) @ fit.values / (2.0 * _CHANGE)])
-        for here, late, early in zip(_windows(segments, fit.lag_s), after, before, strict=True)
+    found = [
+        least_squares(lambda logs: solve(logs)[1], start, bounds=(_LOW, _HIGH), x_scale=0.3, diff_step=1e-3)
+        for start in _STARTS
     ]
-    variances = np.diag(newey_west(slopes, fit.errors, _CORRELATION))
+    logs = np.asarray(min(found, key=lambda one: float(one.cost)).x)
+    return _Fit(logs, solve(logs)[0])
+
+
+def _held_out_r2(segments: Sequence[Segment]) -> float:
+    """Return the R2 in every second block of windows of a fit to the others."""
+    fit = _fit(segments, half=True)
+    rates, heights_m = _stack(cut_windows(segments, fit.logs))
+    held_out = _blocks(len(heights_m)) == 1
+    left = heights_m[held_out] - _modelled(rates[:, held_out], fit.values)
+    return 1.0 - float(np.sum(left**2) / np.sum(heights_m[held_out] ** 2))
+
+
+def _stack(windows: Sequence[Windows]) -> tuple[FloatArray, FloatArray]:
+    """Return the rates (2, n, m) and heights (n, m) in the windows of all stretches."""
+    rates = np.concatenate([each.rates for each in windows], axis=1)
+    return rates, np.concatenate([each.height_m for each in windows])
+
+
+def _blocks(count: int) -> NDArray[np.int64]:
+    """Return for each window (count,) 0 if its block is fitted, 1 if it is held out.
+
+    A block lasts longer than a step: single windows, taken by turns, could miss all steps.
+    """
+    return np.arange(count) // _BLOCK % 2
+
+
+def _modelled(rates: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the sum (...) of rates (2, ...) times slope and drag (2,)."""
+    return np.asarray(values[0] * rates[0] + values[1] * rates[1])
+
+
+def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
+    """Return the sum of lag and dead time, with an interval as those of the angles."""
+    windows = cut_windows(segments, fit.logs)
+    columns = [[each.rates[0], each.rates[1]] for each in windows]
+    for index in range(2):
+        step = np.zeros(2)
+        step[index] = _STEP
+        after, before = (cut_windows(segments, fit.logs + sign * step) for sign in (1.0, -1.0))
+        for found, late, early in zip(columns, after, before, strict=True):
+            found.append(_modelled(late.rates - early.rates, fit.values) / (2.0 * _STEP))
+    slopes = [np.stack(each, axis=-1).reshape(-1, 4) for each in columns]
+    errors = [(each.height_m - _modelled(each.rates, fit.values)).ravel() for each in windows]
+    covariance = newey_west(slopes, errors, 2 * SIZE)[2:, 2:]
+    times_s = fit.times_s
+    variance = max(float(times_s @ covariance @ times_s), 0.0)
+    return Interval(float(times_s.sum()), NORMAL_95 * WIDENING * variance**0.5 + SURPLUS_LAG_S)
+
+
+def _hover(windows: Sequence[Windows], fit: _Fit) -> tuple[Interval, Interval]:
+    """Return the hover command in the middle of the logs, and its rise over it per second: the sag."""
+    middle_s = float(np.mean(np.concatenate([each.middle_s for each in windows])))
+    lines = [np.column_stack([np.ones(len(each.middle_s)), each.middle_s - middle_s]) for each in windows]
+    commands = [
+        (_modelled(each.rate_curvatures, fit.values) - each.height_curvature) / fit.values[0]
+        for each in windows
+    ]
+    line = np.linalg.lstsq(np.concatenate(lines), np.concatenate(commands), rcond=None)[0]
+    errors = [command - rows @ line for rows, command in zip(lines, commands, strict=True)]
+    hover, rise = line.tolist()
+    variances = np.diag(newey_west(lines, [each / hover for each in errors], _HOVER_CORRELATION))
     within = (NORMAL_95 * WIDENING * np.sqrt(np.maximum(variances, 0.0))).tolist()
-    gain = float(fit.values[0])
-    return (
-        Interval(gain, within[0] + SURPLUS_GAIN * abs(gain)),
-        Interval(fit.lag_s, fit.lag_s * within[3] + SURPLUS_S),
-        Interval(float(fit.values[1]) / gain, SAG_WIDENING * within[1] / abs(gain)),
-    )
+    return Interval(hover, abs(hover) * within[0]), Interval(rise / hover, SAG_WIDENING * within[1])
 
 
-def _vertical(segment: Segment, lag_s: float) -> FloatArray:
-    """Return the command (m,) of a stretch behind a lag, times its vertical share."""
-    assert segment.thrust is not None
-    keep = np.exp(-PERIOD_S / lag_s)
-    lagged = filter_command(
-        np.array([1.0 - keep]), np.array([1.0, -keep]), segment.thrust.means(segment.time_s)
-    )
-    return np.asarray(lagged * np.cos(segment.tilt_rad[0]) * np.cos(segment.tilt_rad[1]))
+def _changes(windows: Sequence[Windows]) -> tuple[float, float]:
+    """Return the mean of the command, and the rms of its changes in windows over that.
 
-
-def _change(segments: Sequence[Segment], lag_s: float) -> float:
-    """Return the standard deviation of the lagged command over its mean."""
-    whole = np.concatenate([_vertical(each, lag_s)[each.counted] for each in segments])
-    return float(whole.std() / abs(whole.mean()))
-
-
-def _windows(segments: Sequence[Segment], lag_s: float) -> list[_Window]:
-    """Return all windows of stretches."""
-    size = round(WINDOW_S / PERIOD_S)
-    time_s = PERIOD_S * np.arange(size)
-    lines, _ = np.linalg.qr(np.column_stack([np.ones(size), time_s]))
-    found = []
-    for segment in segments:
-        assert segment.height_m is not None
-        vertical = _vertical(segment, lag_s)
-        begun = int(np.argmax(segment.counted))
-        for first in range(begun, len(vertical) - size + 1, size):
-            here = slice(first, first + size)
-            late = -(segment.time_s[here] - segment.begun_s) * vertical[here]
-            rates = np.column_stack([_twice(vertical[here]), _twice(late), -0.5 * time_s * time_s])
-            height_m = segment.height_m[here]
-            found.append(_Window(rates - lines @ (lines.T @ rates), height_m - lines @ (lines.T @ height_m)))
-    return found
-
-
-def _twice(values: FloatArray) -> FloatArray:
-    """Return the double integral (m,) of samples (m,), which change evenly in between."""
-    for _ in range(2):
-        values = PERIOD_S * np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))])
-    return values
+    The changes are those in the windows that have the largest, `LEAST_S` of them; three digits.
+    """
+    command = np.concatenate([each.command for each in windows])
+    power = np.sort(command.var(axis=1))[-round(LEAST_S / (0.5 * WINDOW_S)) :]
+    mean = float(command.mean())
+    return mean, round(float(np.sqrt(power.mean())) / mean, 3) if mean > 0.0 else 0.0

@@ -5,17 +5,14 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.model.replay.log_replay import AXES, LogReplay
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.replay.log_replay import AXES, SETTLING_S, LogReplay
+from mambo_sil.model.replay.replay_verdict import SAME, ReplayVerdict, errors_of, judge
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 from mambo_sil.results.terminal import sentence, table
 
 CURVES: Final = "replay.csv"
 PICTURES: Final = ("replay.png", "replay.svg")
-
-SETTLING_S: Final = 1.0
-"""Time from the beginning of a log in which the estimates of the controller approach those of the flight."""
-GOOD_EXPLAINED: Final = 0.9
-"""Least share of the logged command that a replay of the controller that flew explains."""
 
 
 class LogReplaySummary(ReportedSummary):
@@ -29,27 +26,33 @@ class LogReplaySummary(ReportedSummary):
     steps: int
     resampled: bool
     equal_steps: int
-    """Steps whose logged command the controller repeats in every bit, as it is after `SETTLING_S`."""
+    """Steps whose logged command the controller repeats in every bit."""
     first_different_s: Number | None
     """Time since the beginning of the log of the first other step, None if there is none."""
     refused: int
-    explained: tuple[Number, Number]
-    """After `SETTLING_S`, 1 less the variance of the difference over that of the logged command."""
+    lost: int
+    """Updates that the log has lost; `steps` are the others."""
+    gaps: int
+    """Gaps that are too long to fill: behind each the controller begins anew."""
+    judged: int
+    """Steps `SETTLING_S` or more after a beginning of the controller; what follows is of these."""
+    miss: tuple[Number, Number]
+    """Change of the error over that of the logged command: half of the motion has less."""
+    error_rad: tuple[Number, Number]
+    """Error: half of the motion has less."""
     rms_rad: tuple[Number, Number]
     largest_rad: tuple[Number, Number]
-    largest_s: tuple[float, float]
-    """Time since the beginning of the log of the largest difference."""
+    largest_s: tuple[Number, Number]
+    """Time since the beginning of the log of the largest error."""
+    verdict: ReplayVerdict
+    missing: str
+    """What is missing for a verdict."""
     remarks: list[str]
 
     @property
-    def same_bits(self) -> bool:
-        """Whether every command is that of the log, bit for bit."""
-        return self.equal_steps == self.steps
-
-    @property
-    def good(self) -> bool:
-        """Whether the log is one of this controller."""
-        return self.same_bits or min(self.explained) >= GOOD_EXPLAINED
+    def good(self) -> bool | None:
+        """Whether the log is one of this controller; None if that cannot be told."""
+        return None if self.verdict is ReplayVerdict.CANNOT_TELL else self.verdict is ReplayVerdict.YES
 
     def section(self, folder: Path) -> Section:
         """Return the section of the report on this replay; raises ResultsError."""
@@ -72,14 +75,11 @@ class LogReplaySummary(ReportedSummary):
 def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogReplaySummary:
     """Compare logged and replayed commands."""
     time_s = replay.time_s - replay.time_s[0]
-    settled = time_s >= min(SETTLING_S, float(time_s[-1]))
     difference_rad = replay.replayed_rad - replay.logged_rad
-    unequal = np.flatnonzero((replay.replayed_rad != replay.logged_rad).any(axis=1))
-    late_rad, logged_rad = difference_rad[settled], replay.logged_rad[settled]
-    largest = np.abs(late_rad).argmax(axis=0)
-    with np.errstate(all="ignore"):
-        explained = 1.0 - late_rad.var(axis=0) / logged_rad.var(axis=0)
-        rms_rad = np.sqrt((late_rad * late_rad).mean(axis=0))
+    unequal = np.flatnonzero((difference_rad != 0.0).any(axis=1))
+    axes = errors_of(replay)
+    verdict, missing = judge(replay, axes)
+    rms_rad, largest_rad, largest_s = _of(difference_rad[replay.settled], time_s[replay.settled])
     return LogReplaySummary(
         log=log,
         source=source,
@@ -89,47 +89,79 @@ def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogRep
         equal_steps=len(time_s) - len(unequal),
         first_different_s=float(time_s[unequal[0]]) if len(unequal) else None,
         refused=int((replay.status != 0).sum()),
-        explained=(float(explained[0]), float(explained[1])),
-        rms_rad=(float(rms_rad[0]), float(rms_rad[1])),
-        largest_rad=(float(late_rad[largest[0], 0]), float(late_rad[largest[1], 1])),
-        largest_s=(float(time_s[settled][largest[0]]), float(time_s[settled][largest[1]])),
+        lost=replay.lost,
+        gaps=replay.gaps,
+        judged=int(replay.settled.sum()),
+        miss=(axes[0].miss, axes[1].miss),
+        error_rad=(axes[0].error_rad, axes[1].error_rad),
+        rms_rad=rms_rad,
+        largest_rad=largest_rad,
+        largest_s=largest_s,
+        verdict=verdict,
+        missing=missing,
         remarks=list(replay.remarks),
+    )
+
+
+Pair = tuple[float, float]
+
+
+def _of(difference_rad: FloatArray, time_s: FloatArray) -> tuple[Pair, Pair, Pair]:
+    """Return the rms of differences (k, 2), the largest ones and their times; NaN without any."""
+    if not len(time_s):
+        nothing = (np.nan, np.nan)
+        return nothing, nothing, nothing
+    rms_rad, largest = (
+        np.sqrt((difference_rad * difference_rad).mean(axis=0)),
+        np.abs(difference_rad).argmax(0),
+    )
+    return (
+        (float(rms_rad[0]), float(rms_rad[1])),
+        (float(difference_rad[largest[0], 0]), float(difference_rad[largest[1], 1])),
+        (float(time_s[largest[0]]), float(time_s[largest[1]])),
     )
 
 
 def finding(summary: LogReplaySummary) -> str:
     """Say in one line whether the log is one of this controller."""
-    if summary.same_bits:
+    miss = f"{100.0 * max(summary.miss):.2g} % of the logged command's motion"
+    match summary.verdict:
+        case ReplayVerdict.CANNOT_TELL:
+            return f"CANNOT TELL whether it was this controller: {summary.missing}"
+        case ReplayVerdict.NO:
+            limit = f"and should {100.0 * SAME:g} % at most"
+            return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
+    if summary.equal_steps == summary.steps:
         return f"all {summary.steps} commands of the log are those of this controller, bit for bit"
-    explained = min(summary.explained)
-    if summary.good:
-        return f"this controller explains {100.0 * explained:.4g} % of the logged command"
-    return (
-        f"NOT THIS CONTROLLER, or not its inputs: it explains {100.0 * max(explained, 0.0):.3g} % of the "
-        f"logged command, and should {100.0 * GOOD_EXPLAINED:g} %"
-    )
+    return f"the commands of the log are those of this controller: it misses {miss}"
 
 
 def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
     """Return name and value of what text and page show."""
     first = summary.first_different_s
+    later = "" if first is None else f", the first other one after {first:.2f} s"
     lines = [
-        ("equal in every bit", f"{summary.equal_steps} of {summary.steps} commands")
-        if first is None
-        else (
-            "equal in every bit",
-            f"{summary.equal_steps} of {summary.steps} commands, the first other one after {first:.2f} s",
-        ),
+        ("equal in every bit", f"{summary.equal_steps} of {summary.steps} commands{later}"),
         ("refused inputs", str(summary.refused)),
+        ("judged", f"{summary.judged} commands, {SETTLING_S:g} s or more after a beginning"),
     ]
-    for axis, explained, rms_rad, largest_rad, at_s in zip(
-        AXES, summary.explained, summary.rms_rad, summary.largest_rad, summary.largest_s, strict=True
+    if summary.lost:
+        behind = f"; it begins anew behind {summary.gaps} long gaps" if summary.gaps else ""
+        lines.append(("lost", f"{summary.lost} of {summary.lost + summary.steps} updates{behind}"))
+    for axis, miss, error_rad, rms_rad, largest_rad, at_s in zip(
+        AXES,
+        summary.miss,
+        summary.error_rad,
+        summary.rms_rad,
+        summary.largest_rad,
+        summary.largest_s,
+        strict=True,
     ):
         lines.append(
             (
-                f"{axis} after {SETTLING_S:g} s",
-                f"{100.0 * explained:.4g} % explained; difference {rms_rad:.3g} rad rms, "
-                f"{largest_rad:.3g} rad at {at_s:.2f} s",
+                axis,
+                f"misses {100.0 * miss:.2g} % of the motion; difference {error_rad:.2g} rad in the middle, "
+                f"{rms_rad:.2g} rad rms, {largest_rad:.2g} rad at {at_s:.2f} s",
             )
         )
     if summary.resampled:

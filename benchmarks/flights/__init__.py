@@ -1,0 +1,1 @@
+"""Flights of ours in one condition after another: limits, the height, starts within a millimetre."""

@@ -1,0 +1,1 @@
+"""Searches for the gains of laws without a model, on drawn flights."""

@@ -1,0 +1,1 @@
+"""Margins of drawn drones and of settings, beside what they fly."""

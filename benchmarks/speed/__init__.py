@@ -1,0 +1,1 @@
+"""Processor time of flights and of commands that fly."""

@@ -1,0 +1,77 @@
+"""No height: what stands for the third axis of a controller that has none."""
+
+import numpy as np
+
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.height import HeightBounds, HeightState, Lift, unknown_height
+from mambo_codegen.methods.shared.inputs import Rows
+from mambo_codegen.methods.shared.math import Real
+
+
+class NoHeight:
+    """Nothing to estimate, nothing to command, and tilts count as in hover: the interface of `HeightAxis`."""
+
+    def __init__(self, constants: QuadraticConstants) -> None:
+        self._computed = constants.numbers.computed
+
+    def hover(self, n: int) -> Real:
+        """Return level commands (n, 2)."""
+        return np.zeros((n, 2), self._computed)
+
+    def bounds(self, limits: Real) -> None:
+        """Return no limits of the height."""
+
+    def check_limits(self, limits: Real) -> Rows:
+        """Return that limits may be set (n,)."""
+        return np.ones(len(limits), np.bool_)
+
+    def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
+        """Return zeros."""
+        del thrust_m_s2
+        return unknown_height(command_rad[:, 0])
+
+    def limited(self, thrust_m_s2: Real) -> Real:
+        """Return the thrusts (n, 0)."""
+        return thrust_m_s2
+
+    def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
+        """Return zeros."""
+        del thrust_m_s2
+        return state
+
+    def observe(
+        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+    ) -> Lift:
+        """Return zeros, on no floor."""
+        del measured, tilt_rad, none_yet
+        return Lift(state, np.zeros_like(has_state), None)
+
+    def command_weight(self, state: HeightState) -> None:
+        """Return that a tilt counts no more than in hover."""
+
+    def aim(
+        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
+    ) -> tuple[HeightState, Rows]:
+        """Return zeros, and that no limit acts (n,)."""
+        del target, measured, bounds
+        return state, np.zeros_like(follows)
+
+    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+        """Return zeros."""
+        del lies
+        return state
+
+    def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:
+        """Return zeros."""
+        del cleared
+        return state
+
+    def over_weight(self, acceleration: Real, weight: Real | None) -> Real:
+        """Return the accelerations."""
+        del weight
+        return acceleration
+
+    def stored(self, state: HeightState) -> list[Real]:
+        """Return no columns: there is no nmpc_height_t."""
+        del state
+        return []

@@ -1,0 +1,27 @@
+"""Members of the structures of nmpc.h, arrays by element, in the order of their numbers."""
+
+from mambo_codegen.methods.shared.constants import Constants
+
+
+def state_members(constants: Constants) -> tuple[str, ...]:
+    """Return the members of nmpc_state_t."""
+    level = (*_pairs("position_m", "velocity_m_s"), "roll_rad", "pitch_rad", "yaw_rad")
+    return (*level, "height_m", "climb_m_s", "grounded") if constants.has_height else level
+
+
+def target_members(constants: Constants) -> tuple[str, ...]:
+    """Return the members of nmpc_target_t."""
+    is_given = constants.tracker is not None and constants.tracker.is_given
+    level = _pairs("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
+    upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
+    return (*level, *upward) if constants.has_height else level
+
+
+def limits_members(constants: Constants) -> tuple[str, ...]:
+    """Return the members of nmpc_limits_t."""
+    level = ("speed_m_s", "braking_m_s2", *_pairs("fence_min_m", "fence_max_m"), "tilt_rad")
+    return (*level, "floor_m", "ceiling_m", "climb_m_s", "descent_m_s") if constants.has_height else level
+
+
+def _pairs(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}[{axis}]" for name in names for axis in range(2))

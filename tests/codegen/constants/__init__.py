@@ -1,0 +1,1 @@
+"""Derived constants against their definitions, by other routes."""

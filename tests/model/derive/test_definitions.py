@@ -1,0 +1,214 @@
+"""Derived settings against their definitions: what a drone can do, found by programmes, scans and samples."""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from mambo_codegen.methods import method_of
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text
+from mambo_sil.model.derive.step_response import _answers, fit_steps
+from tests.support.scenarios import changed
+
+GENERIC = vehicle_toml.preset("generic")
+ROUNDED = 5e-3
+"""Three digits of a number, relative to it."""
+
+
+def settings_for(drone: VehicleFile) -> Settings:
+    """Return the settings in the file that is written for a drone."""
+    return controller_toml.parse(controller_text(drone, drone.name), drone.name)
+
+
+def strong(ratio: float, **sections: Any) -> VehicleFile:
+    """Return a drone whose largest thrust is `ratio` times its weight."""
+    return changed(GENERIC, altitude={"thrust_max_n": ratio * GENERIC.weight_n}, **sections)
+
+
+@pytest.mark.parametrize("ratio", [1.05, 1.2, 1.4, 1.6, 3.0])
+def test_the_tilt_limit_is_half_the_tilt_that_carries_the_weight(ratio: float) -> None:
+    """Found by tilting until the largest thrust no longer does; at most 0.5."""
+    drone = strong(ratio)
+    tilts_rad = np.linspace(0.0, 1.57, 100_001)
+    carries = drone.altitude.thrust_max_n * np.cos(tilts_rad) >= drone.body.mass_kg * GRAVITY_M_S2
+    half_rad = tilts_rad[carries].max() / 2
+    assert settings_for(drone).limits.tilt_rad == pytest.approx(min(half_rad, 0.5), rel=ROUNDED)
+
+
+@pytest.mark.parametrize(
+    ("gains", "trims_rad"),
+    [
+        ((0.8, 1.1), (0.03, -0.01)),
+        ((0.8, 1.1), (-0.05, 0.02)),
+        ((1.2, 0.9), (0.0, -0.04)),
+        ((1.0, 1.0), (0.0, 0.0)),
+    ],
+)
+def test_the_braking_is_a_share_of_what_the_tilt_gives(
+    gains: tuple[float, float], trims_rad: tuple[float, float]
+) -> None:
+    """Along the axis and the way that give least, by linear programmes; and the controller takes it."""
+    attitude = {
+        **{
+            name: {"gain": gain, "lag_s": 0.1, "dead_time_s": 0.02}
+            for name, gain in zip(("roll", "pitch"), gains, strict=True)
+        },
+        "acceleration_per_tilt_g": 0.9,
+        "roll_trim_rad": trims_rad[0],
+        "pitch_trim_rad": trims_rad[1],
+    }
+    settings = settings_for(changed(GENERIC, attitude=attitude))
+    limit_rad, slope, most = settings.limits.tilt_rad, 0.9 * GRAVITY_M_S2, []
+    for (gain, trim_rad), sign in itertools.product(zip(gains, trims_rad, strict=True), (1, -1)):
+        found = linprog([-sign * slope * gain], bounds=[(-limit_rad, limit_rad)])
+        most.append(-found.fun - sign * slope * trim_rad)
+    assert settings.limits.braking_m_s2 == pytest.approx(0.65 * min(most), rel=ROUNDED)
+    assert (settings.model.roll_gain, settings.model.pitch_gain) == gains
+    limiting = method_of(settings).limiting
+    assert limiting is not None
+    assert limiting.tilted.at(limit_rad) == pytest.approx(min(most), rel=1e-9)
+    assert BRAKING_SHARE == 0.65
+
+
+@pytest.mark.parametrize("rate_hz", [50, 70, 110, 120, 200, 740, 2000])
+def test_the_update_period_is_the_nearest_of_all_numbers_of_ticks(rate_hz: int) -> None:
+    """To 10 ms."""
+    drone = changed(GENERIC, attitude={"rate_hz": rate_hz}, sensors={"position_rate_hz": 10})
+    periods_s = [ticks / rate_hz for ticks in range(1, 100)]
+    nearest_s = min(periods_s, key=lambda period_s: abs(period_s - 0.01))
+    assert settings_for(drone).horizon.update_period_s == pytest.approx(nearest_s)
+
+
+@pytest.mark.parametrize("rate_hz", [10, 20, 50, 100])
+@pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.19])
+def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_s: float) -> None:
+    """At updates every 10 ms, over two seconds; at most 0.2 s, which settings allow."""
+    sensors = {"position_rate_hz": rate_hz, "position_delay_s": delay_s}
+    held = [update % round(100 / rate_hz) / 100 for update in range(200)]
+    expected_s = min(delay_s + sum(held) / len(held), 0.2)
+    assert settings_for(changed(GENERIC, sensors=sensors)).observer.age_s == pytest.approx(
+        expected_s, rel=ROUNDED
+    )
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.00105, 0.002, 0.3, 50.0])
+def test_the_noise_of_the_position_is_that_of_the_sensors(noise_m: float) -> None:
+    """At least a millimetre, at most the 10 m that settings allow."""
+    found = settings_for(changed(GENERIC, sensors={"position_noise_m": noise_m})).observer
+    assert found.position_noise == min(max(noise_m, 0.001), 10.0)
+
+
+@pytest.mark.parametrize("ratio", [1.3, 5.0])
+@pytest.mark.parametrize("lag_s", [0.01, 0.08, 0.9])
+@pytest.mark.parametrize("dead_time_s", [0.0, 0.15])
+def test_the_height_is_what_thrust_and_lag_allow(ratio: float, lag_s: float, dead_time_s: float) -> None:
+    """Lag and delay within what settings allow, thrust with a reserve, a descent that is braked."""
+    thrust = {"lag_s": lag_s, "dead_time_s": dead_time_s}
+    drone = strong(ratio, thrust=thrust, attitude={"rate_hz": 200}, sensors={"position_rate_hz": 100})
+    settings = settings_for(drone)
+    height = settings.height
+    assert height is not None
+    assert height.lag_s == pytest.approx(float(np.clip(lag_s, 0.03, 0.5)), rel=ROUNDED)
+    assert height.delay_s == pytest.approx(min(dead_time_s + 0.005, 0.1), rel=ROUNDED)
+    slow_s = 1.5 * (height.lag_s + height.delay_s)
+    assert height.response_time_s == pytest.approx(max(0.13, slow_s), rel=ROUNDED)
+    assert height.velocity_weight_s == pytest.approx(min(1.15 * height.response_time_s, 2.0), rel=0.05)
+    most_m_s2 = min(0.95 * drone.altitude.thrust_max_n / drone.body.mass_kg, 100.0)
+    assert height.thrust_max_m_s2 == pytest.approx(most_m_s2, rel=ROUNDED)
+    assert height.thrust_min_m_s2 == pytest.approx(0.3 * GRAVITY_M_S2, rel=0.02)
+    constants = method_of(settings)
+    braked_m_s = getattr(constants, "height").most_m_s[1]  # noqa: B009 - of the quadratic cost only
+    assert height.descent_m_s <= braked_m_s
+    assert height.descent_m_s == pytest.approx(
+        min(1.5, 0.265 * (height.thrust_max_m_s2 - GRAVITY_M_S2)), rel=0.01
+    )
+
+
+@pytest.mark.parametrize(("largest_m_s2", "has"), [(11.3, False), (11.45, True)])
+def test_a_drone_that_hardly_climbs_has_no_height(largest_m_s2: float, has: bool) -> None:
+    """Where less than 10.8 m/s^2 are left of its thrust, with the reserve, the section would be refused."""
+    thrust_max_n = largest_m_s2 * GENERIC.body.mass_kg
+    drone = changed(GENERIC, thrust={"lag_s": 0.1}, altitude={"thrust_max_n": thrust_max_n})
+    assert (settings_for(drone).height is not None) is has
+
+
+@pytest.mark.parametrize("lags_s", [(0.05, 0.4), (0.3, 0.1), (0.02, 0.03)])
+def test_the_response_time_is_the_mean_of_both_axes(lags_s: tuple[float, float]) -> None:
+    """Of lag plus dead time; at least 0.1 s."""
+    axes = {
+        name: {"gain": 1.0, "lag_s": lag_s, "dead_time_s": 0.02}
+        for name, lag_s in zip(("roll", "pitch"), lags_s, strict=True)
+    }
+    mean_s = np.mean([lag_s + 0.02 for lag_s in lags_s])
+    settings = settings_for(changed(GENERIC, attitude=axes))
+    assert settings.cost.response_time_s == pytest.approx(max(mean_s, 0.1), rel=ROUNDED)
+    assert (settings.model.roll_lag_s, settings.model.pitch_lag_s) == lags_s
+    assert math.isclose(settings.model.roll_delay_s, 0.02)
+
+
+@pytest.mark.parametrize(("braking_m_s2", "has"), [(0.105, True), (0.095, False)])
+def test_the_least_braking_is_the_least_that_settings_allow(braking_m_s2: float, has: bool) -> None:
+    """A drone that hardly tilts has limits as long as they are not refused."""
+    half_rad = braking_m_s2 / (0.65 * GRAVITY_M_S2)
+    limits = settings_for(strong(1.0 / math.cos(2.0 * half_rad))).limits
+    assert limits.braking_m_s2 == (pytest.approx(braking_m_s2, rel=ROUNDED) if has else 0.0)
+
+
+@pytest.mark.parametrize("largest_m_s2", [30.0, 51.0, 54.0, 130.5])
+def test_every_thrust_of_a_drone_is_in_the_range(largest_m_s2: float) -> None:
+    """The next whole number of m/s^2 above the largest; the default where that is enough."""
+    drone = changed(GENERIC, altitude={"thrust_max_n": largest_m_s2 * GENERIC.body.mass_kg})
+    found = settings_for(drone).ranges.thrust_acceleration_max_m_s2
+    assert found >= largest_m_s2 - 1e-9
+    assert (
+        found < largest_m_s2 + 1.0
+        or found == type(settings_for(GENERIC).ranges)().thrust_acceleration_max_m_s2
+    )
+
+
+def test_the_model_is_the_fit_of_each_axis() -> None:
+    """Of a drone whose inner loops are known, with three digits: lag, delay, integral part."""
+    drone = vehicle_toml.preset("mambo")
+    model = settings_for(drone).model
+    roll, pitch = fit_steps(drone)
+    for name, fit in (("roll", roll), ("pitch", pitch)):
+        for key, value in (
+            ("lag_s", fit.lag_s),
+            ("delay_s", fit.delay_s),
+            ("integral_1_s", fit.integral_1_s),
+        ):
+            assert getattr(model, f"{name}_{key}") == pytest.approx(value, rel=ROUNDED)
+    assert roll.lag_s != pytest.approx(pitch.lag_s, rel=0.1)
+
+
+def test_the_answer_to_a_step_begins_at_0_and_ends_at_1() -> None:
+    """Of roll and pitch, each to its own command, over three seconds of the simulation's ticks."""
+    drone = vehicle_toml.preset("mambo")
+    answers = _answers(drone)
+    assert answers.shape == (2, round(3.0 / drone.step_s) + 1)
+    assert answers[:, 0].tolist() == [0.0, 0.0]
+    assert answers[:, -1] == pytest.approx([1.0, 1.0], abs=0.03)
+    assert np.argmax(answers[1] > 0.5) < np.argmax(answers[0] > 0.5), "pitch is quicker"
+
+
+def test_a_drone_without_sensors_is_calm() -> None:
+    """With the noise of a filtered velocity, as with motion capture, and a third of its disturbance."""
+    seen = vehicle_toml.preset("generic").model_dump()
+    blind = settings_for(VehicleFile.model_validate(seen | {"sensors": {"kind": "none"}})).observer
+    captured = settings_for(GENERIC).observer
+    assert blind.velocity_noise == captured.velocity_noise == 0.15
+    assert (blind.disturbance_noise, captured.disturbance_noise) == (1.0, 3.0)
+    assert blind.position_noise == type(blind)().position_noise
+
+
+def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:
+    """That settings allow."""
+    assert settings_for(strong(1.00001)).limits.tilt_rad == 0.01

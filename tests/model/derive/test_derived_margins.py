@@ -1,0 +1,179 @@
+"""What `design` says of margins: the reserve of an axis, and which property is in the way."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from mambo_codegen.settings import controller_toml
+from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
+from mambo_sil.experiment.margins.corners import at_ends, corners
+from mambo_sil.experiment.margins.loop_margins import LoopMargins
+from mambo_sil.experiment.margins.many_drones import measure_drone
+from mambo_sil.model.derive.derived_margins import JudgedMargins, _reserve, _without, judge_margins
+from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.scenarios import CRAZYFLIE, changed
+
+GENERIC = vehicle_toml.preset("generic")
+
+
+def axis(*, gains: tuple[float, ...], delay_s: float = 9.0, growth_1_s: float = -1.0) -> Margins:
+    """Return the margins of a loop broken at the command and, with a second gain, at the motors."""
+    loops = [
+        LoopMargins(**dict.fromkeys(LoopMargins.model_fields, 7.0) | {"gain_up": gain, "delay_s": late_s})
+        for gain, late_s in zip(gains, (delay_s, 1e-6), strict=False)
+    ]
+    poles = Poles(least_damping=0.5, least_damped_rad_s=1.0, slowest_s=1.0, growth_1_s=growth_1_s)
+    shared: dict[str, Any] = {"poles": poles, "gust_to_place_s2": 1.0, "noise": {}, "stable": growth_1_s < 0}
+    if len(loops) == 1:
+        return HeightMargins(**shared, command=loops[0], gust_to_thrust=1.0, sensed_variation_m_s2=None)
+    return AxisMargins(
+        **shared,
+        axis="roll",
+        command=loops[0] if loops else None,
+        motors=loops[1] if loops else None,
+        gust_to_command_rad_s2_m=1.0,
+        sensed_variation_rad=None,
+    )
+
+
+@pytest.mark.parametrize(
+    ("margins", "reserve"),
+    [
+        (axis(gains=(3.0, 6.0)), 2.0),
+        (axis(gains=(6.0, 1.5)), 1.0),
+        (axis(gains=(1.2,)), 0.8),
+        (axis(gains=(6.0, 6.0), delay_s=0.06), 2.0),
+        (axis(gains=(3.0,), delay_s=0.015), 0.5),
+        (axis(gains=(math.inf,), delay_s=math.inf), math.inf),
+        (axis(gains=(), growth_1_s=0.3), -0.3),
+    ],
+)
+def test_the_reserve_is_the_least_margin_over_what_is_warned_of(margins: Margins, reserve: float) -> None:
+    """1.5 times the gain wherever the loop is broken, 30 ms at the command; minus the growth if unstable."""
+    assert _reserve(margins) == pytest.approx(reserve)
+
+
+THRUST = "\n[thrust]\nlag_s = 0.06\ndead_time_s = 0.02\n"
+FLOWN = vehicle_toml.parse(VEHICLES.text("crazyflie-flown") + THRUST, "mine", "mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("drone", "height", "changes"),
+    [
+        (
+            FLOWN,
+            True,
+            {
+                "dead_time_s of roll and pitch": {
+                    "attitude": {name: {"dead_time_s": 0.0} for name in ("roll", "pitch")}
+                },
+                "thrust.dead_time_s = 0.02": {"thrust": {"dead_time_s": 0.0}},
+                "sensors.kind": {"sensors": {"kind": "none"}},
+            },
+        ),
+        (
+            FLOWN,
+            False,
+            {
+                "dead_time_s of roll and pitch": {
+                    "attitude": {name: {"dead_time_s": 0.0} for name in ("roll", "pitch")}
+                },
+                "sensors.kind": {"sensors": {"kind": "none"}},
+            },
+        ),
+        (
+            CRAZYFLIE,
+            True,
+            {"rotors.lag_s": {"rotors": {"lag_s": 0.0}}, "sensors.kind": {"sensors": {"kind": "none"}}},
+        ),
+    ],
+)
+def test_a_drone_without_a_property_differs_in_nothing_else(
+    drone: VehicleFile, height: bool, changes: dict[str, dict[str, Any]]
+) -> None:
+    """Each property that it has, in words, and the drone without; those of the thrust with a height only."""
+    found = dict(_without(drone, height=height))
+    assert len(found) == len(changes)
+    for (words, other), (begin, sections) in zip(found.items(), changes.items(), strict=True):
+        assert words.startswith(begin)
+        if "sensors" in sections:
+            expected = drone.model_dump() | {"sensors": {"kind": "none"}}
+            assert other.model_dump(exclude_none=True) == VehicleFile.model_validate(expected).model_dump(
+                exclude_none=True
+            )
+        else:
+            assert other == changed(drone, **sections)
+
+
+@pytest.mark.parametrize("one", ["roll", "pitch"])
+def test_a_dead_time_of_one_axis_is_a_property_too(one: str) -> None:
+    """And without any, it is none."""
+    still = {"gain": 1.0, "lag_s": 0.1, "dead_time_s": 0.0}
+    axes = {"roll": still, "pitch": still} | {one: still | {"dead_time_s": 0.03}}
+    late = dict(_without(changed(GENERIC, attitude=axes), height=False))
+    none = dict(_without(changed(GENERIC, attitude={"roll": still, "pitch": still}), height=False))
+    assert [words.split(",")[0] for words in late if "dead" in words] == ["dead_time_s of roll and pitch"]
+    ends = ("0.03 and 0.0", "0.0 and 0.03")
+    assert next(iter(late)).endswith(ends[one == "pitch"])
+    assert not any("dead" in words for words in none)
+
+
+def judged(dead_time_s: float) -> JudgedMargins:
+    """Return what is said of the settings derived for a drone with that dead time."""
+    drone = changed(GENERIC, attitude={name: {"dead_time_s": dead_time_s} for name in ("roll", "pitch")})
+    return judge_margins(controller_toml.parse(controller_text(drone, "mine"), "mine"), drone)
+
+
+def test_a_quick_drone_is_not_warned_of() -> None:
+    """Each axis has its verdict, through the sensors of the drone."""
+    found = judged(0.0)
+    assert (found.warning, found.where) == (None, "through sensors mocap")
+    assert min(map(_reserve, found.axes)) >= 1.0
+    assert len(found.lines()) == len(found.axes)
+    assert all(line.endswith(f"({found.where})") for line in found.lines())
+
+
+def reserve_of(drone: VehicleFile, ends: Mapping[str, int]) -> float:
+    """Return the least reserve at ends of the intervals, with its own settings."""
+    settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
+    return min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "none")))
+
+
+@pytest.mark.parametrize(
+    ("gain_width", "dead_time_s"), [(0.2, 0.0), (0.6, 0.0), pytest.param(0.6, 0.15, marks=pytest.mark.long)]
+)
+def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dead_time_s: float) -> None:
+    """Each axis at its own; the cause is that without which the worst drone stands most."""
+    axis = {"gain": 1.0, "lag_s": 0.15, "dead_time_s": dead_time_s}
+    uncertainty = {"roll_gain": gain_width, "pitch_dead_time_s": 0.01}
+    sections = {"attitude": {"roll": axis, "pitch": axis}, "uncertainty": uncertainty}
+    drone = VehicleFile.model_validate(
+        changed(GENERIC, **sections).model_dump() | {"sensors": {"kind": "none"}}
+    )
+    settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
+    found, ends = judge_margins(settings, drone), list(corners(drone))
+    measured = [measure_drone(settings, at_ends(drone, one), "none") for one in ends]
+    assert [_reserve(axis) for axis in found.axes] == [
+        min(map(_reserve, of_one)) for of_one in zip(*measured, strict=True)
+    ]
+    assert found.where == "true state, at the worst of the intervals in [uncertainty]"
+    reserves = [min(map(_reserve, axes)) for axes in measured]
+    assert (found.warning is None) == (min(reserves) >= 1.0)
+    if found.warning is None:
+        return
+    worst = ends[reserves.index(min(reserves))]
+    prompt = changed(drone, attitude={name: {"dead_time_s": 0.0} for name in ("roll", "pitch")})
+    without = {
+        "the interval of attitude.roll.gain": reserve_of(drone, {**worst, "gain": 0}),
+        "the interval of attitude.pitch.dead": reserve_of(drone, {**worst, "dead_time_s": 0}),
+    }
+    if dead_time_s:
+        without["dead_time_s of roll and pitch"] = reserve_of(prompt, worst)
+    cause = max(without, key=lambda words: without[words])
+    assert f"the main cause is {cause}" in found.warning
+    enough = "large enough" if without[cause] >= 1.0 else "still too small"
+    assert found.warning.endswith(f"without it the margins are {enough}")
