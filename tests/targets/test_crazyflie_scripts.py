@@ -87,7 +87,9 @@ def test_goto_goes_along_x_and_back(scripts: dict[str, ModuleType], drone: Drone
     assert drone.names() == [*PREPARED, "takeoff", "go_to", *LANDED]
     moves = drone.of("go_to")
     assert [arguments[0] for _, arguments in moves] == [1.3, 1.0, 1.5, 1.0]
-    assert all(after - before >= arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves))
+    assert all(
+        after - before >= arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves)
+    )
 
 
 def test_a_stream_sends_full_states(scripts: dict[str, ModuleType], drone: Drone) -> None:

@@ -128,9 +128,7 @@ def test_it_watches_battery_and_supervisor_in_flight(
     assert ends[-3:] == STOPPED
 
 
-def test_an_error_in_flight_lands(
-    script: ModuleType, drone: Drone, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_error_in_flight_lands(script: ModuleType, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the firmware, in the time of a climb, and only then the motors stop."""
 
     def fail(*_: object) -> None:
