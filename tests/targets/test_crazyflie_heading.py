@@ -60,7 +60,7 @@ def test_thirty_degrees_are_found_and_landed(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Before the figure, within 0.3 m of the target; the sentence says the side, and the angle to 10 degrees."""
+    """Before the figure, within 0.3 m of the target; the sentence says the side, and roughly the angle."""
     conditions = DeskConditions(
         seed=4, camera_offset_ms=2, heading_rad=math.radians(heading_deg), **CONDITIONS[name]
     )

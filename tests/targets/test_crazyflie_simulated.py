@@ -15,7 +15,7 @@ from tests.support.scripts import SETTINGS, modules_of, run, without, write
 def test_a_simulated_flight_makes_the_same_calls(
     arguments: tuple[str, ...], scripts: dict[str, ModuleType], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It follows what they ask for, a hop of 0.3 m first, lands, and leaves the log of a flight, in metres and radians."""
+    """It follows what they ask for, with a hop before, lands, and leaves a log, in metres and radians."""
     assert run(scripts, *arguments, "--simulate", "--laps", "1") == 0
     printed = capsys.readouterr().out
     assert "simulated on crazyflie through motion capture" in printed
