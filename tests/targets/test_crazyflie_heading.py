@@ -1,5 +1,6 @@
 """The hop of fly.py: it finds a wrong heading on the desk, and no right one, whatever wind and sensors."""
 
+import itertools
 import math
 import re
 from pathlib import Path
@@ -50,17 +51,16 @@ def fly(
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("name", CONDITIONS)
-@pytest.mark.parametrize("heading_deg", [30.0, -30.0])
+@pytest.mark.parametrize("case", itertools.product((30.0, -30.0), CONDITIONS), ids=str)
 def test_thirty_degrees_are_found_and_landed(
-    heading_deg: float,
-    name: str,
+    case: tuple[float, str],
     app: Path,
     scripts: dict[str, ModuleType],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Before the figure, within 0.3 m of the target; the sentence says the side, and roughly the angle."""
+    heading_deg, name = case
     conditions = DeskConditions(
         seed=4, camera_offset_ms=2, heading_rad=math.radians(heading_deg), **CONDITIONS[name]
     )

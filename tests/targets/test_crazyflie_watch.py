@@ -3,6 +3,7 @@
 import math
 import shutil
 import tempfile
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -21,7 +22,7 @@ def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Dr
 
 
 LANDED, STOPPED = ["notify", "land", "stop", "close"], ["stop_setpoint", "notify", "stop", "close"]
-TROUBLES = {
+TROUBLES: dict[str, tuple[dict[str, float], str, list[str]]] = {
     "position": ({"nmpc.lost": 1}, "The drone lands: no position is measured.\n", LANDED),
     "status": (
         {"nmpc.status": 3},
@@ -94,8 +95,12 @@ def test_a_log_whose_folder_is_gone_goes_elsewhere(
         drone.calls.clear()
         drone.blocks.clear()
         at_call(
-            drone, "takeoff", 3.0, lambda: shutil.rmtree(stick), lambda gone=folder: shutil.rmtree(gone, True)
-        )  # type: ignore[misc]
+            drone,
+            "takeoff",
+            3.0,
+            partial(shutil.rmtree, stick),
+            partial(shutil.rmtree, folder, ignore_errors=True),
+        )
         assert run(scripts, "hover", "--log", str(stick / "flight.csv")) == 0
         printed = capsys.readouterr()
         assert f"The log cannot be written to {stick / 'flight.csv'}: No such file" in printed.err
