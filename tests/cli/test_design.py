@@ -29,8 +29,9 @@ def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
-    wrote, roll, pitch = said.splitlines()
+    wrote, flown, roll, pitch = said.splitlines()
     assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml"
+    assert flown == "flown for 10 s: stays at its target (true state)"
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")
     assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
@@ -70,10 +71,11 @@ def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
 
 @pytest.mark.long
 def test_it_warns_of_slow_motors() -> None:
-    """A Mambo with motors of 0.12 s is unstable through its sensors, and they are named."""
+    """A Mambo with motors of 0.12 s crashes and is unstable through its sensors, and they are named."""
     text = run("vehicles", "mambo")[0]
     Path("slow.toml").write_text(re.sub(r"(?m)^lag_s = .*", "lag_s = 0.12", text), "utf-8")
-    _, said = run("design", "slow.toml")
+    _, said = run("design", "slow.toml", code=1)
+    assert "flown for 10 s: CRASHES after " in said
     assert "UNSTABLE" in said
     warning = "warning: a loop tolerates less than 1.5 times the gain or 30 ms more delay; the main cause is "
     assert warning in unwrapped(said)
@@ -92,7 +94,7 @@ def test_tune_starts_from_it() -> None:
 def test_to_stdout_it_prints_the_file_alone() -> None:
     """Which is that of -o."""
     text, said = run("design", "generic", "-o", "-")
-    assert [line.partition(":")[0] for line in said.splitlines()] == ["roll", "pitch"]
+    assert [line.partition(":")[0] for line in said.splitlines()] == ["flown for 10 s", "roll", "pitch"]
     run("design", "generic", "-o", "made/generic.toml")
     assert Path("made/generic.toml").read_text("utf-8") == text
     assert controller_toml.parse(text, "stdout") == load("made/generic.toml")
@@ -124,6 +126,49 @@ def test_a_drone_without_settings_is_refused(old: str, new: str, said: str) -> N
     Path("mine.toml").write_text(DRONE.replace(old, new), "utf-8")
     assert run("design", "mine.toml", code=2)[1].startswith(said)
     assert not Path("controller.toml").exists()
+
+
+@pytest.mark.usefixtures("_no_tool")
+def test_without_a_compiler_the_file_is_written() -> None:
+    """And it says that nothing was flown."""
+    _, said = run("design", "crazyflie-flown")
+    assert "neither flown nor margins: no C compiler found" in said
+    assert load("controller.toml").cost.norm == "quadratic"
+
+
+def test_a_thrust_that_cannot_lift_is_refused() -> None:
+    """With key, value and rule; nothing is written."""
+    weak = (
+        "\n[altitude]\np_n_m = 1.0\nd_n_s_m = 0.5\nthrust_max_n = 1.962\n[thrust]\ngain = 0.3\nlag_s = 0.1\n"
+    )
+    Path("mine.toml").write_text(DRONE + weak, "utf-8")
+    for command in ("design", "margins", "fly"):
+        arguments = ("mine.toml",) if command == "design" else ("crazyflie", "--vehicle", "mine.toml")
+        assert run(command, *arguments, code=2)[1] == (
+            "mine.toml: altitude.thrust_max_n = 1.962 must be more than 3.27, the weight of body.mass_kg "
+            "over thrust.gain\n"
+        )
+    assert not Path("controller.toml").exists()
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("strong", "said"),
+    [
+        ("", "vehicle mine: altitude.thrust_max_n = 3.27 does not lift it with thrust.gain = 0.2, an end of"),
+        (
+            "\n[altitude]\np_n_m = 1.0\nd_n_s_m = 0.5\nthrust_max_n = 9.81\n",
+            "height: a drone that hovers with 3 times the expected thrust does not hold its height",
+        ),
+    ],
+)
+def test_intervals_that_no_controller_learns_have_no_margins(strong: str, said: str) -> None:
+    """Where the thrust may be a third of that in the file; the flight of the file's own drone is good."""
+    wide = "\n[thrust]\ngain = 0.6\nlag_s = 0.1\n[uncertainty]\nthrust_gain = 0.4\n"
+    Path("mine.toml").write_text(DRONE + strong + wide, "utf-8")
+    found = unwrapped(run("design", "mine.toml")[1])
+    assert "flown for 10 s: stays at its target (true state)" in found
+    assert f"no margins: {said}" in found
 
 
 def test_an_unknown_drone_is_refused() -> None:

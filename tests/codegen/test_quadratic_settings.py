@@ -80,6 +80,7 @@ def test_the_presence_of_a_section_gives_the_height() -> None:
     assert controller_toml.parse(controller_toml.to_toml(settings), "written") == settings
     assert "[height]" not in controller_toml.to_toml(level)
     assert settings.digest != level.digest
+    assert "thrust_gain" not in settings.in_use["height"]  # so that the C of older settings stays the same
 
 
 @pytest.mark.parametrize(
@@ -110,6 +111,11 @@ def test_the_presence_of_a_section_gives_the_height() -> None:
         (
             {"height.thrust_max_m_s2": 60.0},
             "height.thrust_max_m_s2 = 60.0 must be at most 50.0 (ranges.thrust_acceleration_max_m_s2)",
+        ),
+        (
+            {"height.thrust_gain": 0.25},
+            "height.thrust_max_m_s2 = 15.0 (the default) must be at most 0.25 (height.thrust_gain) times "
+            "50.0 (ranges.thrust_acceleration_max_m_s2)",
         ),
     ],
 )

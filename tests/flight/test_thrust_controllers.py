@@ -56,6 +56,22 @@ def test_engine_and_reference_have_the_bits_of_numpy(batch: str, scalar: str, ac
         assert_same(fly_compiled(engine, flight, CompiledController(settings, flight.flights)), expected)
 
 
+def test_a_command_is_the_thrust_over_the_gain() -> None:
+    """With a gain of 1/2 commands are twice as large, bit by bit, and so is what is told of the thrust."""
+    rng, told = np.random.default_rng(7), np.full(5, np.nan)
+    plain, halved = (
+        ThrustController(CompiledController(height_settings("float64", thrust_gain=gain), 5))
+        for gain in (1.0, 0.5)
+    )
+    for step in range(60):
+        state, target = rng.normal(0.0, 0.3, (5, 10)), rng.normal(0.0, 0.3, (5, 9))
+        state[:, 9] = step % 4 == 0
+        one, other = plain.step(state, target, told), halved.step(state, target, 2.0 * told)
+        assert (2.0 * one.thrust_m_s2).tobytes() == other.thrust_m_s2.tobytes()
+        assert one.command_rad.tobytes() == other.command_rad.tobytes()
+        told = np.where(rng.random(5) < 0.5, rng.uniform(5.0, 15.0, 5), np.nan)
+
+
 def test_faults_have_the_bits_of_numpy() -> None:
     """Every effect of a fault, limits that change in flight, and callers that level out to hover."""
     settings = height_settings()

@@ -8,6 +8,7 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.faults.fault import Fault
 from mambo_sil.experiment.faults.faults_in_c import native_faulty
@@ -350,7 +351,7 @@ def injected(path: Path, fault: Fault, inputs: FloatArray) -> FloatArray:
     memory = np.zeros((1, 8), np.uint8)
     address = int(_INTERFACE.cast("intptr_t", _INTERFACE.addressof(engine, "record")))
     inner = Native(ffi.cast("engine_controller_t", address), pointer("char *", memory), 0)
-    faulty = native_faulty(ffi.dlopen(str(path)), inner, [fault], memory)
+    faulty = native_faulty(ffi.dlopen(str(path)), inner, [fault], memory, (0.0, 0.0, GRAVITY_M_S2))
     record: Any = ffi.cast("engine_faulty_t *", faulty.instance(0))
     if not any(record.columns):  # an effect that does not use them must not show them
         record.columns = (2, 5)

@@ -34,7 +34,13 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "height.learn_limit": 0.1,
         "height.descent_m_s": 1.2,
     },
-    CRAZYFLIE | {"height.learn": "none", "height.delay_s": 0.0, "limits.braking_m_s2": 2.0},
+    CRAZYFLIE
+    | {
+        "height.learn": "none",
+        "height.thrust_gain": 0.4,
+        "height.delay_s": 0.0,
+        "limits.braking_m_s2": 2.0,
+    },
     CRAZYFLIE
     | {
         "target.acceleration": "given",
@@ -42,11 +48,13 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "limits.fence.x_max_m": 2.0,
         "damping.pitch_rate_feedback_s": 0.02,
         "height.learn_limit": 0.6,
+        "height.thrust_gain": 1.7,
         "ranges.position_m": 5.0,
         "ranges.velocity_m_s": 2.0,
     },
 )
-"""One move and two, all that can be learnt, with and without tracker, limits, fence, age and feedback."""
+"""One move and two, all that can be learnt, with and without tracker, limits, fence, age and feedback; drones
+that deliver less than the commanded thrust, and more."""
 
 
 def height_case(index: int, scalar: str) -> Settings:

@@ -18,7 +18,7 @@ from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians
 from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, SENT, PeriodicLoop, choose
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import LEVEL, Applied, flown, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import Applied, flown, hover_command, numbers_of
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, Offset, PositionController, fly
 from mambo_sil.flight.traces import Trace
@@ -73,7 +73,7 @@ class Scaled:
         """Return the outcome of the controller with other commands."""
         outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
         numbers = numbers_of(outcome)
-        hover = np.array(LEVEL[: numbers.shape[1]])
+        hover = np.array(hover_command(self.controller))
         factors = self.factors[:, : numbers.shape[1]]
         return Applied.of(hover + factors * (numbers - hover), outcome.status)
 

@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.limits_constants import LIMITS
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
+from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
@@ -157,8 +157,8 @@ def _thrust_command(settings: Settings) -> list[FmuVariable]:
     height = settings.height
     if height is None:
         return []
-    range_m_s2 = (height.thrust_min_m_s2, height.thrust_max_m_s2)
-    return [FmuVariable("thrust_command", "output", "m/s2", *range_m_s2, GRAVITY_M_S2, "thrust over mass")]
+    values = (*height.command_m_s2, hover_thrust(settings))
+    return [FmuVariable("thrust_command", "output", "m/s2", *values, "thrust over mass")]
 
 
 def _thrust_delivered(settings: Settings) -> list[FmuVariable]:

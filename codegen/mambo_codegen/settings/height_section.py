@@ -23,6 +23,13 @@ class Height(SettingsSection):
         description="Dead time of the thrust and its lags other than lag_s, in seconds, together: they count "
         "as one first-order lag.",
     )
+    thrust_gain: Number = Field(
+        1.0,
+        ge=0.1,
+        le=3,
+        description="Thrust over mass that the drone delivers for a commanded 1 m/s^2, in steady state: "
+        "commands are thrusts over this gain, and the learnt gain is relative to it.",
+    )
     response_time_s: Number = Field(
         0.13,
         ge=0.02,
@@ -41,15 +48,15 @@ class Height(SettingsSection):
         2.9,
         ge=0.5,
         le=9,
-        description="Least commanded thrust over mass, in metres per second squared: enough for roll and "
-        "pitch to be controlled.",
+        description="Least thrust over mass, in metres per second squared: enough for roll and pitch to be "
+        "controlled. The least command is this over thrust_gain.",
     )
     thrust_max_m_s2: Number = Field(
         15.0,
         ge=10.8,
         le=100,
-        description="Largest commanded thrust over mass, in metres per second squared: what the motors "
-        "deliver, less a reserve for roll, pitch and yaw.",
+        description="Largest thrust over mass, in metres per second squared: what the motors deliver, less a "
+        "reserve for roll, pitch and yaw. The largest command is this over thrust_gain.",
     )
     climb_m_s: Number = Field(
         2.0,
@@ -83,3 +90,8 @@ class Height(SettingsSection):
         description="Noise density of the rate of what is learnt, in m/s^3 per root Hz: a larger one learns "
         "faster. The other noises, age and outage are those of [observer].",
     )
+
+    @property
+    def command_m_s2(self) -> tuple[float, float]:
+        """The least and the largest command."""
+        return self.thrust_min_m_s2 / self.thrust_gain, self.thrust_max_m_s2 / self.thrust_gain

@@ -27,11 +27,11 @@ class SimulatedDrone:
 
     def place(self, position_m: FloatArray) -> None:
         """Let the drone hover at a position (3,) in NED, north."""
-        hover_command = airframe_of(self.drone).hover_command
+        hover_command = airframe_of(self.drone).hover_command / self.drone.thrust_gain
         self._state = self._vehicle.at_rest(position_m[:, np.newaxis], 0.0, hover_command)
         self._altitude = AltitudeLoop(AltitudeLaw("feedforward"), self.drone, 1)
         self._delivery = ThrustDelivery(self.drone, 1)
-        self._thrust_n = np.array([self.drone.weight_n])
+        self._thrust_n = np.array([self.drone.hover_demand_n])
 
     def advance(self, command_rad: FloatArray, lift: Vertical | float) -> None:
         """Hold roll and pitch (2,) for one update period, with heading 0.

@@ -185,7 +185,7 @@ def design(
         typer.Option(help="What measures the position, in place of the sensors in the vehicle's file."),
     ] = None,
 ) -> None:
-    """Derive settings from a drone; write a controller.toml that says the reason of each.
+    """Derive settings from a drone, write them with reasons, fly them; exit 1 if they do not fly well.
 
     For every drone that is not a shipped one, before you tune anything by hand.
     """
@@ -202,20 +202,34 @@ def design(
     if write_file(text, output, force=force):
         name = echo(str(output))
         typer.echo(f"wrote {name}; next: mambo-nmpc fly {name} --vehicle {source}", err=True)
-    _print_margins(settings, drone)
+    if not _print_judgement(settings, drone):
+        raise typer.Exit(1)
 
 
-def _print_margins(settings: "Settings", drone: "VehicleFile") -> None:
-    """Print how far derived settings are from instability on their drone; without a compiler say so."""
+def _print_judgement(settings: "Settings", drone: "VehicleFile") -> bool:
+    """Print how derived settings fly, and how far they are from instability; return whether they fly well.
+
+    Margins of what does not fly well are printed only if they say why. Without a compiler say so.
+    """
     from mambo_codegen.errors import BuildError
+    from mambo_sil.errors import FlightError
+    from mambo_sil.model.derive.derived_flight import fly_derived
     from mambo_sil.model.derive.derived_margins import judge_margins
 
     try:
-        said = judge_margins(settings, drone).lines()
+        flown = fly_derived(settings, drone)
     except BuildError as error:
+        typer.echo(sentence(f"neither flown nor margins: {error}"), err=True)
+        return True
+    typer.echo(sentence(flown.words), err=True)
+    try:
+        judged = judge_margins(settings, drone)
+        said = judged.lines() if flown.good or judged.warning else []
+    except FlightError as error:
         said = [f"no margins: {error}"]
     for line in said:
         typer.echo(sentence(line), err=True)
+    return flown.good
 
 
 def tune(

@@ -19,11 +19,11 @@ LOW_TARGET_M: Final = 0.5
 
 
 def crash_tilt_rad(drone: VehicleFile) -> float:
-    """Return the tilt beyond which the altitude loop's thrust limit does not carry the weight.
+    """Return the tilt beyond which the largest thrust does not carry the weight.
 
     That of the Mambo is 59 degrees.
     """
-    return float(arc_cosine(drone.weight_n / drone.altitude.thrust_max_n))
+    return float(arc_cosine(drone.weight_n / drone.largest_thrust_n))
 
 
 class Crash(BaseModel):

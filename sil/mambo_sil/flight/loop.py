@@ -243,7 +243,7 @@ def fly(
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = suite_of(flight, seeds, truth(state))
     trace = allocate_trace(times_s, flight.traced_targets, sensed=suite is not None)
-    drops, first = Drops(flight.link, seeds), first_command(state, lifting=lifting)
+    drops, first = Drops(flight.link, seeds), first_command(flight, state, lifting=lifting)
     caller, wire = _Caller(controller, drops, targets, trace, first), Wire(flight.link, first)
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
@@ -280,7 +280,7 @@ def fly(
     return trace
 
 
-def first_command(state: VehicleState, *, lifting: bool) -> FloatArray:
+def first_command(flight: Flight, state: VehicleState, *, lifting: bool) -> FloatArray:
     """Return the commands (2, n) that drones have before the first of their controllers: level.
 
     With controllers of the height (3, n): and with the thrust over mass of hover, on the ground 0.
@@ -289,7 +289,8 @@ def first_command(state: VehicleState, *, lifting: bool) -> FloatArray:
     level = np.zeros((2, len(z_m)))
     if not lifting:
         return level
-    return np.concatenate([level, np.where(z_m < 0.0, GRAVITY_M_S2, 0.0)[np.newaxis]])
+    hover_m_s2 = GRAVITY_M_S2 / flight.vehicle.drone.thrust_gain
+    return np.concatenate([level, np.where(z_m < 0.0, hover_m_s2, 0.0)[np.newaxis]])
 
 
 def suite_of(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
@@ -317,7 +318,8 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     command: PerFlight = nominal.command_min
     if flight.start == "hover":
         position_m[2] = vertical_target(first_target).z_m
-        command = np.where(position_m[2] < 0.0, nominal.hover_command, nominal.command_min)
+        hover = nominal.hover_command / flight.vehicle.drone.thrust_gain
+        command = np.where(position_m[2] < 0.0, hover, nominal.command_min)
     state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
     if flight.offset is None:
         return state

@@ -183,7 +183,7 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         pairs.insert(0, (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), weight_limits))
     if (height := settings.height) is not None:
         pairs.append((ApiFunction.SET_THRUST, THRUST, *_both(most_m_s2)))
-        limits_m_s2 = (height.thrust_min_m_s2,), (height.thrust_max_m_s2,)
+        limits_m_s2 = height.command_m_s2[:1], height.command_m_s2[1:]
         pairs.append((ApiFunction.SET_THRUST, THRUST, *limits_m_s2))
     for function, names, lows, highs in pairs:
         for index, name in enumerate(names):

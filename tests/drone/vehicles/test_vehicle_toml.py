@@ -57,6 +57,9 @@ def test_a_drone_reads_from_a_file(tmp_path: Path) -> None:
     assert (drone.altitude.p_n_m, drone.altitude.d_n_s_m) == (1.0, 0.5)
     assert drone.altitude.thrust_max_n == pytest.approx(2.0 * 0.981)
     assert drone.sensors.kind == "none"
+    assert vehicle_toml.parse(
+        FLOWN + "[thrust]\ngain = 0.4\nlag_s = 0.1\n", "weak", "weak.toml"
+    ).largest_thrust_n == (pytest.approx(2.0 * 0.981))
     jsonschema.validate(parse_document(FLOWN, "drone"), VehicleFile.json_schema())
 
 
@@ -132,6 +135,11 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
     "too weak": (
         FLOWN + "[altitude]\np_n_m = 1.0\nd_n_s_m = 1.0\nthrust_max_n = 0.98\n",
         ["altitude.thrust_max_n = 0.98 must be more than 0.981, the weight of body.mass_kg"],
+    ),
+    "too weak by the gain of its thrust": (
+        FLOWN
+        + "[altitude]\np_n_m = 1.0\nd_n_s_m = 1.0\nthrust_max_n = 1.9\n[thrust]\ngain = 0.5\nlag_s = 0.1\n",
+        ["altitude.thrust_max_n = 1.9 must be more than 1.962, the weight of body.mass_kg over thrust.gain"],
     ),
     "a rate that does not divide": (
         FLOWN + f'[sensors]\nkind = "mocap"\nposition_rate_hz = 60\n{MOCAP}',

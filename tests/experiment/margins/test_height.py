@@ -12,6 +12,7 @@ from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
+from mambo_sil.errors import FlightError
 from mambo_sil.experiment.margins.controller_jacobian import linear_controller
 from mambo_sil.experiment.margins.corners import intervals, uncertain
 from mambo_sil.experiment.margins.loop_margins import open_loop, sensitivity
@@ -77,6 +78,27 @@ def test_a_load_that_is_learnt_leaves_roll_and_pitch() -> None:
     settings = height_settings()
     light, heavy = (margins_of(settings, _loaded(load))[0].command for load in (1.0, 1.2))
     assert heavy.delay_s == pytest.approx(light.delay_s, rel=0.01)
+
+
+def test_a_slow_thrust_that_is_learnt_leaves_roll_and_pitch() -> None:
+    """Also if it is learnt by a controller whose model of the thrust lags much."""
+    slow = height_settings(lag_s=0.137, response_time_s=0.212, velocity_weight_s=0.24)
+    found, expected = (margins_of(slow, _loaded(load))[0].command for load in (1.2, 1.0))
+    assert found.delay_s == pytest.approx(expected.delay_s, rel=0.01)
+
+
+@pytest.mark.parametrize(("gain", "limit"), [(0.35, 0.5), (0.9, 0.0)])
+def test_a_thrust_that_cannot_be_learnt_has_no_margins(gain: float, limit: float) -> None:
+    """A controller that knows nothing of it hovers somewhere else, or not at all."""
+    text = VEHICLES.text("crazyflie-flown") + f"\n[thrust]\nlag_s = 0.06\ngain = {gain}\n"
+    drone = Vehicle.of(
+        vehicle_toml.parse(text.replace("thrust_max_n = 0.575", "thrust_max_n = 1.5"), "mine", "mine.toml")
+    )
+    with pytest.raises(
+        FlightError, match=f"does not hold its height with height.learn_limit = {limit:g} and"
+    ):
+        margins_of(height_settings(learn_limit=limit), drone)
+    assert margins_of(height_settings(thrust_gain=gain), drone)[HEIGHT].stable
 
 
 def test_linear_controller_commands_what_the_c_commands() -> None:

@@ -13,6 +13,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import SENSORS_OF, CurveName
 from mambo_sil.flight.scenario import Scenario, flight_of
@@ -135,6 +136,23 @@ def test_the_height_is_that_of_drones_whose_thrust_is_known() -> None:
     assert (slow.lag_s, slow.delay_s, slow.response_time_s) == (0.1, 0.045, 0.218)
     weak = {"thrust_max_n": 1.15 * GENERIC.weight_n}
     assert settings_for(changed(GENERIC, thrust={"lag_s": 0.1}, altitude=weak)).height is None
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("gain", [0.3, 0.1, 1.5])
+def test_the_gain_of_the_thrust_is_that_of_the_file(gain: float) -> None:
+    """Whatever a drone delivers for a command, it flies as one that delivers what is commanded."""
+    document = GENERIC.model_dump(exclude_none=True, exclude={"altitude"})
+    exact, other = (
+        VehicleFile.model_validate(document | {"thrust": {"gain": value, "lag_s": 0.137}})
+        for value in (1.0, gain)
+    )
+    height = settings_for(other).height
+    assert height is not None
+    assert (height.thrust_gain, height.thrust_max_m_s2) == (gain, 18.6)
+    expected, found = (flown(settings_for(one), one, "circle", noisy=True) for one in (exact, other))
+    assert found.position_m == pytest.approx(expected.position_m, abs=1e-3)
+    assert abs(found.position_m[1000:, :, 2] + HOVER_HEIGHT_M).max() < 0.01
 
 
 @pytest.mark.parametrize("rate_hz", [50, 200, 2000])

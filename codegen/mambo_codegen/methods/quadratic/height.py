@@ -20,7 +20,6 @@ from mambo_codegen.methods.quadratic.height_constants import (
 from mambo_codegen.methods.shared.inputs import Rows, choose
 from mambo_codegen.methods.shared.math import Real, clamp, confine
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 
@@ -111,11 +110,7 @@ class HeightAxis:
         self._least = constant((LEAST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
         self._most = constant((MOST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
         self._thrusts = [constant(value, "acceleration") for value in found.thrust_m_step2]
-        height = constants.settings.height
-        assert height is not None
-        self._thrusts_m_s2 = [
-            constant(value, "thrust") for value in (height.thrust_min_m_s2, height.thrust_max_m_s2)
-        ]
+        *self._thrusts_m_s2, self._hover_m_s2 = (constant(value, "thrust") for value in found.command_m_s2)
         self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
@@ -124,10 +119,9 @@ class HeightAxis:
         self._age = constant(age_steps, "age") if age_steps else None
         self._height_limit = constant(settings.ranges.position_m, "position")
         self._velocity_limit = constant(constants.observer.velocity_limit_m_step, "speed")
-        self._hover_m_s2 = constant(GRAVITY_M_S2, "thrust")
         self._up, self._down = constant(found.up_m, "position"), constant(found.down_m, "position")
         self._step2 = constant(found.step2_s2, "step2")
-        self._steps2 = constant(found.steps2_per_s2, "per_step2")
+        self._steps2 = constant(found.steps2_per_s2, "thrust_per_step2")
         self._lines = {
             name: (
                 *(constant(value, "factor") for value in (line.start, line.slope, line.two, 2.0)),

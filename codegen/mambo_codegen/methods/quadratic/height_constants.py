@@ -77,7 +77,9 @@ class HeightConstants:
     thrust_m_step2: (2,) least and largest thrust over mass.
     limit_m_step2: beyond every |a|, |c| and |u|.
     reach_steps:   1/k of the approach rate k: the law flies at the climb v_T + k (p_T - p).
-    step2_s2, steps2_per_s2: T_s^2 and its inverse.
+    thrust_gain:   delivered over commanded thrust.
+    step2_s2, steps2_per_s2: T_s^2 times that, and its inverse: from a command, m/s^2, to what it delivers.
+    command_m_s2:  (3,) least and largest command, and that of hover.
     up_m, down_m:  distances at which the law flies at the largest climb and descent.
     most_m_s:      (2,) largest limits of climb and descent: those that can be braked in time.
     thrust_inverse, weight_inverse: of the thrust's factors, and of (g + u)/g; the latter is never too small.
@@ -98,8 +100,10 @@ class HeightConstants:
     reach_steps: float
     up_m: float
     down_m: float
+    thrust_gain: float
     step2_s2: float
     steps2_per_s2: float
+    command_m_s2: tuple[float, float, float]
     most_m_s: tuple[float, float]
     thrust_inverse: Reciprocal
     weight_inverse: Reciprocal
@@ -121,6 +125,7 @@ def height_constants(settings: Sections) -> HeightConstants | None:
     height, step_s = settings.height, settings.horizon.update_period_s
     if height is None:
         return None
+    delivered_s2 = step_s * step_s * height.thrust_gain
     rows, law = np.array(attitude_solution(step_s, _loop(height))["rows"]), _law(settings, height)
     gravity = GRAVITY_M_S2 * (step_s * step_s)
     gain = observer_gain(settings, height.disturbance_noise)
@@ -146,8 +151,10 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         reach_steps=reach_steps,
         up_m=reach_steps * step_s * height.climb_m_s,
         down_m=reach_steps * step_s * height.descent_m_s,
-        step2_s2=step_s * step_s,
-        steps2_per_s2=1 / (step_s * step_s),
+        thrust_gain=height.thrust_gain,
+        step2_s2=delivered_s2,
+        steps2_per_s2=1 / delivered_s2,
+        command_m_s2=(*height.command_m_s2, GRAVITY_M_S2 / height.thrust_gain),
         most_m_s=(climb, descent),
         thrust_inverse=_reciprocal(*shares),
         weight_inverse=_never_too_small(_reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
@@ -161,9 +168,10 @@ def refusals(settings: Sections) -> list[Refusal]:
     if height is None:
         return []
     refused = []
-    most_m_s2 = settings.ranges.thrust_acceleration_max_m_s2
-    if height.thrust_max_m_s2 > most_m_s2:
-        rule = f"must be at most {most_m_s2!r} (ranges.thrust_acceleration_max_m_s2)"
+    most_m_s2, gain = settings.ranges.thrust_acceleration_max_m_s2, height.thrust_gain
+    if height.command_m_s2[1] > most_m_s2:
+        times = "" if gain == 1.0 else f"{gain!r} (height.thrust_gain) times "
+        rule = f"must be at most {times}{most_m_s2!r} (ranges.thrust_acceleration_max_m_s2)"
         refused.append(Refusal("height", "thrust_max_m_s2", rule))
     try:
         solution = _solution(settings, height)
@@ -193,7 +201,6 @@ def height_context(height: HeightConstants | None) -> dict[str, object]:
     return {
         "height": height,
         "height_quantities": [f"row_{state}" for state in ROW_STATES],
-        "gravity_m_s2": GRAVITY_M_S2,
         "cosine_terms": COSINE_TERMS,
         "least_cosine": LEAST_COSINE,
         "steepest_rad": STEEPEST_RAD,

@@ -92,6 +92,7 @@ def vertical_bits(height: HeightConstants) -> dict[str, int]:
         "per_gravity": fractional_bits(height.per_gravity),
         "reach": fractional_bits(height.reach_steps),
         "step2": fractional_bits(height.step2_s2),
+        "thrust_per_step2": fractional_bits(height.steps2_per_s2),
     }
 
 
@@ -102,7 +103,7 @@ def vertical_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "gravity_product": bits["per_gravity"] + bits["acceleration"] - FACTOR_BITS,
         "angle_square": (2 * bits["angle"]) - SINE_BITS,
         "step2_product": bits["step2"] + bits["thrust"] - bits["acceleration"],
-        "thrust_product": bits["per_step2"] + bits["acceleration"] - bits["thrust"],
+        "thrust_product": bits["thrust_per_step2"] + bits["acceleration"] - bits["thrust"],
         "factor_product": FACTOR_BITS,
         "to_factor": SINE_BITS - FACTOR_BITS,
     }

@@ -49,7 +49,7 @@ class Quadratic(QuadraticConstants, Method):
     setter: ClassVar[str] = "set_command"
     digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
     iterates: ClassVar[bool] = False
-    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS)
+    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS, "height.thrust_gain")
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec sine_cosine"),
         "refuse_nan": (

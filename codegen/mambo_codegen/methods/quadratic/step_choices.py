@@ -27,6 +27,7 @@ class StepChoices:
 
     estimated, none_yet: comparisons of `missed` with NMPC_NO_ESTIMATE: there is an estimate, there is none.
     lift_of:    what the lift of the height depends on beside the thrust.
+    per_step2:  the constant that makes a command of a thrust over mass per squared step.
     own:        parts of the state that a step copies, for the compiler to keep them in registers.
     places:     where attitude model and observer are.
     locals:     the variables that only a height or limits need.
@@ -46,6 +47,7 @@ class StepChoices:
     estimated: str
     none_yet: str
     lift_of: str
+    per_step2: str
     own: tuple[str, ...]
     places: Mapping[str, str]
     locals: tuple[str, ...]
@@ -66,6 +68,12 @@ class StepChoices:
     closing: tuple[str, ...]
 
 
+def _per_step2(constants: QuadraticConstants) -> str:
+    """Return the constant that makes a command of a thrust over mass per squared step."""
+    of_its_own = constants.height is not None and constants.height.thrust_gain != 1.0
+    return "NMPC_THRUST_PER_STEP2_S2" if of_its_own else "NMPC_STEPS2_PER_S2"
+
+
 def step_choices(constants: QuadraticConstants) -> StepChoices:
     """Return what the template of the step chooses by the settings."""
     has_height, has_limits, tracker = constants.has_height, constants.has_limits, constants.tracker
@@ -81,6 +89,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         estimated=estimated,
         none_yet=">=" if has_limits else "==",
         lift_of="height, " if learns_gain else "",
+        per_step2=_per_step2(constants),
         own=own,
         places={part: f"own_{part}" if part in own else f"self->{part}" for part in ("attitude", "observer")},
         locals=_locals(has_height=has_height, has_limits=has_limits),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods import Method, Step, method_of
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import COMMAND, THRUST
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.connection import Connection
@@ -39,7 +39,7 @@ class BoardStep:
     @classmethod
     def level(cls, method: Method, status: int) -> "BoardStep":
         """Return level attitude, with a height at the thrust of hover."""
-        thrust_m_s2 = np.array([GRAVITY_M_S2]) if method.has_height else None
+        thrust_m_s2 = np.array([hover_thrust(method.settings)]) if method.has_height else None
         return cls(np.zeros((1, 2)), np.array([status]), thrust_m_s2)
 
 

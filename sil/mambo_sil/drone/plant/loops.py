@@ -20,8 +20,8 @@ TAKE_OFF_EXCESS: Final = 0.45
 
 
 def take_off_thrust_n(drone: VehicleFile) -> float:
-    """Return the constant total thrust of the first second of a take-off."""
-    return drone.weight_n * (1.0 + TAKE_OFF_EXCESS)
+    """Return the constant demand of thrust in the first second of a take-off."""
+    return drone.hover_demand_n * (1.0 + TAKE_OFF_EXCESS)
 
 
 def altitude_thrust(

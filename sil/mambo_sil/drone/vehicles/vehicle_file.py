@@ -50,14 +50,21 @@ class VehicleFile(VehicleSection):
     @model_validator(mode="before")
     @classmethod
     def _with_altitude(cls, document: Any) -> Any:
-        """Give a drone without an altitude loop one of 10 1/s^2 and 5 1/s, and twice its weight of thrust."""
+        """Give a drone without an altitude loop one of 10 1/s^2 and 5 1/s, and twice its weight of thrust.
+
+        That is what it delivers for the largest demand.
+        """
         if not isinstance(document, Mapping) or "altitude" in document:
             return document
         body = document.get("body")
         mass_kg = body.get("mass_kg") if isinstance(body, Mapping) else None
         if not isinstance(mass_kg, int | float) or not 0.0 < mass_kg < 1e6:
             mass_kg = 1.0  # the fault of the mass is reported
-        thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2
+        thrust = document.get("thrust")
+        gain = thrust.get("gain", 1.0) if isinstance(thrust, Mapping) else 1.0
+        if not isinstance(gain, int | float) or not 0.0 < gain < 1e6:
+            gain = 1.0  # likewise
+        thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2 / gain
         gains = {"p_n_m": 10.0 * mass_kg, "d_n_s_m": 5.0 * mass_kg, "thrust_max_n": thrust_max_n}
         return {**document, "altitude": gains}
 
@@ -93,9 +100,10 @@ class VehicleFile(VehicleSection):
         if self.rotors is not None and self.rotors.command_min >= self.rotors.command_max:
             least = f"{self.rotors.command_min:g} (rotors.command_min)"
             yield self._fault("rotors", "command_max", f"must be more than {least}")
-        if self.altitude.thrust_max_n <= self.weight_n:
-            weight = f"{self.weight_n:.4g}, the weight of body.mass_kg"
-            yield self._fault("altitude", "thrust_max_n", f"must be more than {weight}")
+        if self.largest_thrust_n <= self.weight_n:
+            weight = f"{self.hover_demand_n:.4g}, the weight of body.mass_kg"
+            over = "" if self.thrust is None else " over thrust.gain"
+            yield self._fault("altitude", "thrust_max_n", f"must be more than {weight}{over}")
         rate_hz = self.attitude.rate_hz
         if isinstance(self.sensors, MocapSensors) and rate_hz % self.sensors.position_rate_hz != 0:
             yield self._fault(
@@ -117,6 +125,21 @@ class VehicleFile(VehicleSection):
     def weight_n(self) -> float:
         """The weight, which the altitude loop adds to its demand."""
         return float(self.body.mass_kg * GRAVITY_M_S2)
+
+    @property
+    def thrust_gain(self) -> float:
+        """Steady thrust over the demanded one."""
+        return 1.0 if self.thrust is None else self.thrust.gain
+
+    @property
+    def hover_demand_n(self) -> float:
+        """The demanded thrust that carries the weight."""
+        return self.weight_n / self.thrust_gain
+
+    @property
+    def largest_thrust_n(self) -> float:
+        """The thrust that the drone delivers for the largest demand."""
+        return self.thrust_gain * self.altitude.thrust_max_n
 
     @property
     def inertia_kg_m2(self) -> tuple[float, float, float]:

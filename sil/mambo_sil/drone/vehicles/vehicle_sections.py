@@ -154,7 +154,9 @@ class AltitudeGains(VehicleSection):
 
     p_n_m: Gain = Field(description="Thrust per metre of height error.")
     d_n_s_m: Gain = Field(description="Thrust per m/s of vertical speed, against it.")
-    thrust_max_n: Positive = Field(description="Largest total thrust; more than the weight.")
+    thrust_max_n: Positive = Field(
+        description="Largest demanded thrust; what it gives is more than the weight."
+    )
 
 
 class ThrustResponse(VehicleSection):

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.drone.plant.arrays import IntArray
 from mambo_sil.experiment.faults.fault import (
     Alteration,
@@ -21,7 +22,6 @@ from mambo_sil.experiment.faults.fault import (
     WrapYaw,
 )
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import LEVEL
 from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign, native
 
@@ -31,11 +31,18 @@ _EFFECTS: Final = (KeepInputs, FreezeState, SetState, ScaleState, ShiftState, Wr
 
 
 def native_faulty(
-    engine: Any, inner: Native, faults: Sequence[Fault | None], instances: NDArray[np.uint8] | None
+    engine: Any,
+    inner: Native,
+    faults: Sequence[Fault | None],
+    instances: NDArray[np.uint8] | None,
+    hover: Sequence[float],
 ) -> Native:
-    """Return n controllers with faults around `inner`; `instances` as in `FaultyController`."""
+    """Return n controllers with faults around `inner`.
+
+    hover: the command before the first one, two or three numbers. `instances` as in `FaultyController`.
+    """
     chosen = [fault or _NONE for fault in faults]
-    histories = [np.tile(LEVEL, (fault.late_updates + 1, 1)) for fault in chosen]
+    histories = [np.tile((*hover, 0.0)[:3], (fault.late_updates + 1, 1)) for fault in chosen]
     saved = None if instances is None else np.empty_like(instances[0])
     records = ffi.new("engine_faulty_t[]", len(chosen))
     for row, (fault, history) in enumerate(zip(chosen, histories, strict=True)):
@@ -75,7 +82,8 @@ def _fill_alteration(record: Any, alter: Alteration) -> None:
 
 def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:
     """Return n callers with `patience` (n,) around `inner` that reset `compiled`."""
-    reset, level = compiled.native_reset([LEVEL if inner.lifts else LEVEL[:2]])
+    hover_m_s2 = hover_thrust(compiled.settings)
+    reset, level = compiled.native_reset([(0.0, 0.0, hover_m_s2) if inner.lifts else (0.0, 0.0)])
     memory = native(engine, compiled)
     records = ffi.new("engine_levelling_t[]", len(patience))
     for row, patient in enumerate(patience.tolist()):
@@ -83,6 +91,6 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.controller, record.self = inner.step, inner.instance(row)
         record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
         record.level, record.patience = pointer("char *", level), patient
-        record.hover_m_s2, record.lifting = LEVEL[2], inner.lifts
+        record.hover_m_s2, record.lifting = hover_m_s2, inner.lifts
     kept = inner, memory, level
     return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept, inner.lifts)

@@ -16,7 +16,7 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import ControllerInput, Fault
 from mambo_sil.experiment.faults.faults_in_c import native_faulty, native_levelling
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import LEVEL, Applied, flown, lifts, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import Applied, flown, hover_command, numbers_of
 from mambo_sil.flight.engine.native import Native
 from mambo_sil.flight.loop import PositionController
 
@@ -42,7 +42,7 @@ class FaultyController:
         self._began: dict[int, ControllerInput] = {}
         self._update = 0
         latest = max((fault.late_updates for _, fault in self._faults), default=0)
-        level = np.tile(LEVEL if lifts(self.controller) else LEVEL[:2], (len(faults), 1))
+        level = np.tile(hover_command(self.controller), (len(faults), 1))
         self._computed = deque([level] * (latest + 1), maxlen=latest + 1)
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
@@ -71,7 +71,7 @@ class FaultyController:
 
     def wrap(self, engine: Any, inner: Native) -> Native:
         """Return the same around `inner` in the engine, for one flight of each controller from its start."""
-        return native_faulty(engine, inner, self._given, self._instances)
+        return native_faulty(engine, inner, self._given, self._instances, hover_command(self.controller))
 
 
 class LevellingCaller:
@@ -85,7 +85,7 @@ class LevellingCaller:
         self, controller: PositionController, compiled: CompiledController, patience: IntArray
     ) -> None:
         self.controller = flown(controller)
-        self._level = np.array(LEVEL if lifts(self.controller) else LEVEL[:2])
+        self._level = np.array(hover_command(self.controller))
         self._compiled = compiled
         self._patience = patience
         self._refused = np.zeros(len(patience), np.int64)

@@ -1,21 +1,30 @@
 """The generated C as a linear system: copies of its memory with one number changed, stepped once."""
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import flown, numbers_of
 
 _SETTLING_STEPS: Final = 100
-_LEARNING_S: Final = 10.0
-"""Time in which a controller of the height learns the thrust of hover of a drone."""
+_LEARNING_S: Final = 30.0
+"""Time in which a controller of the height must have learnt the thrust of hover of a drone."""
+_RAMP_S: Final = 5.0
+"""Time in which a drone gets as heavy as it is: at once it could swing with thrust at its limit for ever."""
+_STILL: Final = 1e-6
+"""A controller in whose memory no number changes by more in a second is at rest."""
+_ON_TARGET_M: Final = 1e-3
+"""A controller that has learnt the thrust holds the height this closely."""
 _CHANGE: Final = 1e-6
 """Change of one number of memory or input; the law is linear there, so only rounding depends on it."""
 
@@ -40,11 +49,12 @@ def has_linear_law(settings: Settings) -> bool:
     return method_of(settings).linear_law is not None
 
 
+@lru_cache(maxsize=16)
 def linear_controller(settings: Settings, load: float = 1.0) -> LinearController:
     """Return the C of `settings`, whose law must be linear, with scalar type float64 as a linear system.
 
     `load` is the thrust over mass that a drone needs to hover, over g; only controllers of the height see it.
-    Raises BuildError, CacheError.
+    Raises BuildError, CacheError; FlightError if they cannot hover with it.
     """
     settings = with_option(settings, "code.scalar", "float64")
     settled = CompiledController(settings)
@@ -85,16 +95,42 @@ def _learn(
 ) -> tuple[FloatArray, int]:
     """Let a controller hold the height of a point mass that needs a load; return its state and all it stores.
 
-    The point mass is at its target then, but for a controller that learns nothing.
+    Its thrust lags and its state is as old as the controller models it, so that the loop comes to rest
+    whatever they are. It is at its target then, but for a controller that learns nothing.
+    Raises FlightError if it does not come to rest there.
     """
-    state, period_s, stored = state.copy(), controller.settings.horizon.update_period_s, 0
-    for _ in range(round(_LEARNING_S / period_s)):
-        outcome = _step(controller, state, target)
+    settings, height = controller.settings, controller.settings.height
+    assert height is not None
+    period_s, age_s = settings.horizon.update_period_s, settings.observer.age_s
+    delayed_share = 1.0 - math.exp(-period_s / height.delay_s) if height.delay_s else 1.0
+    lagged_share = 1.0 - math.exp(-period_s / height.lag_s)
+    delayed_m_s2 = thrust_m_s2 = hover_thrust(settings)
+    expected, seen = 1.0 / height.thrust_gain, state.copy()
+    height_m, climb_m_s, lift_m_s2 = float(target[0, 6]), 0.0, 0.0
+    updates_per_s, before = round(1.0 / period_s), np.zeros(0)
+    for second in range(round(_LEARNING_S)):
+        for update in range(updates_per_s):
+            seen[0, 7:9] = height_m - age_s * climb_m_s, climb_m_s - age_s * lift_m_s2
+            outcome = _step(controller, seen, target)
+            delayed_m_s2 += delayed_share * (float(outcome.thrust_m_s2[0]) - delayed_m_s2)
+            thrust_m_s2 += lagged_share * (delayed_m_s2 - thrust_m_s2)
+            grown = min((second + update * period_s) / _RAMP_S, 1.0)
+            lift_m_s2 = thrust_m_s2 / (expected + grown * (load - expected)) - GRAVITY_M_S2
+            height_m += period_s * (climb_m_s + 0.5 * period_s * lift_m_s2)
+            climb_m_s += period_s * lift_m_s2
         stored = outcome.stored.shape[1]
-        lift_m_s2 = outcome.thrust_m_s2[0] / load - GRAVITY_M_S2
-        state[:, 7] += period_s * (state[:, 8] + 0.5 * period_s * lift_m_s2)
-        state[:, 8] += period_s * lift_m_s2
-    return state, stored
+        now = _numbers(controller, stored).copy()
+        if second > _RAMP_S and np.abs(now - before).max() < _STILL:
+            break
+        before = now
+    off_m = abs(height_m - float(target[0, 6]))
+    if abs(lift_m_s2) > _STILL or (height.learn != "none" and off_m > _ON_TARGET_M):
+        raise FlightError(
+            f"height: a drone that hovers with {load * height.thrust_gain:.3g} times the expected thrust "
+            f"does not hold its height with height.learn_limit = {height.learn_limit:g} "
+            f"and height.thrust_max_m_s2 = {height.thrust_max_m_s2:g}; derive settings from its vehicle.toml"
+        )
+    return seen, stored
 
 
 def _step(controller: CompiledController, state: FloatArray, target: FloatArray) -> Any:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.errors import FlightError
 
 Ends = Mapping[str, int]
 """Of each property with an interval: -1 for its lower end, 1 for its upper end, 0 for the value itself."""
@@ -63,13 +64,23 @@ def corners(drone: VehicleFile) -> Iterator[Ends]:
 
 
 def at_ends(drone: VehicleFile, ends: Ends) -> VehicleFile:
-    """Return a drone with its properties at ends of their intervals, within the ranges of a vehicle.toml."""
+    """Return a drone with its properties at ends of their intervals, within the ranges of a vehicle.toml.
+
+    Raises FlightError if its thrust does not lift it there.
+    """
     document = drone.model_dump(exclude_none=True)
     for name, keys in intervals(drone).items():
         for key, width in keys:
             section, last = _section(document, key), key.rpartition(".")[2]
             low, high = _RANGES.get(last, _RANGE)
             section[last] = min(max(section[last] + ends[name] * width, low), high)
+    if "thrust" in document:
+        gain, most_n = document["thrust"]["gain"], drone.altitude.thrust_max_n
+        if gain * most_n <= drone.weight_n:
+            raise FlightError(
+                f"vehicle {echo(drone.name)}: altitude.thrust_max_n = {most_n:g} does not lift it with "
+                f"thrust.gain = {gain:g}, an end of the interval in [uncertainty]"
+            )
     return VehicleFile.model_validate(document)
 
 

@@ -142,9 +142,8 @@ def drone_jacobians(flight: Flight, axes: int = LEVEL_AXES) -> DroneJacobians:
 
 def hover_thrust_n(vehicle: Vehicle) -> PerFlight:
     """Return the demanded thrust that carries the weight of drones, one value or (n,)."""
-    gain = vehicle.drone.thrust.gain if vehicle.drone.thrust else 1.0
     share = vehicle.airframe.thrust_factor_n_s2 / airframe_of(vehicle.drone).thrust_factor_n_s2
-    return vehicle.airframe.mass_kg * GRAVITY_M_S2 / (gain * share)
+    return vehicle.airframe.mass_kg * GRAVITY_M_S2 / (vehicle.drone.thrust_gain * share)
 
 
 def _hovering(vehicle: Vehicle, n: int, signals: Signals) -> VehicleState:

@@ -8,18 +8,15 @@ The thrust is NaN where it is what the controller had commanded.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import TARGET
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
-
-LEVEL: Final = (0.0, 0.0, GRAVITY_M_S2)
-"""The command of hover: roll, pitch, thrust over mass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,3 +85,8 @@ def lifts(controller: Any) -> bool:
             return False
         controller = controller.controller
     return True
+
+
+def hover_command(controller: Any) -> tuple[float, ...]:
+    """Return roll and pitch of hover and, of a controller that commands the thrust, the thrust over mass."""
+    return (0.0, 0.0, hover_thrust(innermost(controller).settings)) if lifts(controller) else (0.0, 0.0)

@@ -149,7 +149,7 @@ static inline vertical_t vertical_target(const engine_simulation_t *simulation, 
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
                   flying_t *flying)
 {
-    const real_t hover_m_s2 = splat(simulation->gravity_m_s2);
+    const real_t hover_m_s2 = splat(simulation->gravity_m_s2 / simulation->thrust_gain);
     vehicle_state_t state;
     int i;
 

@@ -233,10 +233,10 @@ def _altitude(flight: Flight) -> dict[str, Any]:
 
 
 def _thrust(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the members of the response of the thrust, 0 without."""
+    """Return the members of the response of the thrust, a gain of 1 without."""
     response, loop = vehicle.drone.thrust, vehicle.loop
     if response is None or not isinstance(loop, FirstOrderDrone) or loop.thrust_decay is None:
-        return dict.fromkeys(("thrust_lags", *_THRUST), 0)
+        return dict.fromkeys(("thrust_lags", *_THRUST), 0) | {"thrust_gain": 1.0}
     decay = loop.thrust_decay
     found = response.gain, decay.late_ticks, decay.before, decay.after
     return {"thrust_lags": 1} | dict(zip(_THRUST, found, strict=True))

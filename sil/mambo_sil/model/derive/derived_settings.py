@@ -197,7 +197,7 @@ def _limits(drone: VehicleFile) -> Iterator[Derived]:
 
 def _tilt_limit(drone: VehicleFile) -> Derived:
     """Return half the tilt at which the largest thrust carries the weight, within a bound."""
-    ratio = drone.altitude.thrust_max_n / drone.weight_n
+    ratio = drone.largest_thrust_n / drone.weight_n
     half_rad = 0.5 * math.acos(1.0 / ratio)
     words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
     by_flow = isinstance(drone.sensors, MamboSensors)
@@ -220,7 +220,7 @@ def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:
 
 def _height(drone: VehicleFile) -> Iterator[Derived]:
     """Yield the height of a drone whose thrust is known, as far as it can climb; nothing for another."""
-    thrust_m_s2 = drone.altitude.thrust_max_n / drone.body.mass_kg
+    thrust_m_s2 = drone.largest_thrust_n / drone.body.mass_kg
     most_m_s2 = _round(min(THRUST_SHARE * thrust_m_s2, MOST_THRUST_MAX_M_S2))
     if (drone.rotors is None and drone.thrust is None) or most_m_s2 < LEAST_THRUST_MAX_M_S2:
         return
@@ -232,6 +232,8 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     delay_s = _round(min(dead_time_s + _update_period_s(drone) / 2.0, 0.1))
     words = "Half an update period" + (" and thrust.dead_time_s" if dead_time_s else "")
     yield Derived("height", "delay_s", delay_s, words)
+    if drone.thrust_gain != 1.0:
+        yield Derived("height", "thrust_gain", drone.thrust_gain, "As thrust.gain")
     slowness_s = SLOWNESS * (max(lag_s, LEAST_LAG_S) + delay_s)
     response_s = _round(min(max(QUICKEST_HEIGHT_S, slowness_s), SLOWEST_RESPONSE_S))
     words = f"{SLOWNESS:g} times lag and delay, at least {QUICKEST_HEIGHT_S:g}"
@@ -239,7 +241,8 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     weight_s = float(f"{min(CLIMB_WEIGHT * response_s, SLOWEST_RESPONSE_S):.2g}")
     yield Derived("height", "velocity_weight_s", weight_s, f"{CLIMB_WEIGHT:g} times that")
     yield Derived("height", "thrust_min_m_s2", THRUST_MIN_M_S2, "0.3 g: roll and pitch need some thrust")
-    words = f"{THRUST_SHARE:g} of {thrust_m_s2:.3g}, altitude.thrust_max_n over body.mass_kg"
+    gain = "" if drone.thrust_gain == 1.0 else "thrust.gain times "
+    words = f"{THRUST_SHARE:g} of {thrust_m_s2:.3g}, {gain}altitude.thrust_max_n over body.mass_kg"
     yield Derived("height", "thrust_max_m_s2", most_m_s2, words)
     descent_m_s = _round(DESCENT_S * (most_m_s2 - GRAVITY_M_S2))
     words = "What the largest thrust brakes in time" + (
