@@ -51,7 +51,7 @@ def fly(
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("case", itertools.product((30.0, -30.0), CONDITIONS), ids=str)
+@pytest.mark.parametrize("case", list(itertools.product((30.0, -30.0), CONDITIONS)), ids=str)
 def test_thirty_degrees_are_found_and_landed(
     case: tuple[float, str],
     app: Path,
