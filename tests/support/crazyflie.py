@@ -28,7 +28,6 @@ FIRMWARE_FLAGS: Final = (
 )
 """Flags of the firmware that any gcc takes."""
 
-APP: Final = "src/nmpc_app.c"
 LIBRARY: Final = ("nmpc", "nmpc_self_test")
 """Sources beside the app's."""
 
@@ -53,6 +52,8 @@ _INTERFACE.cdef(
     extern uint32_t host_time_ms;
     extern bool host_is_flying;
     extern float host_variances[2];
+    extern bool host_has_variances;
+    extern int host_scheduled;
     extern const struct variable host_logged[];
     extern const struct variable host_parameters[];
     const struct variable *host_find(const struct variable *table, const char *name);
@@ -199,12 +200,17 @@ class Fleet:
         return Answer(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))
 
 
+def app_sources(folder: Path) -> list[Path]:
+    """Return the sources of the app in the target's `folder`, without the controller's."""
+    return sorted((folder / "src").glob("nmpc_app*.c"))
+
+
 @dataclass(frozen=True)
 class Built:
-    """A folder of the target, with the objects that do not change with the app, and the app."""
+    """A folder of the target, its objects by the name of their source, and the app that they make."""
 
     folder: Path
-    objects: tuple[Path, ...]
+    objects: dict[str, Path]
     host: Any
 
     def app(self) -> Crazyflie:
@@ -212,28 +218,25 @@ class Built:
         return Crazyflie(self.host)
 
     def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
-        """Return a drone with an app in which `right` reads `wrong`."""
-        text = (self.folder / APP).read_text("utf-8")
-        assert text.count(right) == 1, f"the template moved on: {right}"
-        source = self.folder / "src" / f"{name.replace(' ', '_')}.c"
-        source.write_text(text.replace(right, wrong), "utf-8")
-        return Crazyflie(linked(source, self.objects))
-
-
-def linked(source: Path, objects: tuple[Path, ...]) -> Any:
-    """Compile an app, link it with `objects`, and load it."""
-    compiled = compile_host(source, source.with_suffix(".o"), "-ffp-contract=off")
-    return link((compiled, *objects), source.with_suffix(".so"))
+        """Return a drone with an app in which `right`, found once in one of its files, reads `wrong`."""
+        texts = {source: source.read_text("utf-8") for source in app_sources(self.folder)}
+        assert sum(text.count(right) for text in texts.values()) == 1, f"the template moved on: {right}"
+        changed = next(source for source, text in texts.items() if right in text)
+        source = changed.with_name(f"mutant_{name.replace(' ', '_')}.c")
+        source.write_text(texts[changed].replace(right, wrong), "utf-8")
+        compiled = compile_host(source, source.with_suffix(".o"), "-ffp-contract=off")
+        objects = self.objects | {changed.stem: compiled}
+        return Crazyflie(link([*objects.values()], source.with_suffix(".so")))
 
 
 def build(folder: Path) -> Built:
     """Compile the target in `folder`."""
-    library = [
-        compile_host(folder / "src" / f"{name}.c", folder / f"{name}.o", "-ffp-contract=off")
-        for name in LIBRARY
-    ]
-    objects = (*library, compile_host(HOST, folder / "host.o"))
-    return Built(folder, objects, linked(folder / APP, objects))
+    sources = [folder / "src" / f"{name}.c" for name in LIBRARY] + app_sources(folder)
+    objects = {
+        source.stem: compile_host(source, folder / f"{source.stem}.o", "-ffp-contract=off")
+        for source in sources
+    } | {"host": compile_host(HOST, folder / "host.o")}
+    return Built(folder, objects, link([*objects.values()], folder / "app.so"))
 
 
 def folder_of(settings: Settings, folder: Path) -> Path:

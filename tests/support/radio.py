@@ -20,6 +20,9 @@ SIZES: Final = {
     "refused": 4,
     "step": 2,
     "age": 2,
+    "takeOvers": 2,
+    "grounded": 1,
+    "level": 1,
     "info": 2,
     "state": 1,
 }
@@ -98,7 +101,7 @@ class Drone:
 
     clock: Clock
     logged: dict[str, float]
-    parameters: dict[str, int]
+    parameters: dict[str, float]
     calls: list[tuple[float, str, tuple[Any, ...]]] = field(default_factory=list)
     has_link: bool = True
     """Whether the radio reaches it."""
@@ -273,7 +276,7 @@ class Parameters:
         """Set a value; raises KeyError."""
         if complete_name not in self._drone.parameters:
             raise KeyError(f"{complete_name} not in param TOC")
-        self._drone.parameters[complete_name] = int(value)
+        self._drone.parameters[complete_name] = float(value) if "." in value else int(value)
         self._drone.note("set_value", complete_name, value)
 
 

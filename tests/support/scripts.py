@@ -3,6 +3,7 @@
 import builtins
 import importlib
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,9 +15,12 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from tests.support.bundles import place
+from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
 
 SETTINGS = presets.preset("crazyflie")
-MODULES = ("fly", "figures", "radio", "simulated_drone")
+PLACE = (1.0, -0.5, 0.1)
+"""Where the drone stands: x, y, height of the floor."""
+MODULES = ("heading", "radio", "figures", "checks", "fly", "simulated_drone", "offboard")
 
 
 def write(settings: Settings, folder: Path) -> Path:
@@ -54,3 +58,44 @@ def without(patch: pytest.MonkeyPatch, package: str) -> None:
         return original(name, *arguments, **options)
 
     patch.setattr(builtins, "__import__", guarded)
+
+
+def ready(scripts: dict[str, ModuleType], patch: pytest.MonkeyPatch) -> Drone:
+    """Return a drone that is ready to fly, and put it and its clock under the scripts."""
+    clock = Clock()
+    logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
+    logged |= dict.fromkeys(scripts["radio"].PLACE, 0.0)
+    logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
+    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
+    logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
+    parameters = {
+        "nmpc.settings": int(SETTINGS.short_digest[:8], 16),
+        "nmpc.selfTest": 0,
+        "nmpc.on": 0,
+        "stabilizer.estimator": 2,
+        "stabilizer.controller": 1,
+        "kalman.resetEstimation": 0,
+        "kalman.initialYaw": 0.5,
+    }
+    found = Drone(clock, logged, parameters)
+    install(found, patch)
+    for name in ("fly", "radio"):
+        patch.setattr(scripts[name], "time", clock)
+    return found
+
+
+def interrupt() -> None:
+    """Press Ctrl-C."""
+    raise KeyboardInterrupt
+
+
+def at_call(drone: Drone, name: str, after_s: float, *events: Callable[[], None]) -> None:
+    """Let events happen some time after the first call with a name, half a second apart."""
+
+    def watch() -> None:
+        if drone.of(name):
+            drone.clock.sleeping.remove(watch)
+            begun = drone.of(name)[0][0]
+            drone.clock.events.extend((begun + after_s + 0.5 * k, event) for k, event in enumerate(events))
+
+    drone.clock.sleeping.append(watch)

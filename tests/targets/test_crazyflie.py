@@ -30,6 +30,7 @@ from tests.support.crazyflie import (
     Built,
     Crazyflie,
     Fleet,
+    app_sources,
     build,
     compile_host,
     content,
@@ -38,6 +39,7 @@ from tests.support.crazyflie import (
     link,
     send,
 )
+from tests.support.height_settings import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
 from tests.support.tools import require
@@ -54,13 +56,13 @@ FRAME_MUTANTS = {
     "y": ("= -(state->position.y +", "= (state->position.y +"),
     "vx": ("= state->velocity.x", "= -state->velocity.x"),
     "vy": ("= -state->velocity.y", "= state->velocity.y"),
-    "roll": ("roll_rad = RAD_PER_DEG * state", "roll_rad = -RAD_PER_DEG * state"),
-    "pitch": ("pitch_rad = RAD_PER_DEG * state", "pitch_rad = -RAD_PER_DEG * state"),
+    "roll": ("measured->roll_rad = RAD_PER_DEG", "measured->roll_rad = -RAD_PER_DEG"),
+    "pitch": ("measured->pitch_rad = RAD_PER_DEG", "measured->pitch_rad = -RAD_PER_DEG"),
     "yaw": ("yaw_rad = -RAD_PER_DEG * state", "yaw_rad = RAD_PER_DEG * state"),
-    "target x": ("target.position_m[0] = p[0];", "target.position_m[0] = -p[0];"),
-    "target y": ("target.position_m[1] = -p[1];", "target.position_m[1] = p[1];"),
-    "target vx": ("velocity_m_s[0] = v[0];", "velocity_m_s[0] = -v[0];"),
-    "target vy": ("velocity_m_s[1] = -v[1];", "velocity_m_s[1] = v[1];"),
+    "target x": ("position_m[0] = to->position", "position_m[0] = -to->position"),
+    "target y": ("position_m[1] = -to->position", "position_m[1] = to->position"),
+    "target vx": ("velocity_m_s[0] = to->velocity", "velocity_m_s[0] = -to->velocity"),
+    "target vy": ("velocity_m_s[1] = -to->velocity", "velocity_m_s[1] = to->velocity"),
     "command roll": (": (DEG_PER_RAD * (float)command.roll", ": (-DEG_PER_RAD * (float)command.roll"),
     "command pitch": (": (DEG_PER_RAD * (float)command.pitch", ": (-DEG_PER_RAD * (float)command.pitch"),
 }
@@ -74,8 +76,8 @@ AGE_MUTANTS = {
 
 # The acceleration where the settings let the caller give it.
 GIVEN_MUTANTS = {
-    "given x": ("acceleration_m_s2[0] = a[0];", "acceleration_m_s2[0] = -a[0];"),
-    "given y": ("acceleration_m_s2[1] = -a[1];", "acceleration_m_s2[1] = a[1];"),
+    "given x": ("acceleration_m_s2[0] = to->acc", "acceleration_m_s2[0] = -to->acc"),
+    "given y": ("acceleration_m_s2[1] = -to->acc", "acceleration_m_s2[1] = to->acc"),
 }
 
 
@@ -337,6 +339,7 @@ SUBJECTS = {
     "given": with_option(SETTINGS, "target.acceleration", "given"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
+    "height": height_settings(acceleration="given"),
     "limits": with_option(SETTINGS, "limits.speed_m_s", 2.0),
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
 }
@@ -355,6 +358,60 @@ def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path)
         )
 
 
+@pytest.mark.parametrize("name", ["crazyflie", "prefix"])
+def test_names_that_are_linked_have_the_prefix(name: str, tmp_path: Path) -> None:
+    """All files are linked into one firmware, whose names they must not meet."""
+    folder, prefix = folder_of(SUBJECTS[name], tmp_path), SUBJECTS[name].code.prefix
+    sources = sorted((folder / "src").glob("*_app*.c"))
+    objects = [compile_host(source, folder / f"{source.stem}.o") for source in sources]
+    listed = shell(require("nm", "binutils"), "--defined-only", "-g", "-j", *objects).split()
+    names = {one for one in listed if not one.endswith(":")}
+    assert f"{prefix}_app_step" in names
+    tables = {"host_logged", "host_parameters"}
+    entries = {one for one in names if one.startswith("controllerOutOfTree")}
+    assert len(entries) == 3
+    assert {one for one in names - tables - entries if not one.startswith(f"{prefix}_app_")} == set()
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_every_log_and_parameter_has_its_documentation(name: str) -> None:
+    """One line in front of it, from which the firmware builds its pages; the group has one too."""
+    files = render_target(SUBJECTS[name], TARGETS["crazyflie"], with_digest=False)
+    kinds = {"LOG": 0, "PARAM": 0}
+    for text in (text for path, text in files.items() if path.endswith(".c")):
+        for before, line in itertools.pairwise(text.splitlines()):
+            if added := re.match(r"(LOG|PARAM)_(ADD|GROUP_START)\(", line):
+                opening = "/** " if added[2] == "GROUP_START" else "/** @brief "
+                assert before.startswith(opening), line
+                assert before.endswith(". */"), line
+                kinds[added[1]] += 1
+    assert kinds["LOG"] > 25
+    assert kinds["PARAM"] > 3
+
+
+def test_missing_variances_are_said_once(tmp_path: Path) -> None:
+    """In the worker's task, when the app starts: a lost position goes unnoticed then."""
+    quiet = build(folder_of(SETTINGS, tmp_path)).host
+    quiet.host_has_variances = False
+    app = Crazyflie(quiet)
+    scheduled = app.host.host_scheduled
+    assert app.console.count("NMPC: no kalman.varX, kalman.varPX: lost positions go unnoticed\n") == 1
+    assert scheduled == app.console.count("\n") == 2, "with the version"
+    app.host.controllerOutOfTreeInit()
+    assert app.host.host_scheduled == scheduled
+    app.modes("modeAbs")
+    send(app, 0.5)
+    flown_since(app, np.zeros(7), 100)
+    assert app.logged("lost") == 0
+
+
+def test_variances_that_are_there_are_not_spoken_of(built: Built) -> None:
+    """The console has the version, and nothing of missing log variables."""
+    app = built.app()
+    assert "settings" in app.console
+    assert "unnoticed" not in app.console
+
+
 @pytest.mark.long
 def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
     """By the compiler's figures, along the calls that it saw: a tick without the PID controller's."""
@@ -362,17 +419,17 @@ def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
     folder = folder_of(SETTINGS, tmp_path)
     frames: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
-    for name in ("nmpc", "nmpc_app"):
+    for source in (folder / "src" / "nmpc.c", *app_sources(folder)):
         shell(
             *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding", "-fcallgraph-info=su"),
-            *(f"-I{LIBC}", f"-I{STAND_INS}", "-c", folder / "src" / f"{name}.c", "-o", folder / f"{name}.o"),
+            *(f"-I{LIBC}", f"-I{STAND_INS}", "-c", source, "-o", folder / f"{source.stem}.o"),
         )
-        graph = (folder / f"{name}.ci").read_text("utf-8")
+        graph = (folder / f"{source.stem}.ci").read_text("utf-8")
         for title, label in re.findall(r'node: { title: "([^"]*)" label: "([^"]*)"', graph):
             if size := re.search(r"(\d+) bytes \(static\)", label):
                 frames[short(title)] = int(size[1])
-        for source, target in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
-            calls.setdefault(short(source), set()).add(short(target))
+        for caller, called in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
+            calls.setdefault(short(caller), set()).add(short(called))
 
     def deepest(function: str) -> int:
         return frames.get(function, 0) + max(
@@ -391,11 +448,10 @@ def short(title: str) -> str:
 def test_kbuild_lists_every_source_with_the_flag(built: Built) -> None:
     """A source that is not listed is not linked; without the flag the Cortex-M4F's bits differ."""
     text = (built.folder / "src" / "Kbuild").read_text("utf-8")
-    listed = [path.stem for path in (built.folder / "src").glob("nmpc*.c") if " " not in path.stem]
-    assert {*LIBRARY, "nmpc_app"} <= {*listed}
-    for name in (*LIBRARY, "nmpc_app"):
-        assert f"obj-y += {name}.o\n" in text
-        assert f"CFLAGS_{name}.o += -ffp-contract=off\n" in text
+    sources = {path.stem for path in (built.folder / "src").glob("nmpc*.c")}
+    assert {*LIBRARY, "nmpc_app", "nmpc_app_step"} <= sources
+    assert {*re.findall(r"^obj-y \+= (\w+)\.o$", text, re.MULTILINE)} == sources
+    assert {*re.findall(r"^CFLAGS_(\w+)\.o \+= -ffp-contract=off$", text, re.MULTILINE)} == sources
     assert "CONFIG_CONTROLLER_OOT=y\n" in (built.folder / "app-config").read_text("utf-8")
 
 

@@ -59,6 +59,36 @@ def test_the_position_is_that_of_now_whenever_the_filter_predicts_and_measures(
         assert app.logged("x") == pytest.approx(0.001 * step_ms, abs=0.0016)
 
 
+def swept(app: Crazyflie, time_ms: int) -> None:
+    """Tick with the estimate of a drone at 1 m/s which four small measurements a prediction correct."""
+    variance = 1.001 * app.host.host_variances[0] if time_ms % 10 == 0 else app.host.host_variances[0]
+    app.state.velocity.x = 1.0
+    app.state.position.x += 0.01 if time_ms % 10 == 0 else 0.0
+    if time_ms % 10 in (2, 4, 6, 8):
+        app.state.position.x += 0.05 * (0.001 * time_ms - app.state.position.x)
+        variance *= 1.001**-0.25
+    app.host.host_variances = [variance, variance]
+    app.tick()
+
+
+def test_several_measurements_a_prediction_are_dated_by_their_mean(built: Built) -> None:
+    """As those of base stations: each lowers the variance by less than one of a camera; none is lost."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(6))
+    app.host.host_variances, app.state.position.x = [1e-4, 1e-4], 0.0
+    for time_ms in range(100):
+        swept(app, time_ms)
+    for offset_ms in range(10):
+        app.ticks += 10  # another controller flew: the next tick takes over
+        app.state.position.x = 0.001 * offset_ms
+        for time_ms in range(offset_ms, 2000 + offset_ms):
+            app.setpoint.timestamp = app.time_ms
+            swept(app, time_ms)
+            assert app.logged("lost") == 0
+        assert app.logged("x") == pytest.approx(0.001 * (1990 + offset_ms), abs=0.0025)
+
+
 def test_an_estimate_without_variances_is_taken_as_it_is(built: Built) -> None:
     """That of another estimator, whatever its position does."""
     app = built.app()

@@ -11,35 +11,14 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings.controller_toml import with_option
-from tests.support.radio import ARMED, CAN_FLY, FLYING, Clock, Drone, install
-from tests.support.scripts import SETTINGS, modules_of, run, without, write
-
-PLACE = (1.0, -0.5, 0.1)
-"""Where the drone stands: x, y, height of the floor."""
+from tests.support.radio import ARMED, CAN_FLY, FLYING, Drone
+from tests.support.scripts import PLACE, SETTINGS, at_call, interrupt, modules_of, ready, run, without, write
 
 
 @pytest.fixture
 def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
     """Return a drone that is ready to fly, and put it and its clock under the scripts."""
-    clock = Clock()
-    logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
-    logged |= dict.fromkeys(scripts["radio"].PLACE, 0.0)
-    logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
-    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
-    logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
-    parameters = {
-        "nmpc.settings": int(SETTINGS.short_digest[:8], 16),
-        "nmpc.selfTest": 0,
-        "nmpc.on": 0,
-        "stabilizer.estimator": 2,
-        "stabilizer.controller": 1,
-        "kalman.resetEstimation": 0,
-    }
-    found = Drone(clock, logged, parameters)
-    install(found, monkeypatch)
-    for name in ("fly", "radio"):
-        monkeypatch.setattr(scripts[name], "time", clock)
-    return found
+    return ready(scripts, monkeypatch)
 
 
 PREPARED = ["set_value", "stop"]
@@ -54,8 +33,9 @@ def test_a_figure_is_uploaded_and_flown_by_the_high_level_commander(
     assert run(scripts, figure, "--height", "0.6") == 0
     flown = ["upload", "define_trajectory", "takeoff", "go_to", "start_trajectory"]
     assert drone.names() == [*PREPARED, *flown, *LANDED]
-    assert drone.of("takeoff")[0][1] == (pytest.approx(0.7), 2.0, None)
-    assert drone.of("go_to")[0][1] == pytest.approx((1.0, -0.5, 0.7, math.radians(30.0), 2.0))
+    assert drone.of("takeoff")[0][1] == (pytest.approx(0.4), 1.5, None)
+    assert drone.of("go_to")[0][1] == pytest.approx((1.3, -0.5, 0.4, math.radians(30.0), 1.5))
+    assert drone.of("go_to")[1][1] == pytest.approx((1.0, -0.5, 0.7, math.radians(30.0), 2.0))
     pieces = uploaded(drone)
     assert drone.of("define_trajectory")[0][1] == (1, 0, len(pieces))
     (begun, _), (landing, (floor, *_)) = drone.of("start_trajectory")[0], drone.of("land")[0]
@@ -106,8 +86,10 @@ def test_goto_goes_along_x_and_back(scripts: dict[str, ModuleType], drone: Drone
     assert run(scripts, "goto", "--size", "0.5", "--rate", "1") == 0
     assert drone.names() == [*PREPARED, "takeoff", "go_to", *LANDED]
     moves = drone.of("go_to")
-    assert [arguments[0] for _, arguments in moves] == [1.0, 1.5, 1.0]
-    assert all(after - before > arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves))
+    assert [arguments[0] for _, arguments in moves] == [1.3, 1.0, 1.5, 1.0]
+    assert all(
+        after - before >= arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves)
+    )
 
 
 def test_a_stream_sends_full_states(scripts: dict[str, ModuleType], drone: Drone) -> None:
@@ -138,7 +120,7 @@ def logs(**values: float) -> Callable[[Drone], None]:
     )
 
 
-def sets(**values: int) -> Callable[[Drone], None]:
+def sets(**values: float) -> Callable[[Drone], None]:
     """Return what changes parameters; __ stands for the dot."""
     return lambda drone: drone.parameters.update({k.replace("__", "."): value for k, value in values.items()})
 
@@ -221,23 +203,6 @@ def test_all_reasons_are_told_at_once(
     assert run(scripts, "hover") == 1
     error = capsys.readouterr().err
     assert ("Kalman" in error, "3.00 V" in error, "locked" in error) == (True, True, True)
-
-
-def interrupt() -> None:
-    """Press Ctrl-C."""
-    raise KeyboardInterrupt
-
-
-def at_call(drone: Drone, name: str, after_s: float, *events: Callable[[], None]) -> None:
-    """Let events happen some time after the first call with a name, half a second apart."""
-
-    def watch() -> None:
-        if drone.of(name):
-            drone.clock.sleeping.remove(watch)
-            begun = drone.of(name)[0][0]
-            drone.clock.events.extend((begun + after_s + 0.5 * k, event) for k, event in enumerate(events))
-
-    drone.clock.sleeping.append(watch)
 
 
 def test_ctrl_c_lands(

@@ -1,6 +1,5 @@
 """The script that flies a Crazyflie from the desk: its calls to cflib, and its flights through a radio."""
 
-import importlib.util
 import math
 import re
 import sys
@@ -20,8 +19,10 @@ from tests.support.bundles import place
 from tests.support.height_settings import height_settings
 from tests.support.offboard import Flown, Radio, fly_offboard
 from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
+from tests.support.scripts import interrupt, modules_of, without
 
 SETTINGS = presets.preset("crazyflie")
+PREPARED, STOPPED = ["set_value"], ["stop_setpoint", "notify", "close"]
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "offboard.md"
 STATE = {"x": 1.0, "y": -0.5, "z": 0.1, "vx": 0.0, "vy": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
 
@@ -37,7 +38,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def drone() -> Drone:
     """Return a drone at rest."""
     logged = {f"stateEstimate.{name}": value for name, value in STATE.items()}
-    return Drone(Clock(), {**logged, "supervisor.info": ARMED | CAN_FLY}, {})
+    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
+    logged |= {"supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
+    parameters = {"stabilizer.estimator": 2, "kalman.resetEstimation": 0, "kalman.initialYaw": 0.0}
+    return Drone(Clock(), logged, parameters)
 
 
 @pytest.fixture
@@ -49,14 +53,11 @@ def script(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> Modul
 def imported(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Import the script of a folder."""
     install(drone, monkeypatch)
-    spec = importlib.util.spec_from_file_location("offboard", folder / "offboard.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    vars(module)["time"] = drone.clock
+    scripts = modules_of(folder, monkeypatch)
+    for name in ("offboard", "radio"):
+        monkeypatch.setattr(scripts[name], "time", drone.clock)
     monkeypatch.setattr(sys, "argv", ["offboard.py", "radio://0/80/2M/E7E7E7E7E7"])
-    return module
+    return scripts["offboard"]
 
 
 def test_it_sends_angles_and_height_a_hundred_times_a_second(
@@ -65,7 +66,7 @@ def test_it_sends_angles_and_height_a_hundred_times_a_second(
     """From the floor up, along the circle, and down; then the motors stop."""
     script.main()
     assert capsys.readouterr().out == "landed\n"
-    assert drone.names() == ["arm", "zdistance", "stop_setpoint", "notify", "close"]
+    assert drone.names() == [*PREPARED, "zdistance", *STOPPED]
     sent = drone.of("zdistance")
     times_s = [time_s for time_s, _ in sent]
     assert np.diff(times_s) == pytest.approx(0.01, abs=1e-6)
@@ -84,15 +85,11 @@ def test_with_a_height_in_the_settings_the_stock_firmware_flies_it(
     files = render_target(height_settings(), TARGETS["crazyflie"], with_digest=False)
     imported(place(files, tmp_path), drone, monkeypatch).main()
     assert capsys.readouterr().out == "landed\n"
-    assert drone.names() == ["arm", "zdistance", "stop_setpoint", "notify", "close"]
+    assert drone.names() == [*PREPARED, "zdistance", *STOPPED]
 
 
 def test_ctrl_c_descends_where_it_is(script: ModuleType, drone: Drone) -> None:
     """Within the time of a climb."""
-
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
     drone.clock.events.append((9.0, interrupt))
     script.main()
     sent = drone.of("zdistance")
@@ -100,14 +97,85 @@ def test_ctrl_c_descends_where_it_is(script: ModuleType, drone: Drone) -> None:
     assert sent[-1][1][3] == pytest.approx(0.1)
 
 
-def test_a_drone_that_sends_no_state_does_not_fly(
-    script: ModuleType, drone: Drone, capsys: pytest.CaptureFixture[str]
+def test_a_second_ctrl_c_stops_the_motors(script: ModuleType, drone: Drone) -> None:
+    """At once."""
+    drone.clock.events.extend([(9.0, interrupt), (9.4, interrupt)])
+    script.main()
+    assert drone.names() == [*PREPARED, "zdistance", *STOPPED]
+    assert drone.of("stop_setpoint")[0][0] == pytest.approx(9.4, abs=0.02)
+
+
+TROUBLES: dict[str, tuple[str, float, str, list[str]]] = {
+    "battery": ("pm.state", 3, "The drone lands: the battery is low, 4.00 V.", ["notify", "land", "stop"]),
+    "tumbled": ("supervisor.info", 32, "The motors stop: the drone has tumbled", []),
+}
+
+
+@pytest.mark.parametrize("name", TROUBLES)
+def test_it_watches_battery_and_supervisor_in_flight(
+    name: str, script: ModuleType, drone: Drone, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """It says why, and hands over to the firmware's landing, or stops the motors."""
+    variable, value, message, ending = TROUBLES[name]
+    drone.clock.events.append((9.0, lambda: drone.logged.update({variable: value})))
+    with pytest.raises(SystemExit, match="1"):
+        script.main()
+    assert capsys.readouterr().err.startswith(message)
+    names = drone.names()
+    ends = names[names.index("zdistance") + 1 :]
+    assert ends[: len(ending)] == ending
+    assert ("land" in ends) == bool(ending)
+    assert ends[-3:] == STOPPED
+
+
+def test_an_error_in_flight_lands(script: ModuleType, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the firmware, in the time of a climb, and only then the motors stop."""
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    drone.clock.events.append((9.0, lambda: monkeypatch.setattr(script, "position", fail)))
+    with pytest.raises(ZeroDivisionError):
+        script.main()
+    ((landing, arguments),) = drone.of("land")
+    assert arguments == (0.1, script.CLIMB_S, None)
+    assert drone.of("stop_setpoint")[0][0] - landing == pytest.approx(script.CLIMB_S + 1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"pm.vbat": 3.5}, "the battery has 3.50 V"),
+        ({"supervisor.info": 64}, "the supervisor has locked the drone"),
+        ({"stateEstimate.x": math.nan, "kalman.varPX": math.nan}, "the Kalman filter finds no position"),
+    ],
+)
+def test_a_drone_that_is_not_ready_stays_on_the_ground(
+    changed: dict[str, float], message: str, script: ModuleType, drone: Drone
+) -> None:
+    """Battery, supervisor and filter are checked as fly.py does."""
+    drone.logged.update(changed)
+    with pytest.raises(SystemExit, match=rf"^No flight: {message}"):
+        script.main()
+    assert not drone.of("zdistance")
+
+
+def test_a_drone_that_sends_nothing_does_not_fly(script: ModuleType, drone: Drone) -> None:
     """It says so."""
     drone.clock.sleeping.clear()
-    script.main()
-    assert capsys.readouterr().out == "no flight: the drone sends no state\n"
+    with pytest.raises(SystemExit, match="No flight: the drone sends no logs"):
+        script.main()
     assert not drone.of("zdistance")
+
+
+@pytest.mark.parametrize("package", ["cflib", "mambo_nmpc"])
+def test_without_a_package_it_says_what_to_install(
+    package: str, script: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In one sentence."""
+    without(monkeypatch, package)
+    with pytest.raises(SystemExit, match=rf"^No flight: .*pip install {package.replace('_', '-')}\.$"):
+        script.main()
 
 
 def test_the_state_of_the_radio_s_log_is_read_in_the_order_of_its_names(

@@ -1,0 +1,137 @@
+"""What fly.py watches in flight, the logs that it keeps, and what the radio carries."""
+
+import math
+import shutil
+import tempfile
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from mambo_codegen.settings.controller_toml import with_option
+from tests.support.height_settings import height_settings
+from tests.support.radio import LOG_BYTES, Drone, LogConfig
+from tests.support.scripts import at_call, modules_of, ready, run, write
+
+
+@pytest.fixture
+def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
+    """Return a drone that is ready to fly, and put it and its clock under the scripts."""
+    return ready(scripts, monkeypatch)
+
+
+LANDED, STOPPED = ["notify", "land", "stop", "close"], ["stop_setpoint", "notify", "stop", "close"]
+TROUBLES: dict[str, tuple[dict[str, float], str, list[str]]] = {
+    "position": ({"nmpc.lost": 1}, "The drone lands: no position is measured.\n", LANDED),
+    "status": (
+        {"nmpc.status": 3},
+        "The drone lands: the controller refuses its inputs, nmpc.status = 3.\n",
+        LANDED,
+    ),
+    "battery": ({"pm.state": 3, "pm.vbat": 3.1}, "The drone lands: the battery is low, 3.10 V.\n", LANDED),
+    "tumbled": ({"supervisor.info": 32}, "The motors stop: the drone has tumbled or crashed.\n", STOPPED),
+}
+
+
+@pytest.mark.parametrize("name", TROUBLES)
+@pytest.mark.parametrize("figure", [("eight",), ("circle", "--stream"), ("goto",)])
+def test_trouble_in_flight_ends_it(
+    figure: tuple[str, ...],
+    name: str,
+    scripts: dict[str, ModuleType],
+    drone: Drone,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """At once, with a sentence, and the log is kept."""
+    values, message, ending = TROUBLES[name]
+    at_call(drone, "takeoff", 8.0, lambda: drone.logged.update(values))
+    assert run(scripts, *figure) == 1
+    assert capsys.readouterr().err == message
+    assert drone.names()[-4:] == ending
+    ended = drone.of("land" if ending == LANDED else "stop_setpoint")[0][0]
+    assert ended - drone.of("takeoff")[0][0] == pytest.approx(8.3, abs=0.4)
+    assert Path("flight.csv").is_file()
+
+
+def test_one_refused_update_flies_on(scripts: dict[str, ModuleType], drone: Drone) -> None:
+    """It takes 0.3 s of them."""
+    bad, good = (
+        (lambda: drone.logged.update({"nmpc.status": 2})),
+        (lambda: drone.logged.update({"nmpc.status": 0})),
+    )
+    at_call(drone, "takeoff", 8.0, bad)
+    at_call(drone, "takeoff", 8.1, good)
+    assert run(scripts, "hover") == 0
+
+
+def test_each_flight_has_a_log_of_its_own(
+    scripts: dict[str, ModuleType], drone: Drone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No file is written over."""
+    Path("flight.csv").write_text("kept", "utf-8")
+    for _ in range(2):
+        assert run(scripts, "hover") == 0
+        drone.blocks.clear()
+    assert Path("flight.csv").read_text("utf-8") == "kept"
+    assert Path("flight-2.csv").stat().st_size == pytest.approx(Path("flight-3.csv").stat().st_size, rel=0.05)
+    assert "flight-3.csv: " in capsys.readouterr().out
+
+
+def test_a_log_whose_folder_is_gone_goes_elsewhere(
+    scripts: dict[str, ModuleType],
+    drone: Drone,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The script says where; if there is no place at all, the log comes on the terminal."""
+    spare, stick = tmp_path / "spare", tmp_path / "stick"
+    spare.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(spare))
+    monkeypatch.setenv("HOME", str(tmp_path / "nowhere"))
+    for folder in (stick, spare):
+        stick.mkdir()
+        drone.calls.clear()
+        drone.blocks.clear()
+        at_call(
+            drone,
+            "takeoff",
+            3.0,
+            partial(shutil.rmtree, stick),
+            partial(shutil.rmtree, folder, ignore_errors=True),
+        )
+        assert run(scripts, "hover", "--log", str(stick / "flight.csv")) == 0
+        printed = capsys.readouterr()
+        assert f"The log cannot be written to {stick / 'flight.csv'}: No such file" in printed.err
+        if folder == stick:
+            assert f"{spare / 'flight.csv'}: " in printed.out
+        else:
+            assert printed.out.startswith("Timestamp,nmpc.step,")
+
+
+def test_a_figure_longer_than_a_battery_is_refused(
+    scripts: dict[str, ModuleType], drone: Drone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything is connected."""
+    assert run(scripts, "circle", "--rate", "0.05", "--laps", "4") == 1
+    assert "the flight takes 7" in capsys.readouterr().err
+    assert not drone.calls
+
+
+@pytest.mark.parametrize("given", ["given", "tracked"])
+def test_log_blocks_fit_the_radio(given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each a packet; at 2 and 1 Mbit/s every update is logged, at 250 kbit/s every second one."""
+    settings = with_option(height_settings(), "target.acceleration", given)
+    radio = modules_of(write(settings, tmp_path), monkeypatch)["radio"]
+    for names in radio.LOGGED:
+        block = LogConfig("block", 10)
+        for name in names:
+            block.add_variable(name)
+        assert sum(block.sizes) <= LOG_BYTES
+    count = len(radio.LOGGED)
+    for rate, period_s in {"2M": 0.01, "1M": 0.01, "250K": 0.02}.items():
+        uri = f"radio://0/80/{rate}/E7E7E7E7E7"
+        found = radio.log_period_s(count, uri)
+        assert math.isclose(found, period_s)
+        assert count / found + 20.0 <= radio.packets_s(uri)
