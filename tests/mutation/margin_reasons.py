@@ -265,4 +265,9 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
             ),
         )
     },
+    (
+        "rebuild.py",
+        "case np.ndarray() if value.ndim and value.shape[-1] == columns and value.dtype == np.float64:",
+        "and -> or",
+    ): "the sensors that there are keep no other arrays",
 }
