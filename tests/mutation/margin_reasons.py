@@ -270,4 +270,5 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
         "case np.ndarray() if value.ndim and value.shape[-1] == columns and value.dtype == np.float64:",
         "and -> or",
     ): "the sensors that there are keep no other arrays",
+    ("corners.py", "if gain * most_n <= drone.weight_n:", "<= -> <"): _EQUAL,
 }
