@@ -33,8 +33,6 @@ from tests.mutation.python_mutants import PythonMutant, names_of, python_mutants
 ROOT: Final = Path(__file__).parents[2]
 SOURCE_ROOTS: Final = ("codegen", "sil")
 PACKAGES: Final = ("mambo_codegen", "mambo_sil", "tests")
-LONGEST_S: Final = 1.5
-"""Processor time, while lines are noted, of the longest test that is run on mutants."""
 LIMIT_S: Final = 60
 """Processor time of the tests of a mutant: one that needs more never ends."""
 
@@ -47,6 +45,8 @@ class Room:
     tests: tuple[str, ...]
     without: tuple[str, ...] = ()
     """Names of files that another room has, or that only draw or print."""
+    longest_s: float = 1.5
+    """Processor time, while lines are noted, of the longest test that is run on mutants."""
 
     @property
     def files(self) -> list[Path]:
@@ -93,15 +93,23 @@ ROOMS: Final = {
     ),
     "derive": Room(
         source=("sil/mambo_sil/model/derive/*.py",),
-        tests=("tests/model/derive",),
-        without=("derived_margins.py",),
+        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "settings")),
+        without=("derived_margins.py", "derived_flight.py"),
     ),
     "design": Room(
         source=("sil/mambo_sil/model/derive/derived_margins.py",),
         tests=("tests/model/derive/test_derived_margins.py",),
+        longest_s=4.0,
     ),
     "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),
-    "axes": Room((f"{_MARGINS}/axis_margins.py",), (f"{_MARGIN_TESTS}/test_axis_margins.py",)),
+    "axes": Room(
+        source=(f"{_MARGINS}/axis_margins.py",),
+        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("axis_margins", "margin_figures")),
+    ),
+    "figures": Room(
+        source=tuple(f"{_MARGINS}/{name}.py" for name in ("margin_figures", "margins_record")),
+        tests=(f"{_MARGIN_TESTS}/test_margin_figures.py",),
+    ),
     "drones": Room(
         source=(f"{_MARGINS}/corners.py", f"{_MARGINS}/many_drones.py"),
         tests=(f"{_MARGIN_TESTS}/test_corners.py", f"{_MARGIN_TESTS}/test_many_drones.py"),
@@ -109,16 +117,28 @@ ROOMS: Final = {
     "hover": Room(
         source=(f"{_MARGINS}/hover_loop.py",),
         tests=tuple(
-            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "axis_margins", "linear", "control")
+            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "close_loop", "axis_margins")
         ),
     ),
-    "margins": Room(
-        source=(f"{_MARGINS}/*.py",),
-        tests=(_MARGIN_TESTS,),
-        without=(
-            *("loop_margins.py", "axis_margins.py", "corners.py", "many_drones.py", "hover_loop.py"),
-            *("margins_plots.py", "margins_report.py"),
+    "linear drones": Room(
+        source=tuple(f"{_MARGINS}/{name}.py" for name in ("drone_jacobians", "rebuild")),
+        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("drone_jacobians", "linear")),
+    ),
+    "linear controllers": Room(
+        source=(f"{_MARGINS}/controller_jacobian.py",),
+        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("linear", "height", "hover_loop")),
+    ),
+    "measured": Room(
+        source=tuple(f"{_MARGINS}/{name}.py" for name in ("hover_margins", "margins_run", "response_file")),
+        tests=tuple(
+            f"{_MARGIN_TESTS}/test_{name}.py"
+            for name in ("response_file", "axis_margins", "height", "command")
         ),
+    ),
+    "derived flight": Room(
+        source=("sil/mambo_sil/model/derive/derived_flight.py",),
+        tests=("tests/model/derive/test_derived_flight.py",),
+        longest_s=4.0,
     ),
 }
 
@@ -133,15 +153,15 @@ def mutants_of(room: Room) -> dict[Path, list[PythonMutant]]:
 class Bench:
     """A plugin of pytest that runs the collected tests on mutants, and writes which of these pass all."""
 
-    def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]], answer: TextIO) -> None:
-        self._chosen, self._answer = chosen, answer
+    def __init__(self, chosen: Sequence[tuple[Path, PythonMutant]], longest_s: float, answer: TextIO) -> None:
+        self._chosen, self._longest_s, self._answer = chosen, longest_s, answer
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Run the tests on the source as it is, then on every mutant."""
         gc.freeze()  # a fork shares the memory that is not looked through for garbage
         files = frozenset(str(path) for path, _ in self._chosen)
         tests = [(item, *_in_a_fork(partial(_reached, session, item, files))) for item in session.items]
-        tests = sorted((one for one in tests if one[1] < LONGEST_S), key=lambda one: one[1])
+        tests = sorted((one for one in tests if one[1] < self._longest_s), key=lambda one: one[1])
         for path, mutant in self._chosen:
             reaching = [item for item, _, lines in tests if _reaches(lines.get(str(path), []), mutant)]
             if _in_a_fork(partial(_survives, session, path, mutant, reaching)):
@@ -274,7 +294,9 @@ def main(name: str, stride: int, turn: int, answer: Path) -> None:
     room = ROOMS[name]
     chosen = [(path, one) for path, found in mutants_of(room).items() for one in found][turn::stride]
     with answer.open("w", encoding="utf-8") as file:
-        code = pytest.main(["-q", "-p", "no:cacheprovider", *room.tests], plugins=[Bench(chosen, file)])
+        code = pytest.main(
+            ["-q", "-p", "no:cacheprovider", *room.tests], plugins=[Bench(chosen, room.longest_s, file)]
+        )
     assert code == 0, code
 
 

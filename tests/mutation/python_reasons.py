@@ -10,16 +10,14 @@ _CHOICE: Final = "a choice, which has no definition: flights judge it, and the c
 _PARITY: Final = "C and reference then differ, which parity shows"
 _SIZE: Final = "only its absolute value counts"
 _WORDS: Final = "words of a comment"
-_LONG: Final = "a long test notices it: draws do not depend on how many there are"
-_ALIKE: Final = "all drones have the same names"
-_DRAWN: Final = "drawn = [campaign.draw(number) for number in range(first, min(first + _BATCH, drones))]"
 _TIMES: Final = "time_s = PERIOD_S * np.arange(first, last + 1, dtype=np.float64)"
 _STEP: Final = 'step = HeldCommand.of(Signal(np.array([time_s[0], 0.0]), np.array([0.0, 1.0]), "step"))'
 _RAMP: Final = "both axes have the same ramp"
 _STABLE: Final = "no loop that is unstable is known: 270 drawn at random have a radius below 1"
+_BOTH_AXES: Final = "a segment of one axis, which has both places"
 _ROOT: Final = "the root lies in the wider interval too"
 
-REASONS: Final[Mapping[Key, str]] = {
+PYTHON_REASONS: Final[Mapping[Key, str]] = {
     (
         "fences.py",
         "along = (way_m / np.where(rests, length_m, 1.0)[:, np.newaxis]).T",
@@ -231,30 +229,6 @@ REASONS: Final[Mapping[Key, str]] = {
         "1e-5 -> 1.1000000000000001e-05",
     ): "a choice: more than all roundings",
     (
-        "corners.py",
-        "document = drone.model_dump(exclude_none=True)",
-        "True -> False #1",
-    ): "a section that there is not, either way",
-    **{
-        ("many_drones.py", line, change): reason
-        for line, change, reason in (
-            ("FREQUENCIES: Final = 150", "150 -> 151", _CHOICE),
-            ("_BATCH: Final = 10", "10 -> 11", "drones do not depend on how many are measured at once"),
-            ("for first in range(0, drones, _BATCH):", "0 -> 1", _LONG),
-            (_DRAWN, "min -> max", _LONG),
-            (_DRAWN, "+ -> -", _LONG),
-            ("progress(first + len(drawn))", "+ -> -", "only shown"),
-            ("if np.isnan(values).all():", "all -> any", "all of the drones have motors, or none"),
-            ("for axis, name in enumerate(one.axis for one in drones[0].axes):", "0 -> 1", _ALIKE),
-            ("names = [axis.axis for axis in drones[0].axes]", "0 -> 1", _ALIKE),
-            (
-                'writer.writerow(["drone", *drones[0].values, *(f"{axis}_stable" for axis in names), *keys])',
-                "0 -> 1",
-                _ALIKE,
-            ),
-        )
-    },
-    (
         "fences.py",
         "(fence.floor_m, fence.ceiling_m) if settings.height else (0.0, 0.0),",
         "0.0 -> 1.0",
@@ -293,6 +267,28 @@ REASONS: Final[Mapping[Key, str]] = {
             ("radius = float(np.max(law_constants(settings).spectral_radius))", "max -> min", _STABLE),
             ("if not radius < 1:", "< -> <=", _STABLE),
             ("if not radius < 1:", "1 -> 2", _STABLE),
+        )
+    },
+    ("derived_settings.py", "FLOW_POSITION_M: Final = 0.04", "0.04 -> 0.044000000000000004"): _CHOICE,
+    **{
+        ("step_response.py", line, change): reason
+        for line, change, reason in (
+            (
+                "found = fit_response([segment], 0, [segment.counted], integrator=integrator)",
+                "0 -> 1",
+                _BOTH_AXES,
+            ),
+            (
+                "return found, root_mean_square(residuals(found, [segment], 0, [segment.counted]))",
+                "0 -> 1",
+                _BOTH_AXES,
+            ),
+            (
+                "chosen, error = (richer, richer_error) if richer_error < WORTH * plain_error "
+                "else (plain, plain_error)",
+                "< -> <=",
+                _EQUAL,
+            ),
         )
     },
 }

@@ -13,15 +13,17 @@ from typing import Final
 
 import pytest
 
+from tests.mutation.margin_reasons import MARGIN_REASONS
 from tests.mutation.python_bench import ROOMS, ROOT, mutants_of
 from tests.mutation.python_mutants import python_mutants
-from tests.mutation.python_reasons import REASONS
+from tests.mutation.python_reasons import PYTHON_REASONS
 from tests.mutation.reasons import Key
 from tests.support.tools import require
 
 SAMPLES: Final = {"fences": 10, "tracker": 4}
 """Rooms whose tests are quick: CI tries one fault in so many, others when the source changes."""
-OPEN: Final = ("design", "axes", "hover", "margins")
+REASONS: Final = {**PYTHON_REASONS, **MARGIN_REASONS}
+OPEN: Final = ("linear controllers",)
 """Rooms of whose survivors not all have a reason yet: the command alone tries them."""
 
 

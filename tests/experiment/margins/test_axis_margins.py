@@ -1,5 +1,6 @@
 """Figures of an axis against their definitions: covariances, sines in the time domain, decaying motion."""
 
+import dataclasses
 import math
 from functools import lru_cache
 from typing import Any, Final
@@ -10,7 +11,14 @@ from scipy.linalg import block_diag, solve_discrete_lyapunov
 
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.experiment.margins.axis_margins import Margins, frequencies, measure_poles
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.experiment.margins.axis_margins import (
+    Margins,
+    frequencies,
+    measure_axis,
+    measure_height,
+    measure_poles,
+)
 from mambo_sil.experiment.margins.hover_loop import (
     AT_COMMAND,
     AT_MOTORS,
@@ -25,6 +33,7 @@ from mambo_sil.experiment.margins.hover_loop import (
 )
 from mambo_sil.experiment.margins.hover_margins import Loops, hover_loops, measure_loops
 from mambo_sil.experiment.margins.loop_margins import sensitivity
+from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.flight.scenario import choose_sensors
@@ -161,6 +170,44 @@ def test_the_least_damped_pole_is_that_of_a_known_system() -> None:
     assert (found.slowest_s, found.growth_1_s) == pytest.approx((5.0, -0.2), rel=1e-6)
 
 
+def modes(poles: list[float], inputs: Any, outputs: Any) -> PeriodicLoop:
+    """Return a system of real poles, each a state of its own, in ticks of 10 ms."""
+    moved, shown = (np.array(one, np.float64)[None] for one in (inputs, outputs))
+    feed, sampled = (
+        kind((1, shown.shape[1], *more), dtype)
+        for kind, more, dtype in ((np.zeros, moved.shape[2:], np.float64), (np.ones, (), np.bool_))
+    )
+    return PeriodicLoop(0.01, np.diag(poles)[None], moved, shown, feed, sampled)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "counts"),
+    [
+        ([[1.0], [1.0]], [[1.0, 1.0]], True),
+        ([[1e-2], [1e-2]], [[1e-2, 1e-2]], True),
+        ([[-1.0], [1.0]], [[1.0, 1.0]], True),
+        ([[1.0], [1.0]], [[-1.0, 1.0]], True),
+        ([[1.0], [1.0]], [[1.0, 1.0], [-1.0, 1.0]], True),
+        ([[1e-4], [1.0]], [[1.0, 1.0]], False),
+        ([[1.0], [1.0]], [[1e-4, 1.0]], False),
+        ([[1e-4], [1.0]], [[1.0, 1.0], [1.0, 0.0]], True),
+        ([[1e-4, 1.0], [1.0, 0.0]], [[1.0, 1.0]], True),
+    ],
+)
+def test_a_pole_counts_by_its_share_of_an_answer(inputs: Any, outputs: Any, counts: bool) -> None:
+    """A thousandth of the largest residue, from one input to one output, whatever its sign and scale."""
+    found = measure_poles(modes([0.99, 0.9], inputs, outputs))
+    assert found.slowest_s == pytest.approx(-0.01 / math.log(0.99 if counts else 0.9))
+
+
+def test_a_pole_that_alternates_counts_too() -> None:
+    """Its root has half the rate of the ticks."""
+    found = measure_poles(modes([-0.9, 0.9], [[1.0], [1.0]], [[1.0, 1.0]]))
+    size = math.hypot(math.log(0.9), math.pi)
+    assert found.least_damping == pytest.approx(-math.log(0.9) / size)
+    assert found.least_damped_rad_s == pytest.approx(size / 0.01)
+
+
 def _exponential(matrix: Any) -> Any:
     values, vectors = np.linalg.eig(matrix)
     return (vectors * np.exp(values) @ np.linalg.inv(vectors)).real
@@ -191,3 +238,37 @@ def test_the_figures_at_each_place_are_those_of_the_loop_broken_there(
         for place, (broken, rad_s) in places.items():
             largest = np.abs(sensitivity(broken, rad_s)).max()
             assert largest <= margins.loops[place].sensitivity < 1.005 * largest
+
+
+@pytest.mark.parametrize(("name", "sensors"), PAIRS)
+def test_axes_have_their_names_and_motors_if_the_drone_has(name: str, sensors: SensorsName) -> None:
+    """Roll, pitch, height; the figures of the command are those of a drone with motors."""
+    loops, found, period_s = hovering(name, sensors)
+    assert [one.axis for one in found] == ["roll", "pitch", "height"][: len(found)]
+    without = measure_axis(loops[1], "pitch", period_s, motors=False)
+    assert without == found[1].model_copy(update={"motors": None})
+    assert without != found[1]
+
+
+def test_an_unstable_loop_has_no_margins_and_no_bounded_answer() -> None:
+    """Neither at the command nor at the motors; every gain is infinite."""
+    loops, _, period_s = hovering("crazyflie", "mocap")
+    roll, height = (
+        dataclasses.replace(loop, transition=1.02 * loop.transition) for loop in (loops[0], loops[2])
+    )
+    axes = (measure_axis(roll, "roll", period_s, motors=True), measure_height(height, period_s))
+    for one in axes:
+        assert (one.stable, one.command, one.motors, one.loops) == (False, None, None, {})
+        assert one.gust_to_place_s2 == math.inf
+        assert {one.to_place for one in one.noise.values()} == {math.inf}
+        assert {one.to_command for one in one.noise.values()} == {math.inf}
+    assert (axes[0].gust_to_command_rad_s2_m, axes[0].sensed_variation_rad) == (math.inf, math.inf)
+    assert (axes[1].gust_to_thrust, axes[1].sensed_variation_m_s2) == (math.inf, math.inf)
+
+
+def test_a_subject_has_the_axes_of_its_loops() -> None:
+    """None if its law is not linear."""
+    drone = vehicle_toml.preset("mambo")
+    _, found, _ = hovering("mambo", "none")
+    assert axes_on(MarginSubject("mine", preset("mambo"), drone)) == list(found)
+    assert axes_on(MarginSubject("mine", preset("mambo-1norm"), drone)) is None

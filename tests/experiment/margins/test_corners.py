@@ -28,12 +28,13 @@ PROPERTY: Final = {"gain": "gain", "acceleration_per_tilt_g": "gain"} | {
 
 
 def uncertain_drone(factor: float = 1.0) -> VehicleFile:
-    """Return a drone with intervals of a factor times WIDTHS."""
+    """Return a drone with intervals of a factor times WIDTHS, which flies with a tenth of its thrust."""
     lines = ["", "[thrust]", "lag_s = 0.06", "gain = 0.95", "", "[uncertainty]"]
     for key, width in WIDTHS.items():
         name = key.removeprefix("attitude.").removeprefix("body.").replace(".", "_")
         lines.append(f"{name} = {factor * width!r}")
-    return vehicle_toml.parse(VEHICLES.text("crazyflie-flown") + "\n".join(lines) + "\n", "mine", "mine.toml")
+    strong = VEHICLES.text("crazyflie-flown").replace("thrust_max_n = 0.575", "thrust_max_n = 8.0")
+    return vehicle_toml.parse(strong + "\n".join(lines) + "\n", "mine", "mine.toml")
 
 
 def value_of(drone: VehicleFile, key: str) -> Any:

@@ -164,6 +164,7 @@ def test_results_and_report_have_the_height() -> None:
     assert "height_command_gain_up" in Path("out/drones.csv").read_text("utf-8").splitlines()[0]
     responses = Path("out/response.csv").read_text("utf-8")
     assert "height,command," in responses
+    assert "roll,motors," in responses
     assert "height,motors," not in responses
     run("report", "out")
     page = Path("report.html").read_text("utf-8")

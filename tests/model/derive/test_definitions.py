@@ -209,6 +209,29 @@ def test_a_drone_without_sensors_is_calm() -> None:
     assert blind.position_noise == type(blind)().position_noise
 
 
+def test_a_flow_deck_has_a_noise_of_its_own() -> None:
+    """Of the position; velocity and disturbance as with motion capture; as old as a frame of 10 ms."""
+    seen = GENERIC.model_dump() | {"sensors": {"kind": "flow-deck"}}
+    deck = settings_for(VehicleFile.model_validate(seen)).observer
+    captured = settings_for(GENERIC).observer
+    assert (deck.velocity_noise, deck.disturbance_noise) == (
+        captured.velocity_noise,
+        captured.disturbance_noise,
+    )
+    assert deck.position_noise > 10 * captured.position_noise
+    assert deck.age_s == 0.01
+
+
 def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:
     """That settings allow."""
     assert settings_for(strong(1.00001)).limits.tilt_rad == 0.01
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.0, 1.1])
+def test_the_gain_of_the_thrust_is_that_of_the_file(gain: float) -> None:
+    """1, the default, is not written."""
+    drone = strong(2.0, thrust={"lag_s": 0.06, "gain": gain})
+    height = settings_for(drone).height
+    assert height is not None
+    assert height.thrust_gain == gain
+    assert ("thrust_gain" in controller_text(drone, "mine")) is (gain != 1.0)

@@ -1,16 +1,24 @@
 """The flight that `design` judges: calm settings, and a drone that falls, is far off or oscillates."""
 
+import math
 import re
+from dataclasses import fields
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.model.derive.derived_flight import fly_derived
+from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.model.derive.derived_flight import _fault, fly_derived
 from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.scenarios import CRAZYFLIE
 
 
 def settings_for(drone: VehicleFile) -> Settings:
@@ -40,6 +48,11 @@ def test_a_drone_that_delivers_too_little_is_seen(learnt: str, words: str) -> No
     assert found.words.endswith("(through sensors mocap)")
 
 
+def test_a_height_is_judged_only_if_the_settings_hold_it() -> None:
+    """A drone whose own loop holds it lower, with 0.8 of the thrust, stays at its target."""
+    assert fly_derived(preset("crazyflie"), delivering(0.8)).good
+
+
 def test_a_drone_that_falls_is_seen() -> None:
     """A fifth of the expected thrust is less than can be learnt."""
     found = fly_derived(settings_for(delivering(1.0)), delivering(0.2))
@@ -55,3 +68,88 @@ def test_a_drone_that_oscillates_is_seen() -> None:
     found = fly_derived(settings_for(drone), drone)
     assert not found.good
     assert found.words.startswith("flown for 10 s: OSCILLATES, by 0.")
+    assert found.words.endswith(f"(through sensors {SENSORS_OF['mambo'][-1]})")
+
+
+TIME_S = np.arange(-1.0, 10.005, 0.01)
+"""Ten seconds, and a take-off before."""
+TARGET_M = np.array([0.3, -0.2, -1.4])
+
+
+def still(**changes: Any) -> Trace:
+    """Return four flights at rest at their target; changes are added to arrays from t = 5 s on."""
+    shape = (len(TIME_S), 4)
+    trace = Trace(
+        time_s=TIME_S,
+        position_m=np.broadcast_to(TARGET_M, (*shape, 3)).copy(),
+        velocity_m_s=np.zeros((*shape, 3)),
+        euler_rad=np.zeros((*shape, 3)),
+        target=np.broadcast_to([0.3, -0.2, 0.0, 0.0, 1.4, 0.0], (*shape, 6)).copy(),
+        command_rad=np.zeros((*shape, 2)),
+        thrust_acceleration_m_s2=np.full(shape, 9.81),
+        status=np.zeros(shape, dtype=np.int64),
+    )
+    for name, (flight, column, values) in changes.items():
+        getattr(trace, name)[TIME_S >= 5.0, flight, column] += values
+    return trace
+
+
+LATE_S = TIME_S[TIME_S >= 5.0]
+SINE = math.sqrt(2.0) * np.sin(4.0 * math.pi * LATE_S)
+"""Whole periods, of rms 1."""
+
+
+@pytest.mark.parametrize(
+    ("changes", "axes", "fault"),
+    [
+        ({}, 3, None),
+        ({"position_m": (0, 0, 0.049)}, 3, None),
+        ({"position_m": (3, 0, 0.051)}, 3, "FAR OFF, 51 mm along x in the mean"),
+        ({"position_m": (1, 1, -0.068)}, 2, "FAR OFF, 68 mm along y in the mean"),
+        ({"position_m": (2, 2, 0.3)}, 3, "FAR OFF, 300 mm along z in the mean"),
+        ({"position_m": (2, 2, 0.3)}, 2, None),
+        ({"position_m": (0, 0, 0.1 * SINE)}, 3, None),
+        ({"euler_rad": (0, 0, 0.145 * SINE)}, 3, None),
+        ({"euler_rad": (3, 0, 0.155 * SINE)}, 3, "OSCILLATES, by 0.15 rad and 0 m/s (rms)"),
+        ({"euler_rad": (0, 1, 0.24 * SINE)}, 3, "OSCILLATES, by 0.24 rad and 0 m/s (rms)"),
+        ({"euler_rad": (0, 2, 0.5 * SINE)}, 3, None),
+        ({"euler_rad": (0, 0, 0.3)}, 3, None),
+        ({"velocity_m_s": (0, 2, 0.195 * SINE)}, 3, None),
+        ({"velocity_m_s": (3, 2, 0.21 * SINE)}, 3, "OSCILLATES, by 0 rad and 0.21 m/s (rms)"),
+        ({"velocity_m_s": (3, 2, 0.21 * SINE)}, 2, None),
+        ({"velocity_m_s": (3, 0, 0.5)}, 2, None),
+        ({"velocity_m_s": (1, 0, math.nan), "euler_rad": (1, 0, math.nan)}, 3, "OSCILLATES, by nan rad"),
+        ({"position_m": (2, 2, 2.0)}, 2, "CRASHES after 5 s, on the ground"),
+    ],
+)
+def test_the_end_of_a_flight_is_judged(
+    changes: dict[str, tuple[int, int, Any]], axes: int, fault: str | None
+) -> None:
+    """Any of four flights: where it is in the mean, the rms of what moves, along the axes that are held."""
+    found = _fault(still(**changes), CRAZYFLIE, axes)
+    if fault is None:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.startswith(fault)
+
+
+def test_what_comes_before_the_end_is_not_judged() -> None:
+    """But the first crash is told."""
+    trace = still()
+    trace.position_m[TIME_S < 4.99, 0, 0] += 1.0
+    trace.euler_rad[TIME_S < 4.99, 0, 0] = 0.4 * np.sin(9.0 * TIME_S[TIME_S < 4.99])
+    assert _fault(trace, CRAZYFLIE, 3) is None
+    trace.position_m[TIME_S > 4.0, 1, 2] += 2.0
+    trace.position_m[TIME_S > 3.255, 2, 2] += 2.0
+    assert _fault(trace, CRAZYFLIE, 3) == "CRASHES after 3.26 s, on the ground"
+
+
+def test_the_place_that_is_seen_is_judged() -> None:
+    """Estimates drift; the settings hold what they see."""
+    drifted = still(position_m=(0, 0, 0.4))
+    columns = {field.name: getattr(drifted, field.name) for field in fields(Trace)}
+    seen = {f"seen_{name}": getattr(still(), name) for name in ("position_m", "velocity_m_s", "euler_rad")}
+    assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) is None
+    seen["seen_position_m"] = drifted.position_m
+    assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) == "FAR OFF, 400 mm along x in the mean"

@@ -7,12 +7,14 @@ from typing import Any
 import pytest
 
 from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
 from mambo_sil.experiment.margins.corners import at_ends, corners
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.many_drones import measure_drone
+from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.model.derive.derived_margins import JudgedMargins, _reserve, _without, judge_margins
 from mambo_sil.model.derive.derived_settings import controller_text
 from tests.support.scenarios import CRAZYFLIE, changed
@@ -112,14 +114,80 @@ def test_a_drone_without_a_property_differs_in_nothing_else(
 @pytest.mark.parametrize("one", ["roll", "pitch"])
 def test_a_dead_time_of_one_axis_is_a_property_too(one: str) -> None:
     """And without any, it is none."""
-    still = {"gain": 1.0, "lag_s": 0.1, "dead_time_s": 0.0}
-    axes = {"roll": still, "pitch": still} | {one: still | {"dead_time_s": 0.03}}
+    prompt = {"gain": 1.0, "dead_time_s": 0.0}
+    still = {"roll": prompt | {"lag_s": 0.1}, "pitch": prompt | {"lag_s": 0.12}}
+    axes = still | {one: still[one] | {"dead_time_s": 0.03}}
     late = dict(_without(changed(GENERIC, attitude=axes), height=False))
-    none = dict(_without(changed(GENERIC, attitude={"roll": still, "pitch": still}), height=False))
+    none = dict(_without(changed(GENERIC, attitude=still), height=False))
     assert [words.split(",")[0] for words in late if "dead" in words] == ["dead_time_s of roll and pitch"]
     ends = ("0.03 and 0.0", "0.0 and 0.03")
     assert next(iter(late)).endswith(ends[one == "pitch"])
     assert not any("dead" in words for words in none)
+
+
+def test_a_thrust_without_a_dead_time_is_none() -> None:
+    """Its lag alone is no property."""
+    drone = changed(FLOWN, thrust={"dead_time_s": 0.0})
+    assert not any("thrust" in words for words in dict(_without(drone, height=True)))
+
+
+def blind(**sections: Any) -> VehicleFile:
+    """Return a drone whose true state is seen."""
+    document = changed(GENERIC, **sections).model_dump() | {"sensors": {"kind": "none"}}
+    return VehicleFile.model_validate(document)
+
+
+def of_gains(roll: float, pitch: float, lag_s: float = 0.15) -> VehicleFile:
+    """Return a drone without sensors and dead times, with gains of the attitude."""
+    axis = {"lag_s": lag_s, "dead_time_s": 0.0}
+    return blind(attitude={"roll": axis | {"gain": roll}, "pitch": axis | {"gain": pitch}})
+
+
+def settings_for(drone: VehicleFile) -> Settings:
+    """Return the settings in the file that is written for a drone."""
+    return controller_toml.parse(controller_text(drone, "mine"), "mine")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_warning_begins_where_a_loop_tolerates_too_little(axis: int) -> None:
+    """Of one axis, whose gain is raised until its loop tolerates less than 30 ms of delay."""
+    settings = settings_for(of_gains(0.5, 0.5))
+    for gain, reserve in ((1.2647, 1.05), (1.3208, 0.95)):
+        gains = [0.5, 0.5]
+        gains[axis] = gain
+        found, warned = judge_margins(settings, of_gains(*gains)), reserve < 1.0
+        assert min(map(_reserve, found.axes)) == pytest.approx(reserve, abs=2e-3)
+        assert (found.warning is not None) is warned
+        last = found.lines()[-1]
+        if warned:
+            assert last == f"warning: {found.warning}"
+            assert last.endswith("30 ms more delay; no single property is the cause")
+        else:
+            assert last.endswith("more delay (true state)")
+
+
+@pytest.mark.parametrize(
+    ("gain", "dead_time_s", "late_s", "begin"),
+    [(1.0, 0.1, 0.004, "dead_time_s of roll"), (1.5, 0.002, 0.1, "sensors.kind")],
+)
+def test_the_cause_is_the_property_without_which_most_is_left(
+    gain: float, dead_time_s: float, late_s: float, begin: str
+) -> None:
+    """Of sensors and dead time; the settings are derived again, and sensors that stay are seen through."""
+    axis = {"gain": gain, "lag_s": 0.15, "dead_time_s": dead_time_s}
+    sensors = {"position_delay_s": late_s}
+    drone = changed(GENERIC, attitude={"roll": axis, "pitch": axis}, sensors=sensors)
+    found = judge_margins(settings_for(of_gains(gain / 2.5, gain / 2.5)), drone)
+    left = {
+        words: min(map(_reserve, measure_drone(settings_for(other), other, seen)))
+        for (words, other), seen in zip(
+            _without(drone, height=False), (SENSORS_OF["mocap"][-1], "none"), strict=True
+        )
+    }
+    cause = max(left, key=lambda words: left[words])
+    assert cause.startswith(begin)
+    assert found.warning is not None
+    assert f"the main cause is {cause}: without it" in found.warning
 
 
 def judged(dead_time_s: float) -> JudgedMargins:
@@ -177,3 +245,20 @@ def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dea
     assert f"the main cause is {cause}" in found.warning
     enough = "large enough" if without[cause] >= 1.0 else "still too small"
     assert found.warning.endswith(f"without it the margins are {enough}")
+
+
+def test_an_interval_is_taken_away_at_the_worst_ends_of_the_others() -> None:
+    """Roll, with settings for less gain, tolerates too little even without the dead time that it may have."""
+    axis = {"gain": 0.5, "lag_s": 0.15, "dead_time_s": 0.0}
+    widths = {"roll_gain": 0.1, "roll_dead_time_s": 0.035}
+    drone = blind(attitude={"roll": axis | {"gain": 1.3}, "pitch": axis}, uncertainty=widths)
+    settings = settings_for(of_gains(0.5, 0.5))
+    late, strong = (
+        min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "none")))
+        for ends in ({"gain": 0, "dead_time_s": 1}, {"gain": 1, "dead_time_s": 0})
+    )
+    assert late < strong < 1.0
+    assert str(judge_margins(settings, drone).warning).endswith(
+        "the main cause is the interval of attitude.roll.dead_time_s +- 0.035: "
+        "without it the margins are still too small"
+    )

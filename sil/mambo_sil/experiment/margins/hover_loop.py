@@ -123,7 +123,6 @@ def close_loop(
             b[of_memory, errors] = controller.b
             b[of_memory, noise:] = controller.b @ noisy
             fed[:, at_command] = np.eye(axes)
-            d[at_command, at_command] = 0.0
         else:
             sent[:, newest] = np.eye(axes)
             a[of_memory, of_memory] = np.eye(memory)
