@@ -26,9 +26,9 @@ def test_a_narrow_fence_changes_nothing_midway() -> None:
 @pytest.mark.parametrize(
     ("settings", "load"),
     [
-        (height_settings(delay_s=0.0), 1.4),
-        (height_settings(delay_s=0.07), 1.4),
-        (with_option(height_settings(), "observer.age_s", 0.03), 1.1),
+        (height_settings(delay_s=0.0), 1.2),
+        (height_settings(delay_s=0.05), 1.2),
+        (with_option(height_settings(), "observer.age_s", 0.024), 1.1),
     ],
     ids=["thrust without delay", "thrust with delay", "old state"],
 )

@@ -84,7 +84,7 @@ def linear_controller(settings: Settings, load: float = 1.0) -> LinearController
 def _hover(settings: Settings) -> tuple[FloatArray, FloatArray]:
     """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), the target midway.
 
-    That is between floor and ceiling; the state is on the floor of the world, from where _learn moves it.
+    That is between floor and ceiling; `_learn` moves the state there.
     """
     if settings.height is None:
         return np.zeros((1, 7)), np.zeros((1, 6))
