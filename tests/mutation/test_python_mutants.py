@@ -13,6 +13,7 @@ from typing import Final
 
 import pytest
 
+from tests.mutation.controller_reasons import CONTROLLER_REASONS
 from tests.mutation.margin_reasons import MARGIN_REASONS
 from tests.mutation.python_bench import ROOMS, ROOT, mutants_of
 from tests.mutation.python_mutants import python_mutants
@@ -22,9 +23,7 @@ from tests.support.tools import require
 
 SAMPLES: Final = {"fences": 10, "tracker": 4}
 """Rooms whose tests are quick: CI tries one fault in so many, others when the source changes."""
-REASONS: Final = {**PYTHON_REASONS, **MARGIN_REASONS}
-OPEN: Final = ("linear controllers",)
-"""Rooms of whose survivors not all have a reason yet: the command alone tries them."""
+REASONS: Final = {**PYTHON_REASONS, **MARGIN_REASONS, **CONTROLLER_REASONS}
 
 
 def in_function(line: str) -> set[str]:
@@ -105,9 +104,9 @@ def test_a_fault_of_a_sample_is_noticed_or_explained(room: str) -> None:
 
 @pytest.mark.thorough
 @pytest.mark.long
-@pytest.mark.parametrize("room", [room for room in ROOMS if room not in OPEN])
+@pytest.mark.parametrize("room", ROOMS)
 def test_a_fault_is_noticed_or_explained(room: str) -> None:
-    """Every fault of each room that is not open; the message has the survivors."""
+    """Every fault of each room; the message has the survivors."""
     require("gcc", "gcc")
     assert [key for key in unnoticed(room) if key not in REASONS] == []
 

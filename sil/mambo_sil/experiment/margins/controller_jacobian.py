@@ -60,9 +60,9 @@ def linear_controller(settings: Settings, load: float = 1.0) -> LinearController
     settled = CompiledController(settings)
     state, target = _hover(settings)
     if settings.height is None:
-        stored = 0
         for _ in range(_SETTLING_STEPS):
-            stored = _step(settled, state, target).stored.shape[1]
+            outcome = _step(settled, state, target)
+        stored = outcome.stored.shape[1]
     else:
         state, stored = _learn(settled, state, target, load)
     seen = state.shape[1] - (settings.height is not None)  # contact with the floor is yes or no
@@ -82,11 +82,14 @@ def linear_controller(settings: Settings, load: float = 1.0) -> LinearController
 
 
 def _hover(settings: Settings) -> tuple[FloatArray, FloatArray]:
-    """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), in a fence midway."""
+    """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), the target midway.
+
+    That is between floor and ceiling; `_learn` moves the state there.
+    """
     if settings.height is None:
         return np.zeros((1, 7)), np.zeros((1, 6))
     state, target, fence = np.zeros((1, 10)), np.zeros((1, 9)), settings.limits.fence
-    state[:, 7] = target[:, 6] = (fence.floor_m + fence.ceiling_m) / 2.0
+    target[:, 6] = (fence.floor_m + fence.ceiling_m) / 2.0
     return state, target
 
 
