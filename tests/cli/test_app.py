@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import to_toml, with_option
 from tests.support.command import run, unwrapped
 
 
@@ -49,6 +51,50 @@ def test_what_cannot_be_flown_is_named(arguments: tuple[str, ...], message: str)
     _, error = run("fly", "crazyflie", "--app", "crazyflie", *arguments, code=2)
     assert message in unwrapped(error)
     assert not Path("flight").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("duration_s = 2.0\nmeasured_from_s = 3.0", "measured_from_s = 3.0 must be less than duration_s"),
+        ("height_m = 99.0", "height_m = 99.0 must lie in 0.1..10.0"),
+        ('[[event]]\nat_s = -1.0\ndo = "kick"', "event.0.at_s = -1.0 must be greater than or equal to 0"),
+        (
+            '[[event]]\nat_s = 1.0\ndo = "nan"\nframez = 2',
+            "event.0.framez is not a key of this file; did you mean",
+        ),
+        ("[drone]\nwind_m_s = [500.0, 0.0]", "drone.wind_m_s.0 = 500.0 must be less than or equal to 100"),
+        (
+            "[bounds]\noff_m = { lest = 1.0 }",
+            "bounds.off_m.lest is not a key of this file; did you mean least?",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_a_wrong_events_file_is_named_by_key_value_and_rule(text: str, message: str) -> None:
+    """Also in a list."""
+    Path("wrong.toml").write_text(text, "utf-8")
+    _, error = run("fly", "--app", "crazyflie", "--events", "wrong.toml", code=2)
+    assert message in unwrapped(error)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--duration-s", "-1"), ("--size-m", "1000"), ("--rate-rad-s", "99")]
+)
+def test_a_curve_that_cannot_be_flown_is_named(option: str, value: str) -> None:
+    """By option, value and rule."""
+    _, error = run("fly", "--app", "crazyflie", "--trajectory", "circle", option, value, code=2)
+    assert f"{option} = {float(value)} must be" in unwrapped(error)
+
+
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_names_with_a_prefix_are_read_and_set() -> None:
+    """The app's group has the name of `code.prefix`."""
+    settings = with_option(presets.preset("crazyflie"), "code.prefix", "left")
+    Path("left.toml").write_text(to_toml(settings), "utf-8")
+    text, _ = run("fly", "left.toml", "--app", "crazyflie", "--events", "limits-one-by-one", "--no-pictures")
+    assert "1 bounds kept" in text
+    assert json.loads(Path("flight/summary.json").read_text("utf-8"))["measures"]["command_rms_rad"] > 0.0
 
 
 def test_events_are_for_an_app() -> None:

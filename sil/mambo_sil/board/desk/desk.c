@@ -201,6 +201,7 @@ logVarId_t logGetVarId(const char *group, const char *name)
 
 float logGetFloat(logVarId_t id) { return (float)value_of(&LOGGED[id]); }
 
+const char *desk_group(void) { return host_logged[0].name; }
 const char *desk_console(void) { return console; }
 
 /* What measures. */
@@ -417,30 +418,6 @@ void desk_full_state(const double position_m[3], const double velocity_m_s[3], c
     sent.acceleration = vector(acceleration_m_s2);
     sent.attitudeQuaternion = (quaternion_t){ 0.0f, 0.0f, (float)sin(0.5 * yaw_rad), (float)cos(0.5 * yaw_rad) };
     sent.mode.x = sent.mode.y = sent.mode.z = sent.mode.quat = modeAbs;
-    set_points_send(&sent, now_ms);
-}
-
-void desk_position(double x_m, double y_m, double z_m, double yaw_rad)
-{
-    const double position_m[3] = { x_m, y_m, z_m };
-    setpoint_t sent = { .timestamp = now_ms };
-
-    sent.position = vector(position_m);
-    sent.attitude.yaw = (float)(DEGREES * yaw_rad);
-    sent.mode.x = sent.mode.y = sent.mode.z = sent.mode.yaw = modeAbs;
-    set_points_send(&sent, now_ms);
-}
-
-void desk_hover(double forward_m_s, double left_m_s, double z_m)
-{
-    const double velocity_m_s[3] = { forward_m_s, left_m_s, 0.0 };
-    setpoint_t sent = { .timestamp = now_ms };
-
-    sent.velocity = vector(velocity_m_s);
-    sent.position.z = (float)z_m;
-    sent.velocity_body = true;
-    sent.mode.x = sent.mode.y = sent.mode.yaw = modeVelocity;
-    sent.mode.z = modeAbs;
     set_points_send(&sent, now_ms);
 }
 

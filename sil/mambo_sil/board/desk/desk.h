@@ -49,8 +49,6 @@ void desk_run(int milliseconds);
 
 /* Set-points by radio, in SI units and rad. */
 void desk_full_state(const double position_m[3], const double velocity_m_s[3], const double acceleration_m_s2[3], double yaw_rad);
-void desk_position(double x_m, double y_m, double z_m, double yaw_rad);
-void desk_hover(double forward_m_s, double left_m_s, double z_m);
 void desk_stop(void);                   /* motors off */
 void desk_yield(void);                  /* no set-points follow: the high-level commander flies */
 
@@ -72,6 +70,9 @@ void desk_state(desk_state_t *state);
 /* Return a log variable as "group.name", NaN if there is none; set a parameter, 0 if there is none. */
 double desk_log(const char *name);
 int desk_set(const char *name, double value);
+
+/* Return the group of the app's log variables and parameters. */
+const char *desk_group(void);
 
 /* What was printed. */
 const char *desk_console(void);

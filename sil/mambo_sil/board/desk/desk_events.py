@@ -14,8 +14,6 @@ from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.trajectories import CURVES, vertical_of
 
 SAMPLE_MS: Final = 10
-PREFIX: Final = "nmpc"
-"""Of the app's log variables and parameters, which `code.prefix` would change."""
 SWITCHED_ON_MS: Final = 1500
 SETTLING_MS: Final = 4000
 """After the take-off, before the course begins."""
@@ -90,7 +88,7 @@ class _Flight:
         self.desk = Desk(library, file.conditions(seed, offset_ms))
         self._course, self._period_ms = _Course(file, seed), file.set_points.period_ms
         self._sends, self._due_ms = self._period_ms > 0, 0
-        self._prefix = PREFIX
+        self._group = self.desk.group
         self.rows: list[tuple[float, ...]] = []
 
     def run(self, time_s: float) -> None:
@@ -99,14 +97,14 @@ class _Flight:
         desk.run(SAMPLE_MS)
         planned = tuple(desk.log(f"ctrltarget.{axis}") for axis in "xyz")
         target = self._course.motion(time_s)[0] if self._period_ms > 0 else planned
-        logged = (desk.log(f"{self._prefix}.{name}") for name in ("outRoll", "outPitch", "lost"))
+        logged = (desk.log(f"{self._group}.{name}") for name in ("outRoll", "outPitch", "lost"))
         self.rows.append((time_s, *desk.state.position_m, *target, *logged))
 
     def send(self, now_ms: int) -> None:
         """Send a set-point if one is due."""
         if self._sends and now_ms >= self._due_ms:
             self.desk.full_state(self._course.packet(0.001 * now_ms))
-            self._due_ms += self._period_ms
+            self._due_ms = now_ms - now_ms % self._period_ms + self._period_ms
 
     def happen(self, event: EventSection) -> None:
         """Let an event happen."""
@@ -114,7 +112,7 @@ class _Flight:
         if event.do in ("sensors-on", "sensors-off"):
             desk.measure(on=event.do == "sensors-on")
         elif event.do in ("radio-on", "radio-off"):
-            self._sends = event.do == "radio-on"
+            self._sends = event.do == "radio-on" and self._period_ms > 0
         elif event.do == "jump":
             desk.jump(vector, event.frames)
         elif event.do == "nan":
@@ -122,7 +120,7 @@ class _Flight:
         elif event.do == "kick":
             desk.kick(vector)
         elif event.do == "set":
-            desk.set(f"{self._prefix}.{event.name}", float(event.value))
+            desk.set(f"{self._group}.{event.name}", float(event.value))
         else:
             self._sends = False
             desk.yield_()

@@ -101,6 +101,12 @@ class Desk:
         printed: bytes = self._ffi.string(self._c.desk_console())
         return printed.decode()
 
+    @property
+    def group(self) -> str:
+        """The group of the app's log variables and parameters: `code.prefix` of its settings."""
+        name: bytes = self._ffi.string(self._c.desk_group())
+        return name.decode()
+
     def log(self, name: str) -> float:
         """Return a log variable as `group.name`; NaN if there is none."""
         return float(self._c.desk_log(name.encode()))

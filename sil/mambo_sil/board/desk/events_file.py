@@ -4,7 +4,8 @@ import math
 from importlib.resources import as_file
 from typing import Annotated, Final, Literal
 
-from pydantic import Field, Strict
+from pydantic import Field, Strict, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.board.desk.desk_flight import DeskConditions, DeskSensors
@@ -120,13 +121,21 @@ class EventsFile(FileSection):
     size_m: float = Field(1.0, ge=-100.0, le=100.0)
     rate_rad_s: float = Field(1.0, ge=-10.0, le=10.0)
     height_m: float = Field(1.0, ge=0.1, le=10.0)
-    duration_s: float = Field(20.0, gt=0.0, le=LONGEST_S)
+    duration_s: float = Field(20.0, ge=0.1, le=LONGEST_S)
     measured_from_s: float = Field(0.0, ge=0.0, le=LONGEST_S)
     drone: DroneSection = DroneSection()
     sensors: SensorsSection = SensorsSection()
     set_points: SetPointsSection = SetPointsSection()
     event: Annotated[tuple[EventSection, ...], Strict(False)] = ()
     bounds: dict[MeasureName, BoundSection] = Field(default_factory=dict)
+
+    @field_validator("measured_from_s")
+    @classmethod
+    def _check_measured(cls, value: float, info: ValidationInfo) -> float:
+        """Leave a part of the course to measure."""
+        if value >= info.data.get("duration_s", LONGEST_S):
+            raise PydanticCustomError("measured", "must be less than duration_s")
+        return value
 
     def conditions(self, seed: int, offset_ms: int) -> DeskConditions:
         """Return the conditions of the flight, at an offset of the sensors' clock in ms."""

@@ -3,6 +3,7 @@
 from typing import Final, Literal, get_args
 
 import typer
+from pydantic import ValidationError
 
 from mambo_codegen.errors import echo
 from mambo_codegen.toolchain import host_toolchain
@@ -10,7 +11,7 @@ from mambo_sil.board.desk import desk_library, events_file
 from mambo_sil.board.desk.desk_events import broken, fly_events, measure
 from mambo_sil.board.desk.desk_report import DESK_FILES, DeskSummary, desk_text, draw_flight, write_trace
 from mambo_sil.board.desk.events_file import EventsFile, SensorsSection
-from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Other, Output, Runner
+from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, OtherFlight, Output, Runner
 from mambo_sil.cli.options import load, show
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CurveName
@@ -24,7 +25,9 @@ OF_A_COURSE: Final = frozenset({"trajectory", "size_m", "rate_rad_s", "duration_
 """Options allowed besides where there is no events file."""
 
 
-def fly_app(course: Course, conditions: Conditions, runner: Runner, output: Output, other: Other) -> None:
+def fly_app(
+    course: Course, conditions: Conditions, runner: Runner, output: Output, other: OtherFlight
+) -> None:
     """Fly once on the desk, write the results; exit 1 if a bound of the events file is broken.
 
     Raises FlightError, and the errors of loading settings and events and of building the C.
@@ -71,12 +74,20 @@ def _course(course: Course) -> EventsFile:
     names: tuple[CurveName, ...] = get_args(CurveName)
     for name in names:
         if course.trajectory == name:
-            return EventsFile(
-                trajectory=name,
-                size_m=SIZE_M if course.size_m is None else course.size_m,
-                rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
-                duration_s=course.duration_s,
-            )
+            try:
+                return EventsFile(
+                    trajectory=name,
+                    size_m=SIZE_M if course.size_m is None else course.size_m,
+                    rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
+                    duration_s=course.duration_s,
+                )
+            except ValidationError as error:
+                fault = error.errors()[0]
+                option, rule = (
+                    str(fault["loc"][0]).replace("_", "-"),
+                    fault["msg"].replace("Input should", "must"),
+                )
+                raise FlightError(f"--{option} = {fault['input']} {rule} with --app") from None
     raise FlightError(f"--trajectory {echo(course.trajectory)} must be {', '.join(names)} with --app")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import UnwritableError, echo
-from mambo_sil.cli.fly.fly_options import Conditions, Course, Other, Output, Runner, command_of
+from mambo_sil.cli.fly.fly_options import Conditions, Course, OtherFlight, Output, Runner, command_of
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
 
 
-def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output, other: Other) -> None:
+def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output, other: OtherFlight) -> None:
     """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes.
 
     To see how settings fly a curve, a push, gusts, sensors or another drone.
@@ -56,7 +56,7 @@ def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output,
         fly_once(course, conditions, runner, output)
 
 
-fly = command_of(_fly, Runner, Course, Conditions, Output, Other)
+fly = command_of(_fly, Runner, Course, Conditions, Output, OtherFlight)
 
 
 def campaign(

@@ -121,7 +121,7 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Other:
+class OtherFlight:
     """A recorded flight again, or that of an app on the desk; `context` knows which options were given."""
 
     context: typer.Context

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
-from mambo_sil.cli.fly.fly_options import Other, Output
+from mambo_sil.cli.fly.fly_options import OtherFlight, Output
 from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
@@ -23,7 +23,7 @@ ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
 """Options allowed with --repeat; the record contains all others."""
 
 
-def fly_again(file: Path, output: Output, other: Other) -> None:
+def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
     """Repeat the flight recorded in `file`, or in the database of its campaign, with the reference.
 
     Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.

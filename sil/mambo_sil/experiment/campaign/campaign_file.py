@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, TypeVar, get_args
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import (
     BaseModel,
@@ -362,7 +362,7 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
             return _explain_unknown(names, dotted, model)
         case "model_type" | "dict_type":
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
-        case "greater_than_equal" | "less_than_equal":
+        case "greater_than_equal" | "less_than_equal" if all(isinstance(one, str) for one in details["loc"]):
             limits = _section(names, model).model_fields[names[-1]].metadata
             low, high = (next(getattr(m, k) for m in limits if hasattr(m, k)) for k in ("ge", "le"))
             return f"{dotted} = {value} must lie in {low}..{high}"
@@ -373,12 +373,13 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
 def _section(names: Sequence[str], model: type[FileSection]) -> Any:
     """Return the model of the section to which the key at the path `names` belongs.
 
-    The names of sections of one kind, as in dict[str, Section], are free.
+    The names of sections of one kind, as in dict[str, Section], are free; those of a list are its indices.
     """
     section: Any = model
     for name in names[:-1]:
         inner = get_args(section)
-        section = inner[1] if inner else section.model_fields[name].annotation
+        one = inner[0] if get_origin(section) is tuple else inner[-1] if inner else None
+        section = section.model_fields[name].annotation if one is None else one
     return section
 
 
