@@ -83,10 +83,8 @@ def _course(course: Course) -> EventsFile:
                 )
             except ValidationError as error:
                 fault = error.errors()[0]
-                option, rule = (
-                    str(fault["loc"][0]).replace("_", "-"),
-                    fault["msg"].replace("Input should", "must"),
-                )
+                option = str(fault["loc"][0]).replace("_", "-")
+                rule = fault["msg"].replace("Input should", "must")
                 raise FlightError(f"--{option} = {fault['input']} {rule} with --app") from None
     raise FlightError(f"--trajectory {echo(course.trajectory)} must be {', '.join(names)} with --app")
 
