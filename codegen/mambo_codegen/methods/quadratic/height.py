@@ -64,12 +64,12 @@ class HeightBounds:
 class Lift:
     """What a step knows of the height of n controllers.
 
-    lies:   (n,) whether the drone lies on the floor.
-    weight: (n,) by how much more the measured tilt counts than in hover; None if no more.
+    on_ground: (n,) whether the drone lies on the floor.
+    weight:    (n,) by how much more the measured tilt counts than in hover; None if no more.
     """
 
     state: HeightState
-    lies: Rows
+    on_ground: Rows
     weight: Real | None
 
 
@@ -183,8 +183,8 @@ class HeightAxis:
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""
-        state, lies = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
-        return Lift(state, lies, self.weight(self.lift(state, state.thrust)))
+        state, on_ground = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
+        return Lift(state, on_ground, self.weight(self.lift(state, state.thrust)))
 
     def command_weight(self, state: HeightState) -> Real:
         """Return by how much more tilts (n,) count with the last command than in hover."""
@@ -204,16 +204,16 @@ class HeightAxis:
 
         tilt_rad (n, 2) compensates the thrust. Returns also which drones (n,) lie on the floor.
         """
-        lies = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
+        on_ground = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
         step = self._products.speed_product(measured[:, 1])
         first, share = has_state & none_yet, self._cosine(tilt_rad)
         started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
         lying = replace(started, velocity_m_step=np.zeros_like(step))
         found = choose(none_yet, started, self._correct(state, measured, step))
-        corrected = choose(has_state, choose(lies, lying, found), state)
-        flown = self._vertical(share, state.thrust_m_s2)
-        steady = replace(corrected, thrust=flown, lagged=flown, command=flown)
-        return replace(choose(first, steady, corrected), share=share), lies
+        corrected = choose(has_state, choose(on_ground, lying, found), state)
+        delivered = self._vertical(share, state.thrust_m_s2)
+        steady = replace(corrected, thrust=delivered, lagged=delivered, command=delivered)
+        return replace(choose(first, steady, corrected), share=share), on_ground
 
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
@@ -256,10 +256,10 @@ class HeightAxis:
         command = self._vertical(state.share, thrust)
         return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
-    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
         products = self._products
-        acceleration = np.where(lies, 0, self._acceleration(state))
+        acceleration = np.where(on_ground, 0, self._acceleration(state))
         mean = state.velocity_m_step + products.half_change(acceleration)
         velocity = state.velocity_m_step + products.velocity_change(acceleration)
         return replace(

@@ -56,9 +56,9 @@ class NoHeight:
         del target, measured, bounds
         return state, np.zeros_like(follows)
 
-    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Return zeros."""
-        del lies
+        del on_ground
         return state
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:

@@ -121,7 +121,7 @@ class ControlStep:
             tilt_rad=np.where(seen, angles, memory.tilt_rad),
             command_rad=command,
             missed=aim.missed,
-            height=self.height.predict(aim.height, lift.lies),
+            height=self.height.predict(aim.height, lift.on_ground),
             height_bounds=memory.height_bounds,
         )
 
@@ -155,7 +155,7 @@ class ControlStep:
         missed = self._count(memory.missed, inputs.has_state)
         columns, follows = self._level_columns, inputs.allows_command & (missed < self._no_estimate)
         level, upward = inputs.target[:, :columns], inputs.target[:, columns:]
-        height, acts = self.height.aim(
+        height, limit_active = self.height.aim(
             lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
         limits, motion, target = self.limits.aim(
@@ -167,19 +167,19 @@ class ControlStep:
         aim = _Aim(target, motion, limits, height, weight, missed, has_command=follows, rests=follows & False)
         if not self.limits.brake:
             return aim
-        return self._end_outage(aim, estimate, acts)
+        return self._end_outage(aim, estimate, limit_active)
 
-    def _end_outage(self, aim: _Aim, estimate: Estimate, acts: Rows) -> _Aim:
+    def _end_outage(self, aim: _Aim, estimate: Estimate, limit_active: Rows) -> _Aim:
         """Brake by the model's velocity where an outage lasts too long, until the model is at rest.
 
-        acts (n,): whether a limit of the height acts.
+        limit_active (n,): whether a limit of the height acts.
         """
         overdue = aim.missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = overdue & ~slow, overdue & slow
         stopped = np.concatenate([estimate.position_m, np.zeros_like(aim.target[:, 2:])], axis=1)
         active = np.where(brakes, ActiveLimit.BRAKING, np.where(rests, 0, aim.limits.active))
-        active = (active & ~ActiveLimit.HEIGHT) + np.where(acts, ActiveLimit.HEIGHT, 0)
+        active = (active & ~ActiveLimit.HEIGHT) + np.where(limit_active, ActiveLimit.HEIGHT, 0)
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),

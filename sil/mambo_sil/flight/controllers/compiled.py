@@ -142,7 +142,7 @@ class CompiledController:
 
     @property
     def last_thrust_m_s2(self) -> NDArray[np.float64]:
-        """The thrusts over mass (n,) that were last commanded, set or told.
+        """The thrusts over mass (n,) that were last commanded, set or reported.
 
         Raises ValueError without a height in the settings.
         """

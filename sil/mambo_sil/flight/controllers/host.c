@@ -67,7 +67,7 @@ void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_
     }
 }
 
-/* The thrusts that were last commanded, set or told. */
+/* The thrusts that were last commanded, set or reported. */
 void nmpc_host_last_thrust(const nmpc_t *controllers, int n, nmpc_real_t *thrust_m_s2)
 {
     int i;
@@ -133,8 +133,8 @@ static nmpc_real_t number_of(double value, int bits)
 #endif
 
 /* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
- * of a state, whose last is not 0 on the floor, and 9 of a target; it is told a thrust that is no NaN, and returns the
- * next one behind the angles. */
+ * of a state, whose last is not 0 on the floor, and 9 of a target; a thrust that is no NaN is the
+ * reported one. It returns the next one behind the angles. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
                        double thrust_acceleration_m_s2, double *command)
 {
