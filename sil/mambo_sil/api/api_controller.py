@@ -220,6 +220,17 @@ class Controller:
             raise ArgumentError("set_thrust needs settings with [height]")
         return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
 
+    def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
+        """Tell whether a position is measured, as by cameras: one truth value for all or (...).
+
+        While none is, as over a flow deck, the observer takes coarser gains. Returns a status (n,), always 0.
+        Raises ArgumentError without `[guard]` in the settings.
+        """
+        if self.settings.guard is None:
+            raise ArgumentError("set_position_measured needs settings with [guard]")
+        measured = np.broadcast_to(np.asarray(is_measured, np.bool_).reshape(-1), self.n)
+        return self._compiled.set_position_measured(measured)
+
     def __getstate__(self) -> dict[str, Any]:
         return {
             "settings": self.settings,

@@ -110,6 +110,11 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
         calls(settings, ApiFunction.SLEW_HEADING, _random_headings(n, rng)),
         calls(settings, ApiFunction.STEP, steps[5]),
         *(
+            [calls(settings, ApiFunction.SET_MEASURED, rng.uniform(-1, 1, (n, 1)))]
+            if method.guard is not None
+            else []
+        ),
+        *(
             [calls(settings, ApiFunction.SET_THRUST, _random_thrusts(settings, n, rng))]
             if method.has_height
             else []
@@ -232,9 +237,11 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         (ApiFunction.INIT, NULL_SELF),
         *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
         *([(ApiFunction.SET_THRUST, NULL_SELF)] if method_of(settings).has_height else []),
+        *([(ApiFunction.SET_MEASURED, NULL_SELF)] if method_of(settings).guard is not None else []),
     ):
         for nulls in range(pointers + 1):
-            values = [[0.1]] if function == ApiFunction.SET_THRUST else [[0.1, 0.2]]
+            takes_one = function in {ApiFunction.SET_THRUST, ApiFunction.SET_MEASURED}
+            values = [[0.1]] if takes_one else [[0.1, 0.2]]
             made = calls(settings, function, np.array(values), nulls)
             yield _surround(settings, rng, made)
 

@@ -100,6 +100,17 @@ void nmpc_host_limits_active(const nmpc_t *controllers, int n, int *active)
 }
 #endif
 
+#ifdef NMPC_HAS_GUARD
+void nmpc_host_set_position_measured(nmpc_t *controllers, int n, const unsigned char *is_measured, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_position_measured(&controllers[i], (int)is_measured[i]);
+    }
+}
+#endif
+
 void nmpc_host_slew_heading(int n, const nmpc_real_t *previous_rad, const nmpc_real_t *wanted_rad,
                             const nmpc_real_t *most_change_rad, nmpc_real_t *next_rad)
 {
