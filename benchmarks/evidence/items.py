@@ -20,11 +20,14 @@ from benchmarks.evidence.board_tables import (
     read_footprints,
 )
 from benchmarks.evidence.campaign_tables import (
+    SLOW_MOTORS,
     campaign,
     campaign_motor_lag,
     campaign_ratios,
     opponents,
+    opponents_curves,
     opponents_ratios,
+    opponents_summary,
     read_campaign,
     read_opponents,
     read_quantiles,
@@ -193,19 +196,24 @@ ITEMS: Final = (
         name="opponents",
         commands=(
             f"mambo-nmpc campaign {_HERE}/opponents.toml -o {RESULTS}/opponents/drawn",
-            f"mambo-nmpc campaign {_HERE}/opponents-slow-motors.toml --flights 300 "
-            f"-o {RESULTS}/opponents/slow-motors",
+            *(
+                f"mambo-nmpc campaign {_HERE}/opponents-{name}.toml --flights 300 "
+                f"-o {RESULTS}/opponents/{name}"
+                for name in SLOW_MOTORS
+            ),
         ),
         controllers=_FLOWN,
         paths=(
-            *(*_FLIGHT, f"{_EXPERIMENT}/campaign"),
-            *(f"{_HERE}/opponents.toml", f"{_HERE}/opponents-slow-motors.toml"),
+            *(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/opponents.toml"),
+            *(f"{_HERE}/opponents-{name}.toml" for name in SLOW_MOTORS),
         ),
         read=read_opponents,
         tables={
+            "opponents-summary": opponents_summary,
             "opponents": opponents("drawn"),
             "opponents-ratios": opponents_ratios,
             "opponents-slow-motors": opponents("slow-motors"),
+            "opponents-curves": opponents_curves,
         },
     ),
     _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
