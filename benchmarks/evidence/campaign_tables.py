@@ -179,7 +179,7 @@ def opponents_ratios(figures: Figures) -> str:
 
 
 def opponents_summary(figures: Figures) -> str:
-    """Return the three figures of each controller that README shows; an IAE of 100 s in m s is a mean in cm."""
+    """Return three figures of each controller for README; an IAE of 100 s, in m s, is a mean in cm."""
     rows = []
     for name in _SUMMARISED:
         drawn, eight, circle = (
