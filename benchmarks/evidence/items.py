@@ -70,6 +70,12 @@ _ONE_NORM: Final = f"{_HERE}/one-norm.toml"
 _FLIGHT: Final = ("sil/mambo_sil/drone", "sil/mambo_sil/flight")
 _EXPERIMENT: Final = "sil/mambo_sil/experiment"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
+_MEASURES: Final = (
+    *_FLIGHT,
+    "sil/mambo_sil/board/footprint",
+    "codegen/mambo_codegen/data/boards",
+    "codegen/mambo_codegen/bundle/flags.py",
+)
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
 _STYLE: Final = "sil/mambo_sil/results/style.py"
@@ -121,7 +127,7 @@ ITEMS: Final = (
     Item(
         name="space",
         commands=space_commands(f"{RESULTS}/space"),
-        controllers=("crazyflie", f"{_HERE}/height.toml"),
+        controllers=("crazyflie", "design crazyflie"),
         paths=(*_FLIGHT, _STYLE, f"{_HERE}/moving_picture.py"),
         read=read_space,
         tables={"space": space_table},
@@ -246,12 +252,7 @@ ITEMS: Final = (
             f"mambo-nmpc footprint mambo --optimisation=-Os -o {RESULTS}/footprint/size",
         ),
         controllers=_MEASURED,
-        paths=(
-            *_FLIGHT,
-            "sil/mambo_sil/board/footprint",
-            "codegen/mambo_codegen/data/boards",
-            "codegen/mambo_codegen/bundle/flags.py",
-        ),
+        paths=_MEASURES,
         read=read_footprints(
             dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))
             | {"mambo -Os": "size"}
@@ -265,6 +266,18 @@ ITEMS: Final = (
             "footprint-scalars": footprint_scalars,
             "compilers": compilers,
         },
+    ),
+    Item(
+        name="footprint-crazyflie",
+        commands=(
+            f"mambo-nmpc design crazyflie -o {RESULTS}/footprint-crazyflie/controller.toml",
+            f"mambo-nmpc footprint {RESULTS}/footprint-crazyflie/controller.toml "
+            f"-o {RESULTS}/footprint-crazyflie/derived",
+        ),
+        controllers=("design crazyflie",),
+        paths=_MEASURES,
+        read=read_footprints({"design crazyflie": "derived"}),
+        tables={"footprint-crazyflie": footprint("design crazyflie")},
     ),
     Item(
         name="faults",
