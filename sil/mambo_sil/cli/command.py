@@ -55,7 +55,7 @@ OptionalSource = Annotated[
     ),
 ]
 Scalar = Annotated[
-    str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
+    str | None, typer.Option(help="Scalar type of the C: float32, float64 or fixed.", metavar="TYPE")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
 
@@ -185,7 +185,7 @@ def _root_options(
 
 def output_option(about: str) -> Any:
     """Return the option -o, a path; `about` is its help."""
-    return typer.Option("--output", "-o", help=about, metavar="<path>")
+    return typer.Option("--output", "-o", help=about, metavar="PATH")
 
 
 OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]
