@@ -27,8 +27,14 @@ SLOW_MOTORS: Final = {
     "slow-motors-fast-eight": "eight at 0.8 rad/s",
 }
 """The curve of each campaign of light drones with slow motors."""
-_SUMMARISED: Final = ("pd", "table1", "pd-feedforward", "pid-feedforward", "mambo")
-"""The controllers that README shows."""
+_SUMMARISED: Final = {
+    "pd": "PD of the paper",
+    "table1": "`table1`, its NMPC",
+    "pd-feedforward": "PD with feed-forward",
+    "pid-feedforward": "PID with feed-forward",
+    "mambo": "`mambo`, our MPC",
+}
+"""The controllers that README shows, with their titles there."""
 
 
 def read_quantiles(results: Path) -> Figures:
@@ -181,13 +187,13 @@ def opponents_ratios(figures: Figures) -> str:
 def opponents_summary(figures: Figures) -> str:
     """Return three figures of each controller for README; an IAE of 100 s, in m s, is a mean in cm."""
     rows = []
-    for name in _SUMMARISED:
+    for name, shown in _SUMMARISED.items():
         drawn, eight, circle = (
             figures[campaign]["controllers"][name] for campaign in ("drawn", *list(SLOW_MOTORS)[:2])
         )
         rows.append(
             {
-                "controller": title(name),
+                "controller": shown,
                 "1000 random drones: median distance, cm": three(drawn["quantiles"]["seen_iae_m_s"]["0.5"]),
                 "slow motors, eight: crashes of 300": str(eight["crashed"]["count"]),
                 "slow motors, fast circle: crashes of 300": str(circle["crashed"]["count"]),
