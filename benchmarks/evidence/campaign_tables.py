@@ -194,9 +194,9 @@ def opponents_summary(figures: Figures) -> str:
         rows.append(
             {
                 "controller": shown,
-                "1000 random drones: median distance, cm": three(drawn["quantiles"]["seen_iae_m_s"]["0.5"]),
-                "slow motors, eight: crashes of 300": str(eight["crashed"]["count"]),
-                "slow motors, fast circle: crashes of 300": str(circle["crashed"]["count"]),
+                "distance, cm": three(drawn["quantiles"]["seen_iae_m_s"]["0.5"]),
+                "crashes: eight": str(eight["crashed"]["count"]),
+                "crashes: circle": str(circle["crashed"]["count"]),
             }
         )
     return table(rows)
