@@ -40,7 +40,7 @@ _TRAIL_S: Final = 1.0
 _SHADES: Final = 8
 """Of each colour, from itself to white: its edges are smooth."""
 _SIZE_INCHES: Final = (5.4, 2.6)
-_FONT: Final = dict.fromkeys(("font.size", "axes.titlesize"), 10.0)
+_FONT: Final[dict[Any, Any]] = dict.fromkeys(("font.size", "axes.titlesize"), 10.0)
 """In a picture so narrow these points are 9 pixels where a phone shows it 358 pixels wide."""
 _DPI: Final = 160
 _TURN_RAD, _RISE_RAD = np.radians(20.0), np.radians(35.0)

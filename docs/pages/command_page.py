@@ -1,6 +1,6 @@
 """The commands on the page of the command line, from the application itself."""
 
-from typing import Final
+from typing import Any, Final
 
 import typer
 from typer.core import TyperGroup
@@ -38,7 +38,7 @@ def _paragraphs(text: str | None) -> list[str]:
     return [line for line in (text or "").split("\n\n") if line]
 
 
-def _records(command: typer.core.TyperCommand, context: typer.Context, kind: str) -> list[list[str]]:
+def _records(command: Any, context: typer.Context, kind: str) -> list[list[str]]:
     """Return name and explanation of the arguments or the options of a command, as its help has them."""
     rows = []
     for parameter in command.get_params(context):

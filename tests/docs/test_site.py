@@ -22,7 +22,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     require_module("math_core")
     folder = tmp_path_factory.mktemp("site")
     script = Path(sys.executable).with_name("mkdocs")
-    command = [script, "build", "--strict", "--site-dir", folder]
+    command: list[str | Path] = [script, "build", "--strict", "--site-dir", folder]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return folder

@@ -180,7 +180,7 @@ def _root_options(
         typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version),
     ] = False,
 ) -> None:
-    """Generate a model predictive controller in static-memory C99 for a small drone, and fly it in simulation."""
+    """Generate model predictive control of a small drone in static-memory C99, and fly it in simulation."""
 
 
 def output_option(about: str) -> Any:
