@@ -32,7 +32,6 @@ from benchmarks.evidence.campaign_tables import (
     read_opponents,
     read_quantiles,
 )
-from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
@@ -113,16 +112,6 @@ ITEMS: Final = (
         read=read_table2,
         tables={"table2": table2, "table2-quarter": table2_quarter},
         pictures={"figure3.png": "table2/figure3.png"},
-    ),
-    Item(
-        name="first",
-        commands=first_commands(f"{RESULTS}/first"),
-        controllers=("mambo", "table1"),
-        paths=(*_FLIGHT, _STYLE, f"{_HERE}/first_picture.py"),
-        read=read_distances,
-        tables={"first": first_table},
-        pictures={"first.png": "first.png"},
-        draw=draw_first_picture,
     ),
     Item(
         name="space",

@@ -190,10 +190,9 @@ FIGURES = [
         lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
     ),
     Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
-    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("first")["pd"])),
-    Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
-    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),
-    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("first")["mambo"], 1)),
+    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("space")["pd"])),
+    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
+    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("space")["third-axis"])),
     Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
     Figure(
         "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)
