@@ -108,6 +108,14 @@ def in_crazyflow(controller: str) -> str:
     return shown(sorted(found)[len(found) // 2])
 
 
+def in_firmware(curve: str, controller: str) -> str:
+    """Return the mean distance in cm over 60 s of a curve in the Crazyflie's firmware, of nine flights."""
+    record = json.loads((ROOT / "docs" / "evidence" / "records" / "firmware.json").read_text("utf-8"))
+    iae_m_s = record["figures"]["curves"][curve][controller]["iae_m_s"]
+    distance_cm = 100 * sum(iae_m_s) / len(iae_m_s) / 60
+    return f"{distance_cm:.1f}" if distance_cm < 10 else f"{distance_cm:.0f}"
+
+
 def ratio_of_pid(index: str) -> float:
     """Return the median, over 1000 random drones, of the tuned PID's index divided by that of `mambo`."""
     found = figures("opponents")["improvements"]
@@ -182,6 +190,15 @@ FIGURES = [
     Figure(FIXED_POINT, r"it takes (.+?) % of the instructions of float32", share_of_fixed),
     Figure(FIXED_POINT, r"on the Mega (\d+) % of the update", lambda: period_percent("mega", FIXED)),
     Figure(FIXED_POINT, r"where float32 takes (\d+) %", lambda: period_percent("mega")),
+    Figure("README.md", r"on an eight: (\S+) cm", lambda: in_firmware("eight", "design")),
+    Figure("README.md", r"Mellinger's controller (\S+) cm", lambda: in_firmware("eight", "mellinger")),
+    Figure("README.md", r"Lee's (\S+) cm", lambda: in_firmware("eight", "lee")),
+    Figure("README.md", r"cm, PID (\d+) cm", lambda: in_firmware("eight", "pid")),
+    Figure(
+        "README.md",
+        r"in the firmware, (\S+ to \S+) cm",
+        lambda: f"{in_firmware('circle', 'design')} to {in_firmware('circle', 'lee')}",
+    ),
     Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
     Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
     Figure(
