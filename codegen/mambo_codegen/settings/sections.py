@@ -335,7 +335,7 @@ class Code(SettingsSection):
     scalar: Literal["float32", "float64", "fixed"] = Field(
         "float32",
         description="Scalar type of the C: float32 is float, float64 is double, fixed is fixed point with "
-        "32-bit integers, for processors without an FPU.",
+        "32-bit integers, for 32-bit processors without an FPU.",
     )
     prefix: str = Field(
         "nmpc",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
 
-_OUTPUT: Final = output_option("Folder for the results; earlier results there are overwritten.")
+_OUTPUT: Final = output_option("Folder for the results; overwrites earlier ones.")
 Results = Annotated[Path, _OUTPUT]
 OptionalResults = Annotated[Path | None, _OUTPUT]
 Workers = Annotated[
@@ -43,7 +43,7 @@ Boards = Annotated[
     typer.Option(
         "--board",
         help=f"{', '.join(BOARD_NAMES)}, or a board's TOML file; again for another; by default all.",
-        metavar="NAME|FILE",
+        metavar="NAME",
         autocompletion=complete_boards,
     ),
 ]
@@ -54,7 +54,7 @@ def _vehicle_option(about: str) -> Any:
     return typer.Option(
         "--vehicle",
         help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml{about}.",
-        metavar="NAME|FILE",
+        metavar="NAME",
         autocompletion=complete_vehicles,
     )
 
@@ -66,14 +66,17 @@ PortName = Annotated[
     str | None,
     typer.Option(
         "--port",
-        help="Serial port of a board with the firmware of `generate --for pil`; the C on it must have the "
-        "bits of that on this machine.",
-        metavar="DEVICE|socket://HOST:PORT",
+        help="Serial port of a board with the firmware of `generate --for pil`, or socket://HOST:PORT; its C "
+        "must have this machine's bits.",
+        metavar="DEVICE",
     ),
 ]
 BAUD: Final = 500000
 """The rate of the shipped boards."""
-Baud = Annotated[int | None, typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1)]
+Baud = Annotated[
+    int | None,
+    typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1, metavar="N"),
+]
 
 
 def load_boards(names: "Sequence[str] | None") -> "Sequence[Board]":

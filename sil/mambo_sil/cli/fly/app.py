@@ -18,7 +18,7 @@ from mambo_sil.flight.names import CurveName
 from mambo_sil.results.folders import new_results
 
 OF_AN_APP: Final = frozenset(
-    {"app", "events", "source", "scalar", "sensors", "seed", "output", "pictures", "as_json"}
+    {"app", "events", "source", "scalar", "sensors", "seed", "output", "no_pictures", "as_json"}
 )
 """Options allowed with --app and an events file, which says all else."""
 OF_A_COURSE: Final = frozenset({"trajectory", "size_m", "rate_rad_s", "duration_s"})
@@ -48,7 +48,7 @@ def fly_app(
         trace = fly_events(library, file, conditions.seed)
         measures = measure(trace, file)
         write_trace(trace, folder / "trace.csv")
-        if output.pictures:
+        if not output.no_pictures:
             draw_flight(trace, file, events or course.trajectory, folder / "flight")
         summary = DeskSummary(
             app=name,
@@ -63,7 +63,7 @@ def fly_app(
         )
         summary.write(folder)
     show(summary, desk_text(summary), as_json=output.as_json)
-    written = DESK_FILES if output.pictures else DESK_FILES[:1]
+    written = DESK_FILES[:1] if output.no_pictures else DESK_FILES
     typer.echo(f"{echo(str(output.output))}: {', '.join(written)}", err=True)
     if not summary.good:
         raise typer.Exit(1)
