@@ -51,7 +51,7 @@ def vehicle_part() -> str:
     """Return what the code writes on the page of vehicle.toml: a table for each section and each kind."""
     parts = []
     shown: set[str] = set()
-    for attitude, sensors in (("cascade", "mambo"), ("first_order", "mocap"), ("mambo", "none")):
+    for attitude, sensors in (("cascade", "mambo"), ("first_order", "mocap"), ("mambo", "true")):
         found = form(attitude, sensors)
         kinds = {"attitude": attitude, "sensors": sensors}
         for section, description in found.sections.items():

@@ -151,8 +151,8 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
     ("response_file.py", "_COUNT: Final = 600", "600 -> 601"): _CHOICE,
     (
         "derived_margins.py",
-        'seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"',
-        'sensors if other.sensors.kind == drone.sensors.kind else "none" -> ("none")',
+        'seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "true"',
+        'sensors if other.sensors.kind == drone.sensors.kind else "true" -> ("true")',
     ): "settings derived for sensors have about the same margins without these: no other cause is known",
     (
         "response_file.py",

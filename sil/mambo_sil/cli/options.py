@@ -9,6 +9,7 @@ import typer
 from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
 from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.flight.names import present_sensors
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
@@ -26,6 +27,21 @@ Workers = Annotated[
 
 BOARD_NAMES: Final = BOARDS.names()
 VEHICLE_NAMES: Final = VEHICLES.names()
+
+
+def sensors_option(names: Sequence[str], about: str) -> Any:
+    """Return the option that chooses sensors by name, of which older ones are read."""
+
+    def read(text: str) -> str:
+        name = present_sensors(text)
+        if name not in names:
+            raise typer.BadParameter(f"{text!r} is not one of {', '.join(map(repr, names))}.")
+        return str(name)
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=complete)
 
 
 def complete_boards(incomplete: str) -> list[str]:

@@ -1,6 +1,6 @@
 """`fly --app`: fly a generated app on the desk, with what surrounds it in its firmware."""
 
-from typing import Final, Literal, get_args
+from typing import Final, get_args
 
 import typer
 from pydantic import ValidationError
@@ -91,9 +91,7 @@ def _course(course: Course) -> EventsFile:
 
 def _with_sensors(file: EventsFile, name: str) -> EventsFile:
     """Return an events file with other sensors; raises FlightError."""
-    kinds: tuple[Literal["mocap", "flow-deck"], ...] = get_args(events_file.SensorsKind)
-    for kind in kinds:
-        if name == kind:
-            sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": kind})
-            return file.model_copy(update={"sensors": sensors})
-    raise FlightError(f"--sensors {echo(name)} must be {' or '.join(kinds)} with --app")
+    if name not in events_file.SENSORS:
+        raise FlightError(f"--sensors {echo(name)} must be {' or '.join(events_file.SENSORS)} with --app")
+    sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": name})
+    return file.model_copy(update={"sensors": sensors})

@@ -9,9 +9,16 @@ from typing import Annotated, Any, Final, Literal
 import typer
 
 from mambo_sil.cli.command import AsJson, Scalar, complete_presets
-from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards
+from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards, sensors_option
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, ControllerName, SensorsName, Start
+from mambo_sil.flight.names import (
+    CURVE_NAMES,
+    SENSORS_NAMES,
+    AltitudeName,
+    ControllerName,
+    SensorsName,
+    Start,
+)
 
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
@@ -58,12 +65,12 @@ class Conditions:
     ] = None
     sensors: Annotated[
         SensorsName,
-        typer.Option(
-            help="What state all loops get: none, the true one; mambo or mambo-derotated, by optical flow "
-            "with its rotation or without; mocap, motion capture; flow-deck, with --app.",
-            metavar="NAME",
+        sensors_option(
+            SENSORS_NAMES,
+            "What state all loops get: true; mocap, motion capture; mambo or mambo-derotated, by optical flow "
+            "with its rotation or without; flow-deck, with --app.",
         ),
-    ] = "none"
+    ] = "true"
     altitude_loop: Annotated[
         AltitudeName,
         typer.Option(

@@ -18,7 +18,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     FlowDeckSensors,
     MamboSensors,
     MocapSensors,
-    NoSensors,
+    TrueState,
 )
 from mambo_sil.model.derive.step_response import fit_steps
 
@@ -36,6 +36,7 @@ MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
 LATE_VELOCITY_M_S: Final = 0.15
+TRUE_VELOCITY_M_S: Final = 0.02
 LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
 """Noise densities of the observer."""
@@ -169,7 +170,12 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
         yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
-    elif isinstance(sensors, NoSensors):
+    elif drone.knows_sensors and isinstance(sensors, TrueState):
+        yield Derived("observer", "position_noise", LEAST_POSITION_M, "The true state has no noise")
+        words = "Learns wind within tenths of a second"
+        yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
+        yield Derived("observer", "velocity_noise", TRUE_VELOCITY_M_S, "The true velocity is never late")
+    elif isinstance(sensors, TrueState):
         words = (
             "No sensors in the file: calm with those of the Mambo and with motion capture, best with neither"
         )
