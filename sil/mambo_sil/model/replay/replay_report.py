@@ -129,7 +129,7 @@ def finding(summary: LogReplaySummary) -> str:
         case ReplayVerdict.CANNOT_TELL:
             return f"CANNOT TELL whether it was this controller: {summary.missing}"
         case ReplayVerdict.NO:
-            limit = f"and should {100.0 * SAME:g} % at most"
+            limit = f"more than the {100.0 * SAME:g} % allowed"
             return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
     if summary.equal_steps == summary.steps:
         return f"all {summary.steps} commands of the log are those of this controller, bit for bit"
