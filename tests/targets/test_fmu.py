@@ -25,7 +25,8 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import Flight, PositionController, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.trajectories import CURVES, Bernoulli
 from tests.support.bundles import place
 from tests.support.height_settings import height_settings

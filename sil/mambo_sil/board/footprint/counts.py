@@ -20,7 +20,8 @@ from mambo_sil.board.footprint.cycles import CycleModel, ModelledCycles
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import STEP_S
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Bernoulli
 
 HARNESS: Final = (
