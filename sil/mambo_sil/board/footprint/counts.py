@@ -66,7 +66,7 @@ class CycleCounts:
     """Modelled cycles of the same ticks without wait states, and the most of those and of the search's steps.
 
     `fewest` and `most_with_wait` are the bounds of the most expensive step: the least that the manual allows
-    without wait states, and the most with those of a flash whose caches are empty when the step begins.
+    without wait states, and the most with a flash whose caches are empty when the step begins.
     """
 
     least: int
