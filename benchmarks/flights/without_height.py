@@ -4,7 +4,7 @@ from mambo_codegen.settings.guard_section import Guard
 from mambo_codegen.settings.model import Settings
 
 
-def level(settings: Settings) -> Settings:
+def without_height(settings: Settings) -> Settings:
     """Return settings without [height], and without what a guard has for the thrust."""
     guard = settings.guard
     if guard is not None:
