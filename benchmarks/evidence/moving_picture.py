@@ -200,7 +200,7 @@ def _draw_quadrotor(axes: Any, place: Points, angles_rad: Points, colour: str) -
         ring = at(forward + (_ROTOR_M * np.cos(_AROUND)), right + (_ROTOR_M * np.sin(_AROUND)))
         inside = (*to_rgb(colour), 0.45) if forward > 0 else "white"
         axes.fill(*ring.T, facecolor="white", zorder=2)
-        axes.fill(*ring.T, facecolor=inside, edgecolor=colour, linewidth=1.0, zorder=2)
+        axes.fill(*ring.T, facecolor=inside, edgecolor=colour, linewidth=ARM, zorder=2)
     axes.fill(*at(_BODY_M * np.cos(_AROUND), _BODY_M * np.sin(_AROUND)).T, facecolor=colour, zorder=2)
 
 
