@@ -18,8 +18,9 @@ CONTROLLER: Final = """\
 
 `mambo-nmpc init` writes such a file with the explanation of every key. A missing key has its default, which
 is preset `table1`; an unknown key, a value out of range, and a value that would have no effect are refused
-with the rule and the fix. `mambo-nmpc schema` prints the JSON schema, with which editors check and complete
-the file.
+with the rule and the fix. `vehicle`, above all sections, is the [drone](vehicles.md) that commands fly with
+the settings; the C does not depend on it. `mambo-nmpc schema` prints the JSON schema, with which editors
+check and complete the file.
 
 The method is `cost.norm`. A key that only one method uses says so. The last column is preset `mambo`.
 """

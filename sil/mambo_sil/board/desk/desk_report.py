@@ -67,7 +67,8 @@ def desk_text(summary: DeskSummary) -> str:
     flown = summary.flight.trajectory if summary.events is None else echo(summary.events)
     count = len(summary.flight.bounds)
     verdict = f"{len(summary.broken)} of {count} bounds BROKEN" if summary.broken else f"{count} bounds kept"
-    answer = f"app of {echo(summary.source)} on the desk, {flown}: " + (verdict if count else "flown")
+    said = verdict if count else "flown"
+    answer = f"app of {echo(summary.source)} on the desk's Crazyflie, {flown}: {said}"
     lines = [sentence(answer), *table(("", "", "", "bound", ""), rows, (0, 2, 3, 4))]
     return "\n".join([*lines, *(f"console: {line}" for line in summary.console.splitlines() if line)])
 

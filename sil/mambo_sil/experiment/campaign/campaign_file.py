@@ -200,6 +200,11 @@ def read(path: Path, vehicle: str | None = None) -> Campaign:
     return _campaign(read_as(CampaignFile, path), path.parent, source, vehicle)
 
 
+def names_drone(path: Path) -> bool:
+    """Return whether a campaign.toml itself names the drone that flies; raises as `read_as`."""
+    return "vehicle" in read_as(CampaignFile, path).flight.model_fields_set
+
+
 def read_as(model: type[File], path: Path) -> File:
     """Read the file at `path` as a `model` with sections like those of campaign.toml.
 
