@@ -126,6 +126,7 @@ def sweep(
     When a controller does not fit its board, or to see what a setting costs.
     """
     from mambo_codegen import boards
+    from mambo_sil.board.emulation.machine import demand_emulator
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, points_text, write_points
     from mambo_sil.cli.progress import counting_bar
@@ -134,6 +135,7 @@ def sweep(
 
     settings = load(source, scalar)
     chosen, drone = boards.load(board), load_drone(vehicle, source)
+    demand_emulator(chosen.emulated_core.value)
     axes = _axes(vary, settings)
     budget = budgets(chosen, settings, axes)
     with (
