@@ -285,11 +285,12 @@ def report(
 
     To show results to somebody, or to keep them.
     """
+    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 
-    with new_page(output, "report") as write:
-        text, results = report_page(folders)
+    with new_page(output, "report") as write, counting_bar("drawing", "folders", len(folders)) as bar:
+        text, results = report_page(folders, bar)
         size = write(text)
     summary = ReportSummary(page=str(output), bytes=size, results=results)
     show(summary, f"{echo(str(output))}: {size / 1000:.0f} kB", as_json=as_json)

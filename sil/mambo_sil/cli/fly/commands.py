@@ -151,7 +151,7 @@ def faults(
     """
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.errors import FlightError
-    from mambo_sil.experiment.faults.fault_flights import End, fly_faults
+    from mambo_sil.experiment.faults.fault_flights import fly_faults
     from mambo_sil.experiment.faults.faults_report import FaultsSummary, faults_text, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
@@ -173,7 +173,7 @@ def faults(
         )
         summary.write(folder)
     show(summary, faults_text(summary), as_json=as_json)
-    if any(verdict.end is End.CRASHED for verdict in verdicts):
+    if summary.crashed:
         raise typer.Exit(1)
 
 
