@@ -27,7 +27,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, make in FOLDERS.items():
         (base / name).mkdir()
         make(base / name)
-    page, _ = report_page([base / name for name in FOLDERS], lambda done: None)
+    page, _ = report_page([base / name for name in FOLDERS], lambda _: None)
     (base / "report.html").write_text(page, "utf-8")
     return base / "report.html"
 
