@@ -162,6 +162,19 @@ def test_the_description_holds_on_the_index_too() -> None:
     assert [path for _, path in links if not (ROOT / path).exists()] == []
 
 
+def test_the_version_stands_alike_everywhere() -> None:
+    """In the citation and at the top of the changelog, a release with the same date in both."""
+    citation = dict(
+        re.findall(r"(?m)^(version|date-released): (\S+)$", (ROOT / "CITATION.cff").read_text("utf-8"))
+    )
+    (heading, *_) = re.findall(r"(?m)^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"))
+    assert citation["version"] == __version__
+    if ".dev" in __version__:
+        assert (heading, "date-released" in citation) == ("[Unreleased]", False)
+    else:
+        assert heading == f"[{__version__}] - {citation['date-released']}"
+
+
 def test_the_classifiers_are_known_and_let_it_be_uploaded() -> None:
     """An index refuses others."""
     assert set(PROJECT["classifiers"]) <= set(trove_classifiers.classifiers)
