@@ -104,12 +104,10 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o build/generated/mambo-fixed
 	$(BIN)/mambo-nmpc generate table1 -o build/generated/table1
 	for name in mambo-fixed table1; do \
-	    cp build/generated/$$name/nmpc* build/generated/$$name/controller.toml build/generated/$$name/manifest.json generated/$$name; done
+	    cp build/generated/$$name/nmpc.[ch] build/generated/$$name/manifest.json generated/$$name; done
 
 docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
-	$(BIN)/mambo-nmpc design crazyflie -o build/docs/three-axes.toml
-	$(BIN)/mambo-nmpc playground build/docs/three-axes.toml crazyflie pid-feedforward pd --vehicle crazyflie -o build/docs/play.html
 	@echo "the manual: build/docs/index.html; its search wants a server: python3 -m http.server -d build/docs"
 
 evidence: $(SETUP_TEST)

@@ -81,7 +81,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
     return between(value, -limit, limit);
 }
 
-/* Saturate `value` at +/- `limit`. */
+/* Clamp `value` at +/- `limit`. */
 NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     return (value > limit) ? limit : ((value < -limit) ? -limit : value);
@@ -320,7 +320,7 @@ static int is_good_command(const nmpc_command_t *command)
  *
  *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
- * whose largest error is as small as that of any with so many terms.
+ * whose largest error is the smallest that so many terms allow.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 4e-09.
  */
@@ -806,7 +806,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *
  * Limits of speed, braking and place (not in the paper).
  *
- * Near the target the command is that of a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
+ * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
  * desired velocity
  *
  *     v_d = v_T + k (p_T - p),   k = K_e/K_v = 1.606 1/s (the smaller one of both axes).
@@ -1440,7 +1440,15 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0, 0 }, { 260899300, 260899300 }, 1244700, 304895, 213426, 41943040, 201326592, 11744051, { 23041, 23041 }
+        { 0, 0 }, /* centre_m */
+        { 260899300, 260899300 }, /* clear_m */
+        1244700, /* margin_m */
+        304895, /* knee_m */
+        213426, /* near_m */
+        41943040, /* speed_m_s */
+        201326592, /* braking_m_s2 */
+        11744051, /* tilt_rad */
+        { 23041, 23041 } /* command_m_step2 */
     };
 
     self->bounds = bounds;

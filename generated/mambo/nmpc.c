@@ -104,7 +104,7 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
 }
 
 #if defined(__GNUC__)
-/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+/* The bits of a magnitude are ordered as the magnitudes are, and a NaN's exceed them all. One comparison of whole
  * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
 #define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
 
@@ -137,7 +137,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 }
 #endif
 
-/* Saturate `value` at +/- `limit`. */
+/* Clamp `value` at +/- `limit`. */
 NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     nmpc_real_t clamped = value;
@@ -191,7 +191,7 @@ static int is_good_command(const nmpc_command_t *command)
  *
  *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
- * whose largest error is as small as that of any with so many terms.
+ * whose largest error is the smallest that so many terms allow.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 1.21e-07.
  */
@@ -681,7 +681,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *
  * Limits of speed, braking and place (not in the paper).
  *
- * Near the target the command is that of a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
+ * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
  * desired velocity
  *
  *     v_d = v_T + k (p_T - p),   k = K_e/K_v = 1.606 1/s (the smaller one of both axes).
@@ -1217,7 +1217,15 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.74821f, 1.1630836f, 0.81415856f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
+        { 0.0f, 0.0f }, /* centre_m */
+        { 995.2518f, 995.2518f }, /* clear_m */
+        4.74821f, /* margin_m */
+        1.1630836f, /* knee_m */
+        0.81415856f, /* near_m */
+        5.0f, /* speed_m_s */
+        6.0f, /* braking_m_s2 */
+        0.35f, /* tilt_rad */
+        { 0.00034335f, 0.00034335f } /* command_m_step2 */
     };
 
     self->bounds = bounds;

@@ -57,6 +57,7 @@ NOT_RUN = {
         "needs the firmware of Bitcraze, and a Crazyflie",
         "needs a Crazyflie",
     ),
+    "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }
 """The console blocks that are not run, by page: the reason, which is in the title of the block."""

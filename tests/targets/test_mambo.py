@@ -19,7 +19,8 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
 from tests.support.height_settings import height_settings
@@ -197,8 +198,8 @@ def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
                 alone.reset([[*state[4:6], 0.0]])
             if not begun:
                 begun = update == 120
-                told = stock_n / mass_kg
-                alone.reset([[*present, told]]) if begun else alone.set_thrust([told])
+                reported_m_s2 = stock_n / mass_kg
+                alone.reset([[*present, reported_m_s2]]) if begun else alone.set_thrust([reported_m_s2])
             expected = alone.step(state[np.newaxis], target[np.newaxis, :6])
             present = expected.command_rad[0].astype(np.float64)
             for tick in range(2):

@@ -34,7 +34,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
-from mambo_sil.flight.names import ALTITUDE_NAMES
+from mambo_sil.flight.names import ALTITUDE_NAMES, SENSORS_KINDS, SensorsKind
 from mambo_sil.model.derive.derived_settings import controller_text
 
 LARGEST_N: Final = 1_000_000
@@ -65,12 +65,25 @@ class Controller:
         self._heading = Heading(self._compiled)
 
     @classmethod
-    def from_vehicle(cls, vehicle: str | Path, n: int = 1, **options: Unpack[ControllerOptions]) -> Self:
+    def from_vehicle(
+        cls,
+        vehicle: str | Path,
+        n: int = 1,
+        *,
+        sensors: SensorsKind | None = None,
+        **options: Unpack[ControllerOptions],
+    ) -> Self:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
-        Raises SourceNotFoundError, UnreadableFileError, and InvalidSettingsError with all broken rules.
+        sensors: what measures, in place of the sensors in the file; "true" for the state of a simulator.
+
+        Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
+        InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
         """
         drone = _read_vehicle(vehicle)
+        if sensors is not None:
+            require_choice("sensors", sensors, SENSORS_KINDS)
+            drone = drone.with_sensors(sensors)
         settings = controller_toml.parse(controller_text(drone, drone.name), f"settings for {drone.name}")
         return cls._made(settings, n, drone, options)
 
@@ -181,7 +194,7 @@ class Controller:
 
         Call it before the first step after a pause. `which` chooses drones by truth values, of the shape of a
         batch. `thrust_m_s2`, one value for all or (...), is the thrust over mass that the drones have, with
-        `[height]` only; without it that of hover. Returns a status (n,), 0 unless a command is refused.
+        `[height]` only; without it the thrust of hover. Returns a status (n,), 0 unless a command is refused.
         """
         if thrust_m_s2 is None and self._method.has_height:
             thrust_m_s2 = hover_thrust(self.settings)
@@ -220,6 +233,17 @@ class Controller:
             raise ArgumentError("set_thrust needs settings with [height]")
         return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
 
+    def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
+        """Tell whether a position is measured, as by cameras: one truth value for all or (...).
+
+        While none is, as over a flow deck, the observer takes coarser gains. Returns a status (n,), always 0.
+        Raises ArgumentError without `[guard]` in the settings.
+        """
+        if self.settings.guard is None:
+            raise ArgumentError("set_position_measured needs settings with [guard]")
+        measured = np.broadcast_to(np.asarray(is_measured, np.bool_).reshape(-1), self.n)
+        return self._compiled.set_position_measured(measured)
+
     def __getstate__(self) -> dict[str, Any]:
         return {
             "settings": self.settings,
@@ -251,7 +275,7 @@ class Controller:
         return batch
 
     def _places(self, state: DroneState) -> list[FloatArray]:
-        """Return the columns of states, those of the height upwards."""
+        """Return the columns of states, the height's upwards."""
         columns = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
         if self._method.has_height:
             contact = state.grounded.reshape(-1).astype(np.float64)

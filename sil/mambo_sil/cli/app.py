@@ -53,10 +53,8 @@ mambo-nmpc fly controller.toml --port /dev/ttyACM0 --real-time --duration-s 20
 mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30
 mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
-mambo-nmpc fly --vehicle my-drone.toml -o my-drone
 mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
-mambo-nmpc fly controller.toml --app crazyflie --events my-events.toml -o events
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen

@@ -8,11 +8,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -36,7 +37,15 @@ from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF, AltitudeName, ControllerName, CurveName, SensorsName, Start
+from mambo_sil.flight.names import (
+    SENSORS_OF,
+    AltitudeName,
+    ControllerName,
+    CurveName,
+    SensorsName,
+    Start,
+    present_sensors,
+)
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 2
@@ -65,18 +74,18 @@ OF_THE_VEHICLE: Final = (
     *("mass_kg", "inertia_kg_m2", "thrust_factor_n_s2", "torque_factor_n_m_s2"),
     *("motor_lag_s", "drag_1_s"),
 )
-"""Keys of a scenario whose defaults are those of its vehicle."""
+"""Keys of a scenario whose defaults are its vehicle's."""
 _AS_THE_VEHICLE: Final[Any] = None
 
 
 class Scenario(_Record):
     """Parameters of one flight; default: Table II's, with a nominal, undisturbed Mambo without sensors.
 
-    Mass, inertia, rotors and drag are those of `vehicle` unless they are given.
+    Mass, inertia, rotors and drag are the vehicle's unless they are given.
     """
 
     vehicle: VehicleFile = NOMINAL
-    """The drone: its inner loops and mixer are always those of its file."""
+    """The drone: its inner loops and mixer are always as in its file."""
 
     seed: int = Field(0, ge=0, le=LARGEST_SEED)
     """Seed of sensor noise, gusts and dropped updates."""
@@ -133,7 +142,7 @@ class Scenario(_Record):
     altitude_loop: AltitudeName = "stock"
     """What holds the height: the vehicle's loop, that with feed-forward, or a PID with feed-forward."""
 
-    sensors: SensorsName = "none"
+    sensors: Annotated[SensorsName, BeforeValidator(present_sensors)] = "true"
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of all sensor noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
@@ -211,11 +220,11 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
 def choose_sensors(
     name: SensorsName, drone: VehicleFile, **parameters: Any
 ) -> Sensors | MotionCapture | None:
-    """Return the sensors called `name` of a drone; `parameters` are those of `Sensors`.
+    """Return the sensors called `name` of a drone; `parameters` as of `Sensors`.
 
     Raises FlightError if it has others.
     """
-    if name == "none":
+    if name == "true":
         return None
     match drone.sensors:
         case MocapSensors() as figures if name == "mocap":

@@ -23,7 +23,7 @@ class Drone {
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
       module.at(address, [1, TARGET_COLUMNS, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
-    const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], lifting: [entry.lifts] };
+    const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], commands_thrust: [entry.commands_thrust] };
     this.setMembers("simulation", flies, BigInt64Array);
   }
 
@@ -43,7 +43,7 @@ class Drone {
     return this.entry.metre !== null;
   }
 
-  /* Replaces the fence, in m, null by that of the settings; returns whether the controller takes it. */
+  /* Replaces the fence, in m, null by the settings' fence; returns whether the controller takes it. */
   enclose(fence) {
     const { calls, self } = this.module, numbers = this.module.at(this.limits, LIMITS, this.real);
     calls.nmpc_default_limits(this.limits);

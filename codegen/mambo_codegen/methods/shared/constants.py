@@ -59,6 +59,11 @@ class Constants(ABC):
         return tracker_constants(self.settings, self.step_s)
 
     @property
+    def guard(self) -> object | None:
+        """The constants of the guard; None without one."""
+        return None
+
+    @property
     def climb_tracker(self) -> TrackerConstants | None:
         """The constants of the tracker of the target's height; None without one."""
         return None
@@ -85,7 +90,7 @@ class Constants(ABC):
 
     @property
     def level_target(self) -> tuple[str, ...]:
-        """The quantity of each number in nmpc_target_t but those of the height, in their order."""
+        """The quantity of each number in nmpc_target_t but the height's, in their order."""
         return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
 
     @property

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -48,6 +49,7 @@ from mambo_sil.flight.names import (
     PdName,
     SensorsName,
     Start,
+    present_sensors,
 )
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
@@ -91,7 +93,7 @@ class FlightSection(FileSection):
     start: Start = "hover"
     vehicle: str = vehicle_toml.DEFAULT
     """A shipped drone, or its vehicle.toml."""
-    sensors: SensorsName | None = None
+    sensors: Annotated[SensorsName | None, BeforeValidator(present_sensors)] = None
     """None: the vehicle's own."""
     altitude_loop: AltitudeName = "stock"
     """What holds the height."""
@@ -206,7 +208,7 @@ def names_drone(path: Path) -> bool:
 
 
 def read_as(model: type[File], path: Path) -> File:
-    """Read the file at `path` as a `model` with sections like those of campaign.toml.
+    """Read the file at `path` as a `model` with sections like campaign.toml.
 
     Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors.
     """
@@ -322,7 +324,7 @@ def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
 
 
 def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
-    """Return the drone that `vehicle` names, or else that of the section [flight] of a file in `folder`."""
+    """Return the drone that `vehicle` names, or else the one of [flight] in a file in `folder`."""
     if vehicle is not None:
         return vehicle_toml.load(vehicle)
     return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
@@ -378,7 +380,7 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
 def _section(names: Sequence[str], model: type[FileSection]) -> Any:
     """Return the model of the section to which the key at the path `names` belongs.
 
-    The names of sections of one kind, as in dict[str, Section], are free; those of a list are its indices.
+    The names of sections of one kind, as in dict[str, Section], are free; in a list they are its indices.
     """
     section: Any = model
     for name in names[:-1]:

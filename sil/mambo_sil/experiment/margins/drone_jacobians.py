@@ -1,6 +1,6 @@
 """Simulated drones as linear systems: every number of their state changed, one tick simulated.
 
-A drone is that of a flight: stock loops, motors and, if the flight has sensors, instruments and estimators.
+A drone is what a flight has: stock loops, motors and, if the flight has sensors, instruments and estimators.
 """
 
 import math
@@ -43,12 +43,12 @@ class Signals:
 
     @property
     def command(self) -> slice:
-        """Inputs: command of roll and pitch, and the thrust over the nominal mass beyond that of hover."""
+        """Inputs: command of roll and pitch, and the thrust over the nominal mass beyond hover."""
         return slice(0, self.axes)
 
     @property
     def motor(self) -> slice:
-        """Inputs: additions to the motor commands that turn about x and y and lift, per that of hover."""
+        """Inputs: additions to the motor commands that turn about x and y and lift, per command of hover."""
         return slice(self.axes, 2 * self.axes)
 
     @property
@@ -68,7 +68,7 @@ class Signals:
 
     @property
     def demand(self) -> slice:
-        """Outputs: shares of the motor commands that turn about x and y and lift, per that of hover."""
+        """Outputs: shares of the motor commands that turn about x and y and lift, per command of hover."""
         return slice(self.seen.stop, self.seen.stop + self.axes)
 
     @property
@@ -159,7 +159,7 @@ def _hovering(vehicle: Vehicle, n: int, signals: Signals) -> VehicleState:
 def _still_sensors(flight: Flight, state: VehicleState) -> Any:
     """Return the sensors of a flight without noise, or None.
 
-    The accelerometer does not correct the tilt: in flight noise does not let it. Smoothed, that of the Mambo
+    The accelerometer does not correct the tilt: in flight noise does not let it. Smoothed, the Mambo's
     has 18 times the width of the gate.
     """
     given = flight.sensors
@@ -190,19 +190,19 @@ def _tick(
     vehicle: Vehicle, moving: _Moving, inputs: FloatArray, signals: Signals
 ) -> tuple[_Moving, FloatArray]:
     """Return n drones one tick later, and the outputs (rows, n) at this tick, for inputs (columns, n)."""
-    state, suite, lifts = moving.state, moving.suite, signals.axes > LEVEL_AXES
+    state, suite, commands_thrust = moving.state, moving.suite, signals.axes > LEVEL_AXES
     command, push = inputs[signals.command], inputs[signals.push]
     true = seen = truth(state)
     if suite is not None:
         suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[signals.noise :]))
         seen = suite.estimate(true)
-    if lifts:
+    if commands_thrust:
         thrust_n = hover_thrust_n(vehicle) + vehicle.drone.body.mass_kg * command[2]
     else:
         thrust_n = altitude_thrust(
             vehicle.drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
         )
-    moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if lifts else 0.0)
+    moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if commands_thrust else 0.0)
     demand = np.zeros((signals.axes, inputs.shape[1]))
     if isinstance(vehicle.loop, FirstOrderDrone):
         state = vehicle.step(state, command[:2], thrust_n, 0.0, seen=seen, moment=moment)
@@ -214,8 +214,8 @@ def _tick(
         motor_command = motor_command + hover * (signs.T @ inputs[signals.motor])
         state = VehicleState(*vehicle.integrate(state, motor_command, moment), memory)
     outputs = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
-    outputs += [-seen.position_m[2:], -seen.velocity_m_s[2:]] if lifts else []
-    outputs += [demand, true.position_m[1::-1], *([-true.position_m[2:]] if lifts else [])]
+    outputs += [-seen.position_m[2:], -seen.velocity_m_s[2:]] if commands_thrust else []
+    outputs += [demand, true.position_m[1::-1], *([-true.position_m[2:]] if commands_thrust else [])]
     return _Moving(state, suite), np.concatenate(outputs)
 
 
@@ -264,7 +264,7 @@ def _numbers(moving: _Moving) -> FloatArray:
 
 
 def _with_numbers(moving: _Moving, numbers: FloatArray) -> _Moving:
-    """Return a simulation of m drones with numbers (rows, m), which lie as those of `_numbers`."""
+    """Return a simulation of m drones with numbers (rows, m), in the order of `_numbers`."""
     first, n = 0, moving.state.body.shape[1]
 
     def take(array: FloatArray) -> FloatArray:

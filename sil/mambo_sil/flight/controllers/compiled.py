@@ -142,7 +142,7 @@ class CompiledController:
 
     @property
     def last_thrust_m_s2(self) -> NDArray[np.float64]:
-        """The thrusts over mass (n,) that were last commanded, set or told.
+        """The thrusts over mass (n,) that were last commanded, set or reported.
 
         Raises ValueError without a height in the settings.
         """
@@ -172,6 +172,18 @@ class CompiledController:
         quantities = setter_quantities(self._method, "set_limits")
         return self._set_each(self._library.nmpc_host_set_limits, limits, quantities)
 
+    def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
+        """Tell whether a position is measured (n,); returns a status (n,).
+
+        Raises ValueError without a guard in the settings.
+        """
+        if self.settings.guard is None:
+            raise ValueError("the settings have no guard")
+        measured, status = np.ascontiguousarray(is_measured, np.uint8), np.empty(self.n, np.intc)
+        function = self._library.nmpc_host_set_position_measured
+        function(self._controllers, self.n, _address(measured), ffi.cast("int *", _address(status)))
+        return status.astype(np.int64)
+
     @property
     def limits_active(self) -> NDArray[np.int64]:
         """What `nmpc_limits_active` returns (n,), an `ActiveLimit` each; raises ValueError without limits."""
@@ -183,7 +195,7 @@ class CompiledController:
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
     ) -> Any:
-        """Compute the next commands; the inputs are those of `ReferenceController.step`.
+        """Compute the next commands; the inputs are as of `ReferenceController.step`.
 
         Only a controller that is given the acceleration of its target reads ax and ay, and needs them.
 

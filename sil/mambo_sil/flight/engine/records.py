@@ -45,10 +45,10 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = False) -> Record:
+def simulation_record(flight: Flight, times_s: FloatArray, *, commands_thrust: bool = False) -> Record:
     """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
 
-    `lifting` says whether the controllers command the thrust.
+    `commands_thrust` says whether the controllers command the thrust.
     """
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
@@ -74,8 +74,8 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = Fa
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
-            "lifting": lifting,
-            "target_columns": (flight.targets_in_space if lifting else flight.given_targets).shape[2],
+            "commands_thrust": commands_thrust,
+            "target_columns": (flight.targets_in_space if commands_thrust else flight.given_targets).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
@@ -174,7 +174,7 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
 
 
 def in_lanes(records: Record, lanes: int) -> NDArray[np.int64]:
-    """Return n records of `flight_records` as those of groups: (groups, members, lanes), each member 8 bytes.
+    """Return n records of `flight_records` in groups: (groups, members, lanes), each member 8 bytes.
 
     The last flight fills the lanes that the last group has left.
     """
@@ -185,7 +185,7 @@ def in_lanes(records: Record, lanes: int) -> NDArray[np.int64]:
 
 
 def _attitude(drone: VehicleFile) -> dict[str, Any]:
-    """Return the members of the attitude loops; those of other kinds than the drone's are 0."""
+    """Return the members of the attitude loops; of other kinds than the drone's they are 0."""
     values: dict[str, Any] = dict.fromkeys((*_STOCK, *_CASCADE, *_FIRST_ORDER), 0)
     match drone.attitude:
         case MamboAttitude() as stock:

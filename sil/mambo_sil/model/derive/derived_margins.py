@@ -42,11 +42,11 @@ class JudgedMargins:
 def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
     """Return the margins of derived settings on their drone, through its own sensors.
 
-    Of a drone with intervals, which `identify` writes, each axis is that of the worst of their ends.
+    Of a drone with intervals, which `identify` writes, each axis has the margins of the worst of their ends.
     Raises BuildError, CacheError.
     """
     sensors = SENSORS_OF[drone.sensors.kind][-1]
-    where = "true state" if sensors == "none" else f"through sensors {sensors}"
+    where = "true state" if sensors == "true" else f"through sensors {sensors}"
     if drone.uncertainty is not None:
         where = f"{where}, at the worst of the intervals in [uncertainty]"
     drone = uncertain(drone, height=settings.height is not None)
@@ -88,7 +88,7 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
         certain = _at(drone, {**worst, name: 0})
         found.append((_reserve_of(measure_drone(settings, certain, sensors)), f"the interval of {words}"))
     for words, other in _without(drone, height=settings.height is not None):
-        seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"
+        seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "true"
         derived = controller_toml.parse(controller_text(other, drone.name), drone.name)
         found.append((_reserve_of(measure_drone(derived, _at(other, worst), seen)), words))
     if not found:
@@ -99,7 +99,7 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
 
 
 def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, VehicleFile]]:
-    """Yield properties in words, and the drone without each; those of the thrust only with a height."""
+    """Yield properties in words, and the drone without each; the thrust's only with a height."""
     document: dict[str, Any] = drone.model_dump(exclude_none=True)
     if isinstance(drone.attitude, FirstOrderAttitude):
         attitude = document["attitude"]
@@ -116,6 +116,6 @@ def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, Vehicle
         rotors = document["rotors"] | {"lag_s": 0.0}
         other = VehicleFile.model_validate(document | {"rotors": rotors})
         yield f"rotors.lag_s = {spell(drone.rotors.lag_s)}", other
-    if drone.sensors.kind != "none":
-        other = VehicleFile.model_validate(document | {"sensors": {"kind": "none"}})
+    if drone.sensors.kind != "true":
+        other = VehicleFile.model_validate(document | {"sensors": {"kind": "true"}})
         yield f"sensors.kind = {spell(drone.sensors.kind)}", other

@@ -96,7 +96,7 @@ def playground_page(
 
 
 def _hues(found: Sequence[PageController]) -> list[int]:
-    """Return the number of each controller's colour; that of a PD is the same on every page."""
+    """Return the number of each controller's colour; a PD has the same on every page."""
     taken = {_PD_HUES[one.source] for one in found if one.source in _PD_HUES}
     others = (hue for hue in (0, 3, 1, 2) if hue not in taken)
     return [_PD_HUES[one.source] if one.source in _PD_HUES else next(others) for one in found]
@@ -115,8 +115,8 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
     """Return title, type of the C's numbers, and in base64 the record of a law without a model.
 
-    `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `lifts`: whether it
-    commands the thrust, and reads the height of its target. `walls`: floor and ceiling in m, if it has them.
+    `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `commands_thrust`: whether
+    it does, and reads the height of its target. `walls`: floor and ceiling in m, if it has them.
     """
     if isinstance(one.kind, Settings):
         method = method_of(one.kind)
@@ -127,7 +127,7 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
             "scalar": one.kind.code.scalar,
             "constants": None,
             "metre": metre,
-            "lifts": one.lifts,
+            "commands_thrust": one.commands_thrust,
             "walls": (fence.floor_m, fence.ceiling_m) if fence.floor_m < fence.ceiling_m else (),
         }
     constants = pd_function(pd_controller(one.kind, flight))[1]
@@ -136,7 +136,7 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
         "scalar": "float64",
         "constants": _text(bytes(ffi.buffer(constants))),
         "metre": None,
-        "lifts": False,
+        "commands_thrust": False,
         "walls": (),
     }
 
