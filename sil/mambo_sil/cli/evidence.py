@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from mambo_codegen.settings.model import Settings
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.experiment.campaign.campaign_file import Entrant
     from mambo_sil.experiment.campaign.campaign_flights import Row
+    from mambo_sil.experiment.inputs import Entrant
     from mambo_sil.experiment.regress.suite_file import FlightSuite
     from mambo_sil.verify.check_list import Entry
     from mambo_sil.verify.verify_report import Verified
@@ -132,7 +132,7 @@ def regress(
     After every change of settings, and in a CI: whether everything flies that flew before.
     """
     from mambo_sil.drone.vehicles import vehicle_toml
-    from mambo_sil.experiment.campaign.campaign_file import load_entrant
+    from mambo_sil.experiment.inputs import load_entrant
     from mambo_sil.experiment.regress.baseline import (
         baseline_path,
         demand_replaceable,

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError
-from mambo_sil.experiment.campaign.campaign_file import Entrant, load_entrant
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, Row
+from mambo_sil.experiment.inputs import Entrant, load_entrant
 from mambo_sil.experiment.regress.baseline import (
     _scenario_digest,
     baseline_path,

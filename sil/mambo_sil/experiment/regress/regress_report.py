@@ -12,8 +12,8 @@ from pydantic import Field
 
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATURATED, Row
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite

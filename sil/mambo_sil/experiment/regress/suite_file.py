@@ -21,8 +21,8 @@ from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.campaign.campaign_file import FileSection, load_drone, read_as
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, OF_LIMITS
+from mambo_sil.experiment.inputs import FileSection, load_drone, read_as
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import Scenario
 
