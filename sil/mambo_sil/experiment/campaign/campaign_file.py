@@ -156,6 +156,11 @@ def read(path: Path, vehicle: str | None = None) -> Campaign:
     return _campaign(read_as(CampaignFile, path), path.parent, source, vehicle)
 
 
+def names_drone(path: Path) -> bool:
+    """Return whether a campaign.toml itself names the drone that flies; raises as `read_as`."""
+    return "vehicle" in read_as(CampaignFile, path).flight.model_fields_set
+
+
 def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None) -> Campaign:
     """Load drone and controllers and check that each can be simulated."""
     file, drone = load_its_drone(file, folder, source, vehicle)

@@ -179,7 +179,8 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    lines = [sentence(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")]
+    flown = f"{echo(summary.suite)} with {summary.controller} on {' and '.join(map(echo, summary.vehicles))}"
+    lines = [sentence(f"{flown}: {finding(summary)}")]
     lines += [sentence(one) for one in remarks(summary)]
     ratio = () if summary.baseline is None else ("over recorded",)
     heads = ("group", "metric", "bound", "median", "worst", *ratio, "at limit", "failed")
