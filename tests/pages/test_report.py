@@ -155,7 +155,8 @@ def test_every_result_folder_can_be_reported() -> None:
     def kinds(base: type[Summary]) -> set[type[Summary]]:
         return {base}.union(*map(kinds, base.__subclasses__()))
 
-    written = {one for one in kinds(Summary) if "command" in vars(one)}
+    own = {one for one in kinds(Summary) if one.__module__.startswith("mambo")}
+    written = {one for one in own if "command" in vars(one)}
     assert written - {ReportSummary, PlaygroundSummary, UnfinishedCampaign} == set(RESULTS)
 
 

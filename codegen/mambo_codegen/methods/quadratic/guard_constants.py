@@ -10,7 +10,8 @@ from mambo_codegen.settings.sections import Sections
 class GuardConstants:
     """Constants of the guard, float64.
 
-    tilt_rad, thrust_m_s2: what a budget holds: how much a command may vary at once.
+    tilt_rad, thrust_m_s2: what a budget holds: how much a command may vary at once. A command of the thrust is
+        a thrust over height.thrust_gain.
     tilt_growth_rad, thrust_growth_m_s2: what a budget gains in a control step.
     """
 
@@ -25,11 +26,12 @@ def guard_constants(settings: Sections) -> GuardConstants | None:
     guard, period_s = settings.guard, settings.horizon.update_period_s
     if guard is None:
         return None
+    gain = settings.height.thrust_gain if settings.height else 1.0
     return GuardConstants(
         tilt_rad=guard.tilt_rad,
         tilt_growth_rad=guard.tilt_rad_s * period_s,
-        thrust_m_s2=guard.thrust_m_s2,
-        thrust_growth_m_s2=guard.thrust_m_s3 * period_s,
+        thrust_m_s2=guard.thrust_m_s2 / gain,
+        thrust_growth_m_s2=guard.thrust_m_s3 * period_s / gain,
     )
 
 

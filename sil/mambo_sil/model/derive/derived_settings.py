@@ -280,7 +280,7 @@ def _guard(drone: VehicleFile, height: list[Derived]) -> Iterator[Derived]:
     found = {each.key: float(each.value) for each in height}
     if not found:
         return
-    swing_m_s2 = (found["thrust_max_m_s2"] - found["thrust_min_m_s2"]) / drone.thrust_gain
+    swing_m_s2 = found["thrust_max_m_s2"] - found["thrust_min_m_s2"]
     yield Derived("guard", "thrust_m_s2", _round(swing_m_s2), "From the least thrust to the largest")
     words = f"{THRUST_SWINGS_1_S:g} times that in a second"
     yield Derived("guard", "thrust_m_s3", _round(THRUST_SWINGS_1_S * swing_m_s2), words)
