@@ -28,7 +28,7 @@ class Guard(SettingsSection):
         12.0,
         ge=0.1,
         le=10000,
-        description="How much the thrust over mass may vary at once by commands, in metres per second squared.",
+        description="How much the thrust over mass may vary at once, in metres per second squared.",
     )
     thrust_m_s3: Annotated[Number, WITH_HEIGHT] = Field(
         50.0,
