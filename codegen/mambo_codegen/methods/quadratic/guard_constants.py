@@ -10,8 +10,8 @@ from mambo_codegen.settings.sections import Sections
 class GuardConstants:
     """Constants of the guard, float64.
 
-    tilt_rad, thrust_m_s2: what a budget holds: how much a command may vary at once; that of the thrust is over
-        height.thrust_gain, as commands are.
+    tilt_rad, thrust_m_s2: what a budget holds: how much a command may vary at once; of the thrust over
+        height.thrust_gain, as its commands are.
     tilt_growth_rad, thrust_growth_m_s2: what a budget gains in a control step.
     """
 
