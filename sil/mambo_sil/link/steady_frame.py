@@ -1,0 +1,85 @@
+"""The frame in which the controller flies when the estimator of the autopilot moves its own by a jump.
+
+An estimator that learns that it was wrong moves position, velocity or heading at once; the drone has not
+moved. The controller would answer with a jump of its command, and its observer would take the jump for a
+gust. So the controller gets the estimate less the jump, and the rest of the jump fades: the drone glides to
+where the new frame has its target. While it does, a fence of the controller is off by that rest.
+"""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from mambo_sil.api.frames import wrapped
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.link.records import Estimate
+
+JUMP_M, JUMP_RAD = 0.1, 0.1
+"""Smallest changes that are taken for a jump where the estimator does not count its resets."""
+ERROR_M_S, RATE_RAD_S = 0.5, 6.0
+"""And how much larger they must be for every second between two estimates: error of the velocity, yaw rate."""
+LONGEST_S: Final = 0.25
+"""Time between two estimates from which on a jump cannot be seen."""
+FADES_S, VELOCITY_FADES_S = 2.0, 0.5
+"""Time constants with which the rest of a jump of position and velocity fades."""
+
+
+class SteadyFrame:
+    """Follows the jumps of an estimator; call `hold` once for each estimate."""
+
+    def __init__(self) -> None:
+        self.jumps = 0
+        """Jumps so far."""
+        self.heading_change_rad = 0.0
+        """What the heading has jumped by so far."""
+        self._last: Estimate | None = None
+        self._offset_m: FloatArray = np.zeros(3)
+        self._offset_m_s: FloatArray = np.zeros(3)
+
+    @property
+    def offset_m(self) -> FloatArray:
+        """What remains of the jumps of the position (3,)."""
+        return self._offset_m
+
+    def begin(self, estimate: Estimate) -> None:
+        """Take an estimate as it is, and forget what was before."""
+        self._last = estimate
+        self._offset_m, self._offset_m_s = np.zeros(3), np.zeros(3)
+
+    def hold(self, estimate: Estimate) -> Estimate:
+        """Return an estimate less the rest of the jumps; its heading is the new one."""
+        last, self._last = self._last, estimate
+        if last is None or (passed_s := estimate.time_s - last.time_s) > LONGEST_S:
+            self.begin(estimate)
+            return estimate
+        self._offset_m = self._offset_m * math.exp(-passed_s / FADES_S)
+        self._offset_m_s = self._offset_m_s * math.exp(-passed_s / VELOCITY_FADES_S)
+        moved_m, moved_m_s, turned_rad = _changes(last, estimate, passed_s)
+        if _has_jumped(last, estimate, passed_s):
+            self.jumps += 1
+            self._offset_m = self._offset_m + moved_m
+            self._offset_m_s = self._offset_m_s + moved_m_s
+            self.heading_change_rad += turned_rad
+        return replace(
+            estimate,
+            position_m=estimate.position_m - self._offset_m,
+            velocity_m_s=estimate.velocity_m_s - self._offset_m_s,
+        )
+
+
+def _changes(last: Estimate, estimate: Estimate, passed_s: float) -> tuple[FloatArray, FloatArray, float]:
+    """Return by what position and velocity (3,) and heading differ from the expected ones."""
+    expected_m = last.position_m + passed_s * last.velocity_m_s
+    turned_rad = float(wrapped(estimate.attitude_rad[2] - last.attitude_rad[2]))
+    return estimate.position_m - expected_m, estimate.velocity_m_s - last.velocity_m_s, turned_rad
+
+
+def _has_jumped(last: Estimate, estimate: Estimate, passed_s: float) -> bool:
+    """Return whether the estimator has moved its frame: by its own count, or else by the size of the change."""
+    if last.resets is not None and estimate.resets is not None:
+        return last.resets != estimate.resets
+    moved_m, _, turned_rad = _changes(last, estimate, passed_s)
+    is_moved = float(np.abs(moved_m).max()) > JUMP_M + ERROR_M_S * passed_s
+    return is_moved or abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s
