@@ -1,4 +1,4 @@
-"""What a pilot lets the drone follow: a place, a curve, or the targets of a program, each by its own clock."""
+"""What a pilot lets the drone follow: a place, a curve, or the targets of a program."""
 
 import math
 from collections.abc import Callable

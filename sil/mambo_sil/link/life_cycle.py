@@ -1,4 +1,4 @@
-"""The life of a flight: connect, check, arm, climb, fly, land; without a socket and without a clock of its own.
+"""The life of a flight: connect, check, arm, climb, fly, land; without a socket and without a clock.
 
 Give it what comes (`receive`), and send what it wants (`orders`), both with the present time. Every way in
 which it can end is an `End` with a sentence.
@@ -11,27 +11,22 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.link import checks
+from mambo_sil.link.checks import Preflight, stack_of
 from mambo_sil.link.courses import Course, Place
 from mambo_sil.link.records import (
     COMPANION,
     SET_MODE,
     Answer,
     Arm,
-    AskParameter,
-    Battery,
     Beat,
     Estimate,
     Heartbeat,
     OnGround,
     Order,
-    Parameter,
     Record,
     SetMode,
     SetPosition,
-    SetRate,
     Stack,
-    Stream,
     TakeOff,
     Text,
 )
@@ -98,7 +93,8 @@ class LifeCycle:
 
     def __init__(self, steering: Steering, height_m: float) -> None:
         self.steering, self.height_m = steering, height_m
-        self.phase, self.end = Phase.CONNECTING, None
+        self.phase = Phase.CONNECTING
+        self.end: End | None = None
         self.stack: Stack | None = None
         self.system = 0
         self.estimate: Estimate | None = None
@@ -106,16 +102,15 @@ class LifeCycle:
         self.course_time_s = 0.0
         """Time on the clock of the course, which stands still while there is no estimate."""
         self._begun_s: float | None = None
-        self._parameters: dict[str, float] = {}
-        self._estimates: list[Estimate] = []
+        self._preflight: Preflight | None = None
         self._fresh: Estimate | None = None
-        self._battery: float | None = None
         self._landed, self._armed, self._mode = False, False, -1
         self._lands = False
         """Whether the autopilot has accepted to land."""
         self._place_m = np.zeros(3)
         self._why, self._good = "", True
         self._last_text, self._lag_s, self._stops = "", math.inf, 0
+        self._stepped_s = -math.inf
         self._message_s = self._estimate_s = self._rest_s = self._accepted_s = 0.0
         self._beat, self._ask, self._level = Timer(BEAT_S), Timer(ASK_S), Timer(0.0)
         self._arm, self._changes_mode = Timer(BEAT_S), Timer(BEAT_S)
@@ -164,19 +159,17 @@ class LifeCycle:
         if self.phase is Phase.ENDED:
             return
         self._message_s = now_s
+        if self._preflight is not None and self.phase is Phase.CHECKING:
+            self._preflight.receive(record)
         match record:
             case Heartbeat():
                 self._receive_heartbeat(record)
             case Estimate():
                 self._receive_estimate(record, now_s)
-            case Parameter():
-                self._parameters[record.name] = record.value
             case Answer() if record.command == SET_MODE and self.phase is Phase.LANDING:
                 self._lands |= record.accepted
             case OnGround():
                 self._landed = record.landed
-            case Battery():
-                self._battery = record.share
             case Text():
                 self._last_text = record.text
 
@@ -186,11 +179,12 @@ class LifeCycle:
         elif beat.component != 1:
             return
         elif self.stack is None:
-            found = checks.stack_of(beat)
+            found = stack_of(beat)
             if isinstance(found, str):
                 self._finish(f"no flight: {found}", good=False)
             else:
                 self.stack, self.system = found, beat.system
+                self._preflight = Preflight(found, self.steering.controller.update_period_s)
                 self._enter(Phase.CHECKING)
         elif beat.system == self.system:
             self._armed, self._mode = beat.armed, beat.mode
@@ -236,8 +230,6 @@ class LifeCycle:
         self.estimate = estimate
         if lag_s - self._lag_s <= OLDEST_S:
             self._fresh, self._estimate_s = estimate, now_s
-            if self.phase is Phase.CHECKING:
-                self._estimates.append(estimate)
 
     # What is sent.
 
@@ -286,53 +278,34 @@ class LifeCycle:
 
     def _end_early(self) -> None:
         """End before the flight, and say what is missing."""
-        says = f", which says: {self._last_text}" if self._last_text else ""
         name = "the autopilot" if self.stack is None else self.stack.name
-        match self.phase:
-            case Phase.CONNECTING:
-                why = f"no heartbeat within {CONNECT_S:.0f} s: start the autopilot, and let it send to this port"
-            case Phase.CHECKING:
-                missing = [one for one in self._wanted() if one not in self._parameters]
-                why = (
-                    f"{name} sends no {missing[0]}"
-                    if missing
-                    else f"{name} sends no position and attitude: its estimator has none yet, or the rate of the "
-                    "link is too low"
-                ) + says
-            case _:
-                why = f"{name} did not arm within {ARM_S:.0f} s{says or ', and does not say why'}"
-                if self._armed:
-                    self.land(why, good=False)
-                    return
-        self._finish(f"no flight: {why}", good=False)
-
-    def _wanted(self) -> tuple[str, ...]:
-        """Return the parameters that the checks read."""
-        return () if self.stack is None else (self.stack.hover_parameter, *self.stack.needs)
+        says = f", and says: {self._last_text}" if self._last_text else ""
+        if self.phase is Phase.CONNECTING:
+            waited = f"no heartbeat has come within {CONNECT_S:.0f} s"
+            why = f"{waited}: start the autopilot, and let it send to this port"
+        elif self.phase is Phase.CHECKING and self._preflight is not None:
+            why = f"{self._preflight.missing()}{says}"
+        else:
+            why = f"{name} did not arm within {ARM_S:.0f} s{says}"
+        if self._armed:
+            self.land(why, good=False)
+        else:
+            self._finish(f"no flight: {why}", good=False)
 
     def _check(self, now_s: float) -> list[Order]:
         """Ask for what is missing; go on once all is there and good."""
-        stack, period_s = self.stack, self.steering.controller.update_period_s
-        if stack is None:
+        preflight, estimate = self._preflight, self.estimate
+        if preflight is None:
             return []
-        missing = [one for one in self._wanted() if one not in self._parameters]
-        if not missing and len(self._estimates) >= checks.LEAST_ESTIMATES:
-            fault = (
-                checks.parameter_fault(stack, self._parameters)
-                or checks.estimate_fault(self._estimates, period_s)
-                or checks.battery_fault(self._battery)
-            )
-            if fault:
-                self._finish(f"no flight: {fault}", good=False)
-            else:
-                self._place_m = self._estimates[-1].position_m
-                self.steering.hover_thrust = self._parameters[stack.hover_parameter]
-                self._enter(Phase.ARMING)
-            return []
-        if not self._ask.is_due(now_s):
-            return []
-        rates = [SetRate(stream, 1.0 / period_s) for stream in stack.streams]
-        return [*rates, SetRate(Stream.EXTENDED_SYS_STATE, 5.0), *map(AskParameter, missing)]
+        if preflight.missing() is not None or estimate is None:
+            return preflight.requests() if self._ask.is_due(now_s) else []
+        if fault := preflight.fault():
+            self._finish(f"no flight: {fault}", good=False)
+        else:
+            self._place_m = estimate.position_m
+            self.steering.hover_thrust = self.steering.mean_thrust = preflight.hover_thrust
+            self._enter(Phase.ARMING)
+        return []
 
     def _start(self, now_s: float) -> list[Order]:
         """Change to the guided mode, and arm."""
@@ -387,15 +360,17 @@ class LifeCycle:
 
     def _step(self, estimate: Estimate, now_s: float) -> list[Order]:
         """Step the controller; land if it refuses the state for long."""
-        set_point, passed_s, is_accepted = self.steering.steer(
-            estimate, self.course.target(self.course_time_s)
+        last_s, self._stepped_s = self._stepped_s, estimate.time_s
+        passed_s = estimate.time_s - last_s
+        self.course_time_s += passed_s if passed_s <= PAUSE_S else 0.0
+        set_point = self.steering.steer(
+            estimate, lambda ago_s: self.course.target(max(self.course_time_s - ago_s, 0.0))
         )
-        self.course_time_s += passed_s
-        if is_accepted:
+        if self.steering.is_accepted:
             self._accepted_s = now_s
         elif self.phase is Phase.FLYING and now_s - self._accepted_s > REFUSED_S:
             self.land("the controller refuses the state, which is out of its [ranges]", good=False)
-        return [set_point]
+        return [] if set_point is None else [set_point]
 
     def _land(self, now_s: float) -> list[Order]:
         """Let the autopilot land; fly on until it has changed its mode."""
@@ -405,7 +380,7 @@ class LifeCycle:
         orders: list[Order] = []
         if self._mode != stack.land:
             orders += [SetMode(stack.land)] if self._changes_mode.is_due(now_s) else []
-            if math.isfinite(self.steering.mean_thrust) and not self._lands:
+            if self.steering.take_overs and not self._lands:
                 orders += self._steer(now_s)
         elif self._landed and self._arm.is_due(now_s):
             orders.append(Arm(arm=False))

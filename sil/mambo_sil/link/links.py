@@ -73,9 +73,7 @@ class UdpLink:
 class SimulatedLink(UdpLink):
     """A simulated autopilot behind a socket of the loopback, as fast as the machine computes."""
 
-    def __init__(
-        self, stack: Stack, drone: VehicleFile, condition: Condition | None = None
-    ) -> None:
+    def __init__(self, stack: Stack, drone: VehicleFile, condition: Condition | None = None) -> None:
         super().__init__(Address("127.0.0.1", 0))
         pilot = ("127.0.0.1", self.socket.port)
         self.autopilot = SimulatedAutopilot(stack, drone, pilot, condition)

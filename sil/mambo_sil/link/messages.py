@@ -6,6 +6,7 @@ mode).
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -177,6 +178,32 @@ def _send_estimate(mav: Any, estimate: Estimate, stream: Stream | None) -> None:
             )
 
 
+def _read_heartbeat(message: Any) -> Heartbeat:
+    return Heartbeat(
+        *(message.get_srcSystem(), message.get_srcComponent(), message.autopilot, message.type),
+        bool(message.base_mode & ARMED),
+        message.custom_mode,
+    )
+
+
+def _read_landed(message: Any) -> OnGround | None:
+    return OnGround(message.landed_state == ON_GROUND) if message.landed_state else None
+
+
+def _read_battery(message: Any) -> Battery | None:
+    return Battery(message.battery_remaining / 100.0) if message.battery_remaining >= 0 else None
+
+
+_READ: Final[dict[str, Callable[[Any], Record | None]]] = {
+    "HEARTBEAT": _read_heartbeat,
+    "PARAM_VALUE": lambda message: Parameter(message.param_id, message.param_value),
+    "COMMAND_ACK": lambda message: Answer(message.command, message.result == ACCEPTED),
+    "EXTENDED_SYS_STATE": _read_landed,
+    "SYS_STATUS": _read_battery,
+    "STATUSTEXT": lambda message: Text(message.text),
+}
+
+
 class RecordReader:
     """Reads records from messages; a position and the attitude nearest before it make an estimate.
 
@@ -189,26 +216,8 @@ class RecordReader:
 
     def read(self, message: Any) -> Record | None:
         """Return the record in a message; None for one that is of no use."""
-        match message.get_type():
-            case "HEARTBEAT":
-                return Heartbeat(
-                    *(message.get_srcSystem(), message.get_srcComponent()),
-                    *(message.autopilot, message.type),
-                    bool(message.base_mode & ARMED),
-                    message.custom_mode,
-                )
-            case "PARAM_VALUE":
-                return Parameter(message.param_id, message.param_value)
-            case "COMMAND_ACK":
-                return Answer(message.command, message.result == ACCEPTED)
-            case "EXTENDED_SYS_STATE" if message.landed_state != 0:
-                return OnGround(message.landed_state == ON_GROUND)
-            case "SYS_STATUS" if message.battery_remaining >= 0:
-                return Battery(message.battery_remaining / 100.0)
-            case "STATUSTEXT":
-                return Text(message.text)
-            case _:
-                return self._estimate(message)
+        read = _READ.get(message.get_type())
+        return self._estimate(message) if read is None else read(message)
 
     def _estimate(self, message: Any) -> Estimate | None:
         match message.get_type():
@@ -244,9 +253,7 @@ def _read_odometry(message: Any) -> Estimate | None:
     elif message.child_frame_id != LOCAL_NED:
         return None
     position = np.array([message.x, message.y, message.z])
-    return _finite(
-        Estimate(message.time_usec / 1e6, position, velocity, attitude_rad, message.reset_counter)
-    )
+    return _finite(Estimate(message.time_usec / 1e6, position, velocity, attitude_rad, message.reset_counter))
 
 
 def _finite(estimate: Estimate) -> Estimate | None:

@@ -115,6 +115,19 @@ class Pilot:
         return "" if self.life.end is None else self.life.end.sentence
 
     @property
+    def words(self) -> str:
+        """The phase, and where the drone is, in a line."""
+        life, estimate = self.life, self.life.estimate
+        if estimate is None:
+            return life.phase.value
+        x, y, z = estimate.position_m.tolist()
+        line = f"{life.phase.value}, {estimate.time_s:.0f} s, x {x:.2f} y {y:.2f} height {-z:.2f} m"
+        if life.phase is not Phase.FLYING:
+            return line
+        away_m = float(np.linalg.norm(estimate.position_m - self._target_m))
+        return f"{line}, {100.0 * away_m:.0f} cm off"
+
+    @property
     def state(self) -> DroneState:
         """The last estimate of the autopilot."""
         estimate = self.life.estimate
@@ -134,7 +147,7 @@ class Pilot:
         self._run(until)
 
     def _run(self, until: Callable[[], bool]) -> None:
-        """Serve the link until `until`, or the end of the flight, which raises PilotError unless it is good."""
+        """Serve the link until `until` or the end of the flight; raises PilotError unless that is good."""
         try:
             with self._counted_interrupts():
                 while not (self.life.is_over or (self.life.end is None and until())):

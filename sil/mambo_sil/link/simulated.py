@@ -62,12 +62,14 @@ class Condition:
     """What the simulated drone is like beside its vehicle.
 
     hover_thrust: the share of the largest thrust that carries it, and `believed` the one in its parameter.
+    refuses:      why it does not arm; nothing if it does.
     """
 
     hover_thrust: float = 0.52
     believed: float = 0.5
     guided_options: int = 8
     battery: float = 0.9
+    refuses: str = ""
     yaw_rad: float = 0.3
     wind_m_s: float = 0.0
     seed: int = 0
@@ -174,8 +176,8 @@ class SimulatedAutopilot:
         return True
 
     def _arm(self, order: Arm) -> None:
-        if order.arm and self.condition.battery < 0.1:
-            self._emit(Text("Preflight Fail: low battery"))
+        if order.arm and self.condition.refuses:
+            self._emit(Text(self.condition.refuses))
         elif order.arm or order.force or self.is_on_ground:
             if order.arm and not self.armed:
                 self._aim_m = self._state.body[:3, 0].copy()
@@ -237,9 +239,7 @@ class SimulatedAutopilot:
         yaw_rad = float(estimate.attitude_rad[2]) - self.jump_rad
         ahead = north * math.cos(yaw_rad) + east * math.sin(yaw_rad)
         right = east * math.cos(yaw_rad) - north * math.sin(yaw_rad)
-        tilt_rad = np.clip(
-            np.array([right, -ahead]) / GRAVITY_M_S2, -LARGEST_TILT_RAD, LARGEST_TILT_RAD
-        )
+        tilt_rad = np.clip(np.array([right, -ahead]) / GRAVITY_M_S2, -LARGEST_TILT_RAD, LARGEST_TILT_RAD)
         share = min(max(1.0 - down / GRAVITY_M_S2, 0.2), 1.8)
         return tilt_rad, share * self.drone.hover_demand_n
 

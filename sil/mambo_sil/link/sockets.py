@@ -48,7 +48,8 @@ def dialect() -> Any:
         from pymavlink.dialects.v20 import common  # noqa: PLC0415 - an optional package
     except ImportError:
         raise LinkError(
-            "MAVLink needs pymavlink, which is missing: pip install 'mambo-nmpc[mavlink]', or pymavlink itself"
+            "MAVLink needs pymavlink, which is missing: pip install 'mambo-nmpc[mavlink]', "
+            "or pymavlink itself"
         ) from None
     return common
 
@@ -116,7 +117,7 @@ class MavlinkSocket:
         source = message.get_srcSystem(), message.get_srcComponent()
         number = message.get_seq()
         newest, behind = self._newest.get(source, (number - 1, 0))
-        is_next = 0 < (number - newest) % 256 < _HALF or behind >= _NEW_AFTER
+        is_next = bool(0 < (number - newest) % 256 < _HALF) or behind >= _NEW_AFTER
         self._newest[source] = (number, 0) if is_next else (newest, behind + 1)
         return is_next
 
@@ -124,5 +125,8 @@ class MavlinkSocket:
 def _cannot_listen(error: OSError) -> str:
     """Return why a port cannot be listened at, and what to do."""
     if error.errno == errno.EADDRINUSE:
-        return "is in use: another pilot or ground station listens there; end it, or let the autopilot send to another port"
+        return (
+            "is in use: another pilot or ground station listens there; end it, or let the autopilot send to "
+            "another port"
+        )
     return f"cannot be listened at: {error.strerror}; name an address of this machine"

@@ -19,7 +19,7 @@ from mambo_sil.link.records import Estimate
 JUMP_M, JUMP_RAD = 0.1, 0.1
 """Smallest changes that are taken for a jump where the estimator does not count its resets."""
 ERROR_M_S, RATE_RAD_S = 0.5, 6.0
-"""And how much larger they must be for every second between two estimates: error of the velocity, yaw rate."""
+"""And how much larger they must be for each second between two estimates."""
 LONGEST_S: Final = 0.25
 """Time between two estimates from which on a jump cannot be seen."""
 FADES_S, VELOCITY_FADES_S = 2.0, 0.5
@@ -77,7 +77,7 @@ def _changes(last: Estimate, estimate: Estimate, passed_s: float) -> tuple[Float
 
 
 def _has_jumped(last: Estimate, estimate: Estimate, passed_s: float) -> bool:
-    """Return whether the estimator has moved its frame: by its own count, or else by the size of the change."""
+    """Return whether the frame has moved: by the count of the estimator, else by the size of the change."""
     if last.resets is not None and estimate.resets is not None:
         return last.resets != estimate.resets
     moved_m, _, turned_rad = _changes(last, estimate, passed_s)

@@ -16,23 +16,18 @@ from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, ControllerName, Se
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
 """Of the Table II case."""
+CURVE_HELP: Final = f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m."
+SIZE_HELP: Final = f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}."
+RATE_HELP: Final = f"Angular rate of the curve, in rad/s; by default {RATE_RAD_S:g}."
 
 
 @dataclass(frozen=True)
 class Course:
     """What is to be followed, from where, and for how long."""
 
-    trajectory: Annotated[
-        str,
-        typer.Option(help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m."),
-    ] = "bernoulli"
-    size_m: Annotated[
-        float | None,
-        typer.Option(help=f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}."),
-    ] = None
-    rate_rad_s: Annotated[
-        float | None, typer.Option(help=f"Angular rate of the curve, in rad/s; by default {RATE_RAD_S:g}.")
-    ] = None
+    trajectory: Annotated[str, typer.Option(help=CURVE_HELP)] = "bernoulli"
+    size_m: Annotated[float | None, typer.Option(help=SIZE_HELP)] = None
+    rate_rad_s: Annotated[float | None, typer.Option(help=RATE_HELP)] = None
     duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0
     start: Annotated[Start, typer.Option(help="Start hovering in the air, or 5 s earlier on the ground.")] = (
         "hover"
