@@ -118,7 +118,7 @@ class Steering:
     def _send(
         self, held: Estimate, target: TargetState, outcome: StepOutcome, passed_s: float
     ) -> SetAttitude:
-        """Return the set-point of an outcome, and record it; tell the controller of a thrust that is capped."""
+        """Return the set-point of an outcome, and record it; the controller learns of a capped thrust."""
         roll_rad, pitch_rad, heading_rad, thrust_m_s2 = outcome.attitude_thrust("NED").tolist()
         share = thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
         thrust = min(max(share, LEAST_THRUST), MOST_THRUST)
