@@ -29,7 +29,7 @@ from mambo_sil.link.records import (
     Stream,
     Text,
 )
-from mambo_sil.link.steering import Steering
+from mambo_sil.link.steering import Steering, Update
 from tests.support.links import controller
 
 PERIOD_S = 0.01
@@ -37,7 +37,7 @@ PERIOD_S = 0.01
 
 def life_cycle() -> LifeCycle:
     """Return a flight that has not begun."""
-    return LifeCycle(Steering(controller(), lambda update: None), 1.0)
+    return LifeCycle(Steering(controller(), list[Update]().append), 1.0)
 
 
 def beat(stack: Stack = PX4, *, armed: bool = False, mode: int = 0, vehicle: int = 2) -> Heartbeat:
@@ -167,7 +167,12 @@ def test_no_heartbeat_is_a_sentence() -> None:
     ("hover", "options", "stack", "words"),
     [
         (0.95, 8.0, PX4, "MPC_THR_HOVER = 0.95; it must lie in 0.05..0.9"),
-        (0.5, 1.0, ARDUCOPTER, "GUID_OPTIONS = 1, with which it takes the thrust for a climb rate; set it to 9"),
+        (
+            0.5,
+            1.0,
+            ARDUCOPTER,
+            "GUID_OPTIONS = 1, with which it takes the thrust for a climb rate; set it to 9",
+        ),
     ],
     ids=["hover", "options"],
 )
@@ -284,4 +289,4 @@ def test_the_state_out_of_range_makes_it_land() -> None:
 def test_a_controller_without_the_thrust_is_refused() -> None:
     """The autopilot wants roll, pitch and thrust."""
     with pytest.raises(LinkError, match=r"the settings have no \[height\]"):
-        Steering(Controller(preset("mambo")), lambda update: None)
+        Steering(Controller(preset("mambo")), list[Update]().append)

@@ -5,7 +5,6 @@ import socket
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from types import TracebackType
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
@@ -33,12 +32,6 @@ pitch = { gain = 1.0, lag_s = 0.12, dead_time_s = 0.04 }
 gain = 1.0
 lag_s = 0.05
 dead_time_s = 0.01
-[sensors]
-kind = "mocap"
-position_noise_m = 0.001
-position_delay_s = 0.01
-velocity_filter_s = 0.03
-attitude_noise_rad = 0.003
 """
 """A drone of 1 kg whose ticks are the periods of the controller, so that flights are quick."""
 
@@ -49,11 +42,10 @@ def drone() -> VehicleFile:
     return vehicle_toml.parse(DRONE, "drone", "drone.toml")
 
 
-def write_drone(folder: Path) -> Path:
-    """Write drone.toml."""
-    path = folder / "drone.toml"
-    path.write_text(DRONE, "utf-8")
-    return path
+def write_drone(folder: Path) -> None:
+    """Write drone.toml, and the controller.toml that `design` derives from it."""
+    (folder / "drone.toml").write_text(DRONE, "utf-8")
+    (folder / "controller.toml").write_text(controller_text(drone(), "drone.toml"), "utf-8")
 
 
 @dataclass
@@ -141,12 +133,11 @@ class WiredLink(UdpLink):
         self.wire.carry(self.now_s())
         return self._read(0.0)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Close all sockets."""
         self.wire.close()
-        self.autopilot.socket.__exit__(kind, error, trace)
-        super().__exit__(kind, error, trace)
+        self.autopilot.socket.close()
+        super().close()
 
 
 def controller() -> Controller:
@@ -165,4 +156,4 @@ def simulated(
     """Return a pilot, its autopilot, and the steps of the flight."""
     updates: list[Update] = []
     link = SimulatedLink(STACKS[stack], drone(), condition)
-    return Pilot(controller(), link, updates.append), link.autopilot, updates
+    return Pilot(controller(), lambda: link, updates.append), link.autopilot, updates

@@ -1,8 +1,7 @@
 """The two ends that a pilot can have: a real autopilot, in real time, or a simulated one, in its own time."""
 
 import time
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.link.messages import RecordReader
@@ -27,11 +26,9 @@ class Link(Protocol):
         """Return what has come; wait a moment for it."""
         ...
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    def close(self) -> None:
+        """Close its sockets."""
+        ...
 
 
 WAIT_S = 0.005
@@ -61,13 +58,9 @@ class UdpLink:
         records = map(self._reader.read, self.socket.receive(wait_s))
         return [record for record in records if record is not None]
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.socket.__exit__(kind, error, trace)
+    def close(self) -> None:
+        """Close its socket."""
+        self.socket.close()
 
 
 class SimulatedLink(UdpLink):
@@ -87,8 +80,7 @@ class SimulatedLink(UdpLink):
         self.autopilot.tick()
         return self._read(0.0)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.autopilot.socket.__exit__(kind, error, trace)
-        super().__exit__(kind, error, trace)
+    def close(self) -> None:
+        """Close both sockets."""
+        self.autopilot.socket.close()
+        super().close()

@@ -39,6 +39,7 @@ TOLD: Final = 3
 class Pilot:
     """Flies one drone; positions are NED in the frame of the autopilot's estimator, z down.
 
+    It is a context manager: it opens its link, lands if the drone still flies, and closes the link.
     The calls must follow each other without a pause: while none runs, nothing is sent, which the autopilot
     takes for a lost link after a second. Ctrl-C lands, a second one stops the motors; either raises
     KeyboardInterrupt after that. Every call raises PilotError, with a sentence, if the flight has ended.
@@ -47,11 +48,11 @@ class Pilot:
     def __init__(
         self,
         controller: Controller,
-        link: Link,
+        open_link: Callable[[], Link],
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
         watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
     ) -> None:
-        self.link, self.steering = link, Steering(controller, record)
+        self._open_link, self.steering = open_link, Steering(controller, record)
         self.life = LifeCycle(self.steering, 1.0)
         self._watch, self._interrupts = watch, 0
 
@@ -61,7 +62,8 @@ class Pilot:
 
         Raises LinkError, and what `Controller.from_file` raises.
         """
-        return cls(Controller.from_file(path, **options), UdpLink(parse_link(link)))
+        address = parse_link(link)
+        return cls(Controller.from_file(path, **options), lambda: UdpLink(address))
 
     @classmethod
     def simulate(
@@ -74,8 +76,8 @@ class Pilot:
         """Return a pilot of a simulated drone behind the messages of an autopilot: "px4" or "ardupilot"."""
         require_choice("autopilot", autopilot, tuple(STACKS))
         require_path("vehicle", vehicle, f"a vehicle.toml, or one of {', '.join(vehicle_toml.names())}")
-        controller = Controller.from_file(path, **options)
-        return cls(controller, SimulatedLink(STACKS[autopilot], vehicle_toml.load(str(vehicle))))
+        drone = vehicle_toml.load(str(vehicle))
+        return cls(Controller.from_file(path, **options), lambda: SimulatedLink(STACKS[autopilot], drone))
 
     def take_off(self, height_m: float) -> None:
         """Connect, check, arm, climb by the autopilot's own controller, and take over at a height."""
@@ -198,7 +200,8 @@ class Pilot:
             signal.signal(signal.SIGINT, before)
 
     def __enter__(self) -> Self:
-        self.link.__enter__()
+        """Open the link; raises LinkError."""
+        self.link = self._open_link()
         return self
 
     def __exit__(
@@ -211,7 +214,7 @@ class Pilot:
                 with contextlib.suppress(PilotError):
                     self._run(lambda: False)
         finally:
-            self.link.__exit__(kind, error, trace)
+            self.link.close()
 
 
 class _Arrival:

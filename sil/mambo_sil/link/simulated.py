@@ -86,9 +86,10 @@ class SimulatedAutopilot:
         self.time_s, self.armed, self.mode = 0.0, False, stack.hold
         self.orders: list[Order] = []
         """What was ordered since the start, without heartbeats."""
-        self.jump_m: FloatArray = np.zeros(3)
-        self.jump_m_s: FloatArray = np.zeros(3)
-        self.jump_rad, self.resets = 0.0, 0
+        self.drift_m_s: FloatArray = np.zeros(3)
+        """Error of the estimated velocity, with which the estimated position drifts away."""
+        self._error_m: FloatArray = np.zeros(3)
+        self._error_rad, self._resets = 0.0, 0
         self.silent = False
         """Whether it sends nothing."""
         seeds = (self.condition.seed,)
@@ -117,10 +118,16 @@ class SimulatedAutopilot:
         """Whether the feet touch the ground."""
         return bool(self._state.body[2, 0] >= 0.0)
 
-    def jump(self, by_m: FloatArray, by_m_s: FloatArray, by_rad: float = 0.0) -> None:
-        """Move the state of the estimator by a jump, as after a reset."""
-        self.jump_m, self.jump_m_s = self.jump_m + by_m, self.jump_m_s + by_m_s
-        self.jump_rad, self.resets = self.jump_rad + by_rad, self.resets + 1
+    def reset_estimator(self, by_m: FloatArray, by_rad: float = 0.0) -> None:
+        """Move the estimate by a jump; the velocity is right from now on."""
+        self._error_m, self._error_rad = self._error_m + by_m, self._error_rad + by_rad
+        self.drift_m_s = np.zeros(3)
+        self._resets += 1
+
+    @property
+    def error_m(self) -> FloatArray:
+        """Error of the estimated position (3,)."""
+        return self._error_m
 
     def tick(self) -> None:
         """Obey what has come, move on by a tick, and send what is due."""
@@ -131,6 +138,7 @@ class SimulatedAutopilot:
                 self._obey(order)
         seen = self.true if self._suite is None else self._suite.estimate(self.true)
         estimate = self._estimate(seen)
+        self._error_m = self._error_m + self.drone.step_s * self.drift_m_s
         self._fall_back()
         with np.errstate(all="ignore"):
             self._advance(seen, estimate)
@@ -140,14 +148,14 @@ class SimulatedAutopilot:
 
     def _estimate(self, seen: Seen) -> Estimate:
         """Return the estimate, with the jumps of its frame; its origin is where the drone starts."""
-        attitude_rad = seen.euler_rad[:, 0] + np.array([0.0, 0.0, self.jump_rad])
+        attitude_rad = seen.euler_rad[:, 0] + np.array([0.0, 0.0, self._error_rad])
         attitude_rad[2] = float(wrapped(attitude_rad[2]))
         return Estimate(
             self.time_s,
-            seen.position_m[:, 0] - np.array(STARTS_M) + self.jump_m,
-            seen.velocity_m_s[:, 0] + self.jump_m_s,
+            seen.position_m[:, 0] - np.array(STARTS_M) + self._error_m,
+            seen.velocity_m_s[:, 0] + self.drift_m_s,
             attitude_rad,
-            self.resets,
+            self._resets,
         )
 
     def _obey(self, order: Order) -> None:
@@ -209,7 +217,7 @@ class SimulatedAutopilot:
             command_rad, thrust_n = np.zeros(2), 0.0
         elif self.mode == self.stack.guided and isinstance(self._set_point, SetAttitude):
             roll_rad, pitch_rad, yaw_rad = self._set_point.attitude_rad.tolist()
-            command_rad, self._yaw_rad = np.array([roll_rad, pitch_rad]), yaw_rad - self.jump_rad
+            command_rad, self._yaw_rad = np.array([roll_rad, pitch_rad]), yaw_rad - self._error_rad
             thrust_n = self._set_point.thrust / self.condition.hover_thrust * self.drone.hover_demand_n
         else:
             command_rad, thrust_n = self._hold(estimate)
@@ -227,16 +235,16 @@ class SimulatedAutopilot:
             descent_m_s = DESCENT_M_S
         else:
             if self.mode == self.stack.guided and isinstance(self._set_point, SetPosition):
-                self._aim_m = self._set_point.position_m + np.array(STARTS_M) - self.jump_m
+                self._aim_m = self._set_point.position_m + np.array(STARTS_M) - self._error_m
             descent_m_s = math.nan
-        place_m = estimate.position_m + np.array(STARTS_M) - self.jump_m
-        velocity_m_s = estimate.velocity_m_s - self.jump_m_s
+        place_m = estimate.position_m + np.array(STARTS_M) - self._error_m
+        velocity_m_s = estimate.velocity_m_s - self.drift_m_s
         wanted_m_s = np.clip(POSITION_1_S * (self._aim_m - place_m), -SPEED_M_S, SPEED_M_S)
         wanted_m_s[2] = np.clip(wanted_m_s[2], -CLIMB_M_S, DESCENT_M_S)
         if math.isfinite(descent_m_s):
             wanted_m_s[2] = descent_m_s
         north, east, down = (VELOCITY_1_S * (wanted_m_s - velocity_m_s)).tolist()
-        yaw_rad = float(estimate.attitude_rad[2]) - self.jump_rad
+        yaw_rad = float(estimate.attitude_rad[2]) - self._error_rad
         ahead = north * math.cos(yaw_rad) + east * math.sin(yaw_rad)
         right = east * math.cos(yaw_rad) - north * math.sin(yaw_rad)
         tilt_rad = np.clip(np.array([right, -ahead]) / GRAVITY_M_S2, -LARGEST_TILT_RAD, LARGEST_TILT_RAD)

@@ -5,8 +5,7 @@ import errno
 import select
 import socket
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from mambo_codegen.errors import echo
 from mambo_sil.errors import LinkError
@@ -76,12 +75,8 @@ class MavlinkSocket:
             raise LinkError(f"{listen}: {_cannot_listen(error)}") from error
         self._socket.setblocking(False)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Close the socket."""
         self._socket.close()
 
     @property

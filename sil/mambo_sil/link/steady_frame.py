@@ -2,8 +2,12 @@
 
 An estimator that learns that it was wrong moves position, velocity or heading at once; the drone has not
 moved. The controller would answer with a jump of its command, and its observer would take the jump for a
-gust. So the controller gets the estimate less the jump, and the rest of the jump fades: the drone glides to
-where the new frame has its target. While it does, a fence of the controller is off by that rest.
+gust. So the controller gets the estimate less an offset, which begins as the jump and then fades,
+
+    offset'' = -2 w offset' - w^2 offset,
+
+with position and velocity less `offset` and `offset'`, so that they agree: the drone glides to where the new
+frame has its target. While it does, a fence of the controller is off by the offset.
 """
 
 import math
@@ -22,8 +26,10 @@ ERROR_M_S, RATE_RAD_S = 0.5, 6.0
 """And how much larger they must be for each second between two estimates."""
 LONGEST_S: Final = 0.25
 """Time between two estimates from which on a jump cannot be seen."""
-FADES_S, VELOCITY_FADES_S = 2.0, 0.5
-"""Time constants with which the rest of a jump of position and velocity fades."""
+NOISE_M_S: Final = 0.1
+"""Change of the velocity that may be noise and motion: where resets are not counted, none is seen in it."""
+FADING_1_S: Final = 0.8
+"""w: after 0.2 m the drone glides with 0.06 m/s at most, and needs 6 s for 95 % of it."""
 
 
 class SteadyFrame:
@@ -54,19 +60,26 @@ class SteadyFrame:
         if last is None or (passed_s := estimate.time_s - last.time_s) > LONGEST_S:
             self.begin(estimate)
             return estimate
-        self._offset_m = self._offset_m * math.exp(-passed_s / FADES_S)
-        self._offset_m_s = self._offset_m_s * math.exp(-passed_s / VELOCITY_FADES_S)
+        self._fade(passed_s)
         moved_m, moved_m_s, turned_rad = _changes(last, estimate, passed_s)
         if _has_jumped(last, estimate, passed_s):
             self.jumps += 1
             self._offset_m = self._offset_m + moved_m
-            self._offset_m_s = self._offset_m_s + moved_m_s
+            if estimate.resets is not None or float(np.abs(moved_m_s).max()) > NOISE_M_S:
+                self._offset_m_s = self._offset_m_s + moved_m_s
             self.heading_change_rad += turned_rad
         return replace(
             estimate,
             position_m=estimate.position_m - self._offset_m,
             velocity_m_s=estimate.velocity_m_s - self._offset_m_s,
         )
+
+    def _fade(self, passed_s: float) -> None:
+        """Let time pass for the offset, which solves its differential equation."""
+        left = math.exp(-FADING_1_S * passed_s)
+        pull_m_s = self._offset_m_s + FADING_1_S * self._offset_m
+        self._offset_m = left * (self._offset_m + passed_s * pull_m_s)
+        self._offset_m_s = left * (self._offset_m_s - FADING_1_S * passed_s * pull_m_s)
 
 
 def _changes(last: Estimate, estimate: Estimate, passed_s: float) -> tuple[FloatArray, FloatArray, float]:

@@ -74,9 +74,10 @@ def pilot(
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
+    open_link = _opener(link, simulate, vehicle)
     updates: list[Update] = []
     with new_results(output, PilotSummary.command, (LOG,)) as folder, progress_bar("connecting") as bar:
-        flown = Pilot(Controller(settings), _open(link, simulate, vehicle), updates.append, _watch(bar))
+        flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar))
         interrupted: KeyboardInterrupt | None = None
         try:
             with flown:
@@ -105,8 +106,8 @@ def pilot(
         raise typer.Exit(1)
 
 
-def _open(link: str | None, simulate: str | None, vehicle: str | None) -> "Link":
-    """Open the link that the options describe; raises LinkError, BadParameter."""
+def _opener(link: str | None, simulate: str | None, vehicle: str | None) -> "Callable[[], Link]":
+    """Return what opens the link that the options describe; raises LinkError, BadParameter."""
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.link.links import SimulatedLink, UdpLink
     from mambo_sil.link.records import STACKS
@@ -119,8 +120,10 @@ def _open(link: str | None, simulate: str | None, vehicle: str | None) -> "Link"
     if link is not None:
         if vehicle is not None:
             raise typer.BadParameter("it is the drone of --simulate: leave it out", param_hint="--vehicle")
-        return UdpLink(parse_link(link))
-    return SimulatedLink(STACKS[str(simulate)], vehicle_toml.load(vehicle or SIMULATED_DRONE))
+        address = parse_link(link)
+        return lambda: UdpLink(address)
+    stack, drone = STACKS[str(simulate)], vehicle_toml.load(vehicle or SIMULATED_DRONE)
+    return lambda: SimulatedLink(stack, drone)
 
 
 def _watch(bar: "Bar") -> "Callable[[Pilot], None]":
