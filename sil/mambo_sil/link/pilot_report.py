@@ -34,8 +34,8 @@ class PilotSummary(Summary):
     """From one set-point to the next: median, and what 95 % do not exceed."""
     horizontal_rms_m: Number
     vertical_rms_m: Number
-    attitude_rms_rad_s: Number
-    """Rate of change of roll and pitch, together."""
+    command_rms_rad_s: Number
+    """Rate of change of the commanded roll and pitch, together."""
     hover_parameter: str | None
     hover_thrust: Number
     """The share of the largest thrust that the autopilot's parameter gives for hover."""
@@ -75,7 +75,7 @@ def _measures(updates: Sequence[Update]) -> dict[str, object]:
         "set_points": len(updates),
         "refused": sum(one.status != 0 for one in updates),
         "flown_s": float(np.ptp(time_s)) if len(updates) else 0.0,
-        **dict.fromkeys(("horizontal_rms_m", "vertical_rms_m", "attitude_rms_rad_s"), none),
+        **dict.fromkeys(("horizontal_rms_m", "vertical_rms_m", "command_rms_rad_s"), none),
         "interval_s": (none, none),
     }
     if len(updates) < 3:
@@ -86,12 +86,12 @@ def _measures(updates: Sequence[Update]) -> dict[str, object]:
     if judged.sum() < 3:
         return found
     errors = np.array([one.estimate.position_m - one.target.position_m for one in updates])[judged]
-    tilt = np.array([one.estimate.attitude_rad[:2] for one in updates])[judged]
+    tilt = np.array([one.command_rad for one in updates])[judged]
     rates = np.diff(tilt, axis=0) / np.diff(time_s[judged])[:, np.newaxis]
     return found | {
         "horizontal_rms_m": float(np.sqrt(np.mean(np.sum(errors[:, :2] ** 2, axis=1)))),
         "vertical_rms_m": float(np.sqrt(np.mean(errors[:, 2] ** 2))),
-        "attitude_rms_rad_s": float(np.sqrt(np.mean(np.sum(rates**2, axis=1)))),
+        "command_rms_rad_s": float(np.sqrt(np.mean(np.sum(rates**2, axis=1)))),
     }
 
 
@@ -105,17 +105,12 @@ def pilot_text(summary: PilotSummary) -> str:
             ("set-points", f"{summary.set_points} in {summary.flown_s:.1f} s"),
             ("interval", f"{1e3 * median_s:.0f} ms, 95 % within {1e3 * most_s:.0f} ms"),
             ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
-            ("roll and pitch", f"move at {np.degrees(summary.attitude_rms_rad_s):.0f} degrees/s rms"),
+            ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
             (
                 "thrust of hover",
                 f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",
             ),
-            ("estimator", f"jumped {_times(summary.jumps)}"),
-            ("pauses", f"{summary.pauses}, behind which the controller began anew"),
+            ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
         ]
         lines += ["", *table((), rows, (0, 1))]
     return "\n".join(lines)
-
-
-def _times(count: int) -> str:
-    return {0: "never", 1: "once"}.get(count, f"{count} times")
