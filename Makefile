@@ -108,8 +108,6 @@ generated: $(SETUP)
 
 docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
-	$(BIN)/mambo-nmpc design crazyflie -o build/docs/three-axes.toml
-	$(BIN)/mambo-nmpc playground build/docs/three-axes.toml crazyflie pid-feedforward pd --vehicle crazyflie -o build/docs/play.html
 	@echo "the manual: build/docs/index.html; its search wants a server: python3 -m http.server -d build/docs"
 
 evidence: $(SETUP)

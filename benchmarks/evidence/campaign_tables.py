@@ -21,6 +21,20 @@ _SHOWN: Final = {
     "command_variation_rad": ("0.5", "0.95"),
 }
 """Quantiles in tables, by index."""
+SLOW_MOTORS: Final = {
+    "slow-motors": "eight at 0.5 rad/s",
+    "slow-motors-circle": "circle at 1.5 rad/s",
+    "slow-motors-fast-eight": "eight at 0.8 rad/s",
+}
+"""The curve of each campaign of light drones with slow motors."""
+_SUMMARISED: Final = {
+    "pd": "PD of the paper",
+    "table1": "`table1`, its NMPC",
+    "pd-feedforward": "PD with feed-forward",
+    "pid-feedforward": "PID with feed-forward",
+    "mambo": "`mambo`, our MPC",
+}
+"""The controllers that README shows, with their titles there."""
 
 
 def read_quantiles(results: Path) -> Figures:
@@ -41,7 +55,7 @@ def read_campaign(results: Path) -> Figures:
 
 def read_opponents(results: Path) -> Figures:
     """Return statistics of each controller by campaign, and improvements of both errors, seen and true."""
-    found = {name: summary(results / name) for name in ("drawn", "slow-motors")}
+    found = {name: summary(results / name) for name in ("drawn", *SLOW_MOTORS)}
     compared = _improvements(found["drawn"], ("iae_m_s", "seen_iae_m_s"))
     return {name: _quantiles(one) for name, one in found.items()} | {"improvements": compared}
 
@@ -168,3 +182,32 @@ def opponents_ratios(figures: Figures) -> str:
                 )
                 row[f"{error}: the other is closer in"] = f"{_percent(one['better']['share'])} %"
     return table(list(rows.values()))
+
+
+def opponents_summary(figures: Figures) -> str:
+    """Return three figures of each controller for README; an IAE of 100 s, in m s, is a mean in cm."""
+    rows = []
+    for name, shown in _SUMMARISED.items():
+        drawn, eight, circle = (
+            figures[campaign]["controllers"][name] for campaign in ("drawn", *list(SLOW_MOTORS)[:2])
+        )
+        rows.append(
+            {
+                "controller": shown,
+                "distance, cm": three(drawn["quantiles"]["seen_iae_m_s"]["0.5"]),
+                "crashes: eight": str(eight["crashed"]["count"]),
+                "crashes: circle": str(circle["crashed"]["count"]),
+            }
+        )
+    return table(rows)
+
+
+def opponents_curves(figures: Figures) -> str:
+    """Return the crashes of light drones with slow motors on each curve."""
+    rows = []
+    for name in figures["slow-motors"]["controllers"]:
+        row = {"crashed, of 300": title(name)}
+        for campaign, curve in SLOW_MOTORS.items():
+            row[curve] = str(figures[campaign]["controllers"][name]["crashed"]["count"])
+        rows.append(row)
+    return table(rows)

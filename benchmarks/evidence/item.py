@@ -1,4 +1,4 @@
-"""One item of evidence: its commands, its figures, the tables and pictures in docs/evidence, and its stamp.
+"""One item of evidence: its commands, its figures, its tables on pages, its pictures, and its stamp.
 
 The stamp docs/evidence/data/NAME.json holds the figures of the tables without rounding, from which they are
 written again without a flight, the commit at which they were made, and ids of what they depend on.
@@ -6,6 +6,7 @@ written again without a flight, the commit at which they were made, and ids of w
 
 import json
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -19,9 +20,14 @@ from typing import Any, Final
 from benchmarks.evidence.sources import ROOT, controller_digests, git, object_ids
 from mambo_sil.results.folders import finite
 
-PAGES: Final = ROOT / "docs" / "evidence"
-DATA: Final = PAGES / "data"
+PICTURES: Final = ROOT / "docs" / "evidence"
+DATA: Final = PICTURES / "data"
 RESULTS: Final = "build/evidence"
+
+PLACE: Final = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
+"""Where a table stands on a page: its beginning, its name, its end; a comment is not shown."""
+_LONG_TABLE: Final = 15
+"""A table of more rows than that is folded."""
 
 Figures = dict[str, Any]
 """What JSON can hold; a number that is infinite or NaN is null."""
@@ -39,7 +45,7 @@ class Item:
     controllers: presets and files whose C flies or is measured, as `mambo` or `mambo --scalar fixed`.
     paths:       folders and files of the repository that compute the figures.
     read:        returns the figures in the folder of the results.
-    tables:      return Markdown of figures, by the name of the file in docs/evidence/data.
+    tables:      return Markdown of figures, by the name that pages have at its place.
     pictures:    files of the results, by their name in docs/evidence.
     draw:        draws pictures that no command draws, into the folder of the results.
     variable:    environment variable that the commands want; without it the item is made only by its name.
@@ -65,8 +71,8 @@ class Item:
         return {"controllers": controller_digests(self.controllers), "paths": object_ids(self.paths)}
 
     def texts(self, figures: Figures) -> dict[str, str]:
-        """Return the tables by file name."""
-        return {f"{name}.md": table(figures) + "\n" for name, table in self.tables.items()}
+        """Return the tables by name."""
+        return {name: folded(name, table(figures)) for name, table in self.tables.items()}
 
 
 def read_stamp(item: Item) -> Figures:
@@ -103,7 +109,7 @@ def make(item: Item, say: Callable[[str], None]) -> None:
     if item.draw is not None:
         item.draw(results)
     for name, source in item.pictures.items():
-        shutil.copyfile(results / source, PAGES / name)
+        shutil.copyfile(results / source, PICTURES / name)
     stamp = {
         "commands": list(item.commands),
         "duration_s": round(time.monotonic() - start),
@@ -165,14 +171,40 @@ def _is_record(value: Any) -> bool:
     return _is_plain(value) or (isinstance(value, dict) and all(map(_is_plain, value.values())))
 
 
+def folded(name: str, table: str) -> str:
+    """Return a table, inside an element that opens it if it is long."""
+    count = len(table.splitlines()) - 2
+    if count <= _LONG_TABLE:
+        return table
+    summary = f"<summary>Table: {name.replace('-', ' ')} ({count} rows)</summary>"
+    return f'<details class="note" markdown="1">\n{summary}\n\n{table}\n\n</details>'
+
+
+def pages() -> list[Path]:
+    """Return README and the pages of the manual."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def with_tables(page: str, tables: Mapping[str, str]) -> str:
+    """Return the text of a page with `tables` at their places; other tables stay as they are."""
+
+    def written(place: re.Match[str]) -> str:
+        first, name, last = place.groups()
+        return f"{first}\n{tables[name]}\n\n{last}" if name in tables else place[0]
+
+    return PLACE.sub(written, page)
+
+
 def write_tables(item: Item) -> list[str]:
-    """Write the tables of the figures in the stamp; return the names of those that changed."""
+    """Write the tables of the figures in the stamp on all pages that have them; return the changed pages."""
+    tables = item.texts(read_stamp(item)["figures"])
     changed = []
-    for name, text in item.texts(read_stamp(item)["figures"]).items():
-        path = DATA / name
-        if not path.is_file() or path.read_text("utf-8") != text:
-            path.write_text(text, "utf-8")
-            changed.append(name)
+    for page in pages():
+        before = page.read_text("utf-8")
+        after = with_tables(before, tables)
+        if after != before:
+            page.write_text(after, "utf-8")
+            changed.append(str(page.relative_to(ROOT)))
     return changed
 
 

@@ -20,16 +20,18 @@ from benchmarks.evidence.board_tables import (
     read_footprints,
 )
 from benchmarks.evidence.campaign_tables import (
+    SLOW_MOTORS,
     campaign,
     campaign_motor_lag,
     campaign_ratios,
     opponents,
+    opponents_curves,
     opponents_ratios,
+    opponents_summary,
     read_campaign,
     read_opponents,
     read_quantiles,
 )
-from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
@@ -67,6 +69,12 @@ _ONE_NORM: Final = f"{_HERE}/one-norm.toml"
 _FLIGHT: Final = ("sil/mambo_sil/drone", "sil/mambo_sil/flight")
 _EXPERIMENT: Final = "sil/mambo_sil/experiment"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
+_MEASURES: Final = (
+    *_FLIGHT,
+    "sil/mambo_sil/board/footprint",
+    "codegen/mambo_codegen/data/boards",
+    "codegen/mambo_codegen/bundle/flags.py",
+)
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
 _STYLE: Final = "sil/mambo_sil/results/style.py"
@@ -106,19 +114,9 @@ ITEMS: Final = (
         pictures={"figure3.png": "table2/figure3.png"},
     ),
     Item(
-        name="first",
-        commands=first_commands(f"{RESULTS}/first"),
-        controllers=("mambo", "table1"),
-        paths=(*_FLIGHT, _STYLE, f"{_HERE}/first_picture.py"),
-        read=read_distances,
-        tables={"first": first_table},
-        pictures={"first.png": "first.png"},
-        draw=draw_first_picture,
-    ),
-    Item(
         name="space",
         commands=space_commands(f"{RESULTS}/space"),
-        controllers=("crazyflie", f"{_HERE}/height.toml"),
+        controllers=("crazyflie", "design crazyflie"),
         paths=(*_FLIGHT, _STYLE, f"{_HERE}/moving_picture.py"),
         read=read_space,
         tables={"space": space_table},
@@ -193,19 +191,24 @@ ITEMS: Final = (
         name="opponents",
         commands=(
             f"mambo-nmpc campaign {_HERE}/opponents.toml -o {RESULTS}/opponents/drawn",
-            f"mambo-nmpc campaign {_HERE}/opponents-slow-motors.toml --flights 300 "
-            f"-o {RESULTS}/opponents/slow-motors",
+            *(
+                f"mambo-nmpc campaign {_HERE}/opponents-{name}.toml --flights 300 "
+                f"-o {RESULTS}/opponents/{name}"
+                for name in SLOW_MOTORS
+            ),
         ),
         controllers=_FLOWN,
         paths=(
-            *(*_FLIGHT, f"{_EXPERIMENT}/campaign"),
-            *(f"{_HERE}/opponents.toml", f"{_HERE}/opponents-slow-motors.toml"),
+            *(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/opponents.toml"),
+            *(f"{_HERE}/opponents-{name}.toml" for name in SLOW_MOTORS),
         ),
         read=read_opponents,
         tables={
+            "opponents-summary": opponents_summary,
             "opponents": opponents("drawn"),
             "opponents-ratios": opponents_ratios,
             "opponents-slow-motors": opponents("slow-motors"),
+            "opponents-curves": opponents_curves,
         },
     ),
     _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
@@ -238,12 +241,7 @@ ITEMS: Final = (
             f"mambo-nmpc footprint mambo --optimisation=-Os -o {RESULTS}/footprint/size",
         ),
         controllers=_MEASURED,
-        paths=(
-            *_FLIGHT,
-            "sil/mambo_sil/board/footprint",
-            "codegen/mambo_codegen/data/boards",
-            "codegen/mambo_codegen/bundle/flags.py",
-        ),
+        paths=_MEASURES,
         read=read_footprints(
             dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))
             | {"mambo -Os": "size"}
@@ -257,6 +255,18 @@ ITEMS: Final = (
             "footprint-scalars": footprint_scalars,
             "compilers": compilers,
         },
+    ),
+    Item(
+        name="footprint-crazyflie",
+        commands=(
+            f"mambo-nmpc design crazyflie -o {RESULTS}/footprint-crazyflie/controller.toml",
+            f"mambo-nmpc footprint {RESULTS}/footprint-crazyflie/controller.toml "
+            f"-o {RESULTS}/footprint-crazyflie/derived",
+        ),
+        controllers=("design crazyflie",),
+        paths=_MEASURES,
+        read=read_footprints({"design crazyflie": "derived"}),
+        tables={"footprint-crazyflie": footprint("design crazyflie")},
     ),
     Item(
         name="faults",

@@ -24,7 +24,7 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import flown as as_flown
+from mambo_sil.flight.controllers.thrust_controller import adapted
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import (
@@ -86,7 +86,7 @@ class AppTakeOff:
     """Controllers of the height, one for each heading, with the take-off of the Crazyflie's app."""
 
     def __init__(self, controller: PositionController) -> None:
-        self.controller = as_flown(controller)
+        self.controller = adapted(controller)
         self._is_up = np.zeros(HEADINGS, np.bool_)
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:

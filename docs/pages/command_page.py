@@ -1,6 +1,6 @@
-"""The page of the command line, from the application itself."""
+"""The commands on the page of the command line, from the application itself."""
 
-from typing import Final
+from typing import Any, Final
 
 import typer
 from typer.core import TyperGroup
@@ -9,21 +9,15 @@ from typer.main import get_command
 from docs.pages.tables import code, plain, table
 from mambo_sil.cli.app import app
 
-INTRODUCTION: Final = """\
-# Command line
-
-What `mambo-nmpc COMMAND --help` prints. `mambo-nmpc --install-completion` sets up the completion of commands,
-options, presets and boards in your shell. Results go to stdout, messages to stderr.
-"""
 EXAMPLES: Final = "Examples:"
 
 
-def command_page() -> str:
-    """Return the page: a section for each command, in the order of the help."""
+def command_part() -> str:
+    """Return what the code writes on the page: a section for each command, in the order of the help."""
     root = get_command(app())
     assert isinstance(root, TyperGroup)
     context = typer.Context(root, info_name="mambo-nmpc")
-    parts = [INTRODUCTION, table(["option", ""], _records(root, context, "option"))]
+    parts = [table(["option", ""], _records(root, context, "option"))]
     parts += [f"\n{line}" for line in _paragraphs(root.epilog) if line.startswith("Exit codes")]
     for name, command in root.commands.items():
         inside = typer.Context(command, info_name=f"mambo-nmpc {name}")
@@ -44,7 +38,7 @@ def _paragraphs(text: str | None) -> list[str]:
     return [line for line in (text or "").split("\n\n") if line]
 
 
-def _records(command: typer.core.TyperCommand, context: typer.Context, kind: str) -> list[list[str]]:
+def _records(command: Any, context: typer.Context, kind: str) -> list[list[str]]:
     """Return name and explanation of the arguments or the options of a command, as its help has them."""
     rows = []
     for parameter in command.get_params(context):

@@ -1,39 +1,47 @@
-"""The hooks of MkDocs: pages that the code writes, tables that `make evidence` writes, drawings, formulas."""
+"""The hooks of MkDocs: addresses, parts of pages that the code writes, drawings, formulas."""
 
 import re
+import shutil
+import subprocess
+import sys
+import tomllib
 from html import unescape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 from math_core import LatexToMathML
 from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.pages import Page
 
-from docs.pages.command_page import command_page
-from docs.pages.python_page import python_page
-from docs.pages.settings_page import controller_page, vehicle_page
+sys.path.insert(0, str(Path(__file__).parents[2]))  # where plain `mkdocs` has the folder of this file only
 
-PAGES: Final = {
-    "reference/settings.md": controller_page,
-    "reference/vehicle-toml.md": vehicle_page,
-    "reference/command-line.md": command_page,
-    "reference/python-api.md": python_page,
+from docs.pages.command_page import command_part
+from docs.pages.python_page import python_part
+from docs.pages.settings_page import controller_part, vehicle_part
+
+ROOT: Final = Path(__file__).parents[2]
+
+PARTS: Final = {
+    "reference/settings.md": controller_part,
+    "reference/vehicle-toml.md": vehicle_part,
+    "reference/command-line.md": command_part,
+    "reference/python-api.md": python_part,
 }
+"""What the manual has in place of the part of a page that serves where Markdown is read without MkDocs."""
 
-_TABLE: Final = re.compile(r"^\[(Table: [^\]]+)\]\(([^)]+\.md)\)$", re.MULTILINE)
-"""A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
+_PART: Final = re.compile(r"<!-- outside the manual -->.*?<!-- end -->", re.DOTALL)
+
+_PLAYGROUND: Final = "playground.md"
 
 _NOT_SEARCHED: Final = "explanation/decisions/"
 """The folder for developers."""
 
 _WIDE: Final = "evidence/"
 """The folder whose tables need the width of the table of contents."""
-_WIDEST: Final = ("evidence/margins.md", "evidence/simulators.md")
-"""Pages whose tables need the whole width."""
-
-_LONG_TABLE: Final = 15
-"""A table of more rows than that is folded."""
+_WIDEST: Final = ("evidence/margins.md", "evidence/simulators.md", _PLAYGROUND)
+"""Pages that need the whole width."""
 
 _DRAWING: Final = re.compile(r"^!\[[^\]]+\]\(([^)]*drawings/[^)]+\.svg)\)$", re.MULTILINE)
 """A line that is a drawing; as part of the page it has the colour of its text, light or dark."""
@@ -44,32 +52,34 @@ _FORMULA: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]
 _LATEX: Final = LatexToMathML(fancy_error=False)
 
 
-def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages to the files of the site."""
-    for path, write in PAGES.items():
-        files.append(File.generated(config, path, content=write()))
-    return files
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Set the addresses of manual and repository, which stand in pyproject.toml, once there are any."""
+    urls = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["urls"]
+    if manual := urls.get("Documentation"):
+        config.site_url = manual.rstrip("/") + "/"
+    if repository := urls.get("Repository"):
+        config.repo_url = repository
+        config.repo_name = "/".join(repository.rstrip("/").split("/")[-2:])
+    return config
 
 
 def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
-    """Put each linked table and drawing in place of its link; raises OSError for one that is not there."""
-    if page.file.src_uri.startswith(_NOT_SEARCHED):
+    """Put in what the code writes, and the drawings; raises OSError for one that is not there."""
+    name = page.file.src_uri
+    if name.startswith(_NOT_SEARCHED):
         page.meta["search"] = {"exclude": True}
-    if page.file.src_uri.startswith(_WIDE):
-        page.meta["hide"] = ["toc", "navigation"] if page.file.src_uri in _WIDEST else ["toc"]
-    if page.file.abs_src_path is None:
-        return markdown
-    folder = Path(page.file.abs_src_path).parent
-    markdown = _TABLE.sub(lambda link: _table(link[1], (folder / link[2]).read_text("utf-8")), markdown)
+    if name in _WIDEST:
+        page.meta["hide"] = ["toc", "navigation"]
+    elif name.startswith(_WIDE):
+        page.meta["hide"] = ["toc"]
+    if name in PARTS:
+        part = PARTS[name]()
+        markdown = _PART.sub(lambda _: part, markdown)
+    if name == _PLAYGROUND and _has_compilers():
+        frame = Path(__file__).with_name("playground.html").read_text("utf-8")
+        markdown = _PART.sub(lambda _: frame, markdown)
+    folder = ROOT / "docs" / Path(name).parent
     return _DRAWING.sub(lambda link: f"<div>\n{(folder / link[1]).read_text('utf-8')}</div>", markdown)
-
-
-def _table(title: str, text: str) -> str:
-    """Return a table as part of a page, folded if it is long."""
-    head, rule, *rows = text.splitlines()
-    if len(rows) <= _LONG_TABLE:
-        return text
-    return "\n    ".join([f'??? note "{title} ({len(rows)} rows)"\n', head, rule, *rows])
 
 
 def on_page_content(html: str, /, **_: object) -> str:
@@ -82,3 +92,25 @@ def _typeset(formula: re.Match[str]) -> str:
     tag, latex = formula.groups()
     mathml = _LATEX.convert_with_local_state(unescape(latex).strip(), displaystyle=tag == "div")
     return f'<div class="formula">{mathml}</div>' if tag == "div" else mathml
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Write the playground that its page shows; raises PluginError if its commands refuse."""
+    if _has_compilers():
+        with TemporaryDirectory() as folder:
+            derived = f"{folder}/three-axes.toml"
+            _run("design", "crazyflie", "-o", derived)
+            sources = (derived, "crazyflie", "pid-feedforward", "pd")
+            _run("playground", *sources, "--vehicle", "crazyflie", "-o", f"{config.site_dir}/play.html")
+
+
+def _has_compilers() -> bool:
+    """Return whether the playground can be made here; if not, its page is as outside the manual."""
+    return all(map(shutil.which, ("clang", "wasm-ld")))
+
+
+def _run(*words: str) -> None:
+    command = [sys.executable, "-m", "mambo_nmpc", *words]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ran.returncode:
+        raise PluginError(ran.stderr)

@@ -1,4 +1,4 @@
-"""The page of the Python API: the docstrings of the public names of `mambo_nmpc`."""
+"""The names on the page of the Python API: the docstrings of the public names of `mambo_nmpc`."""
 
 from typing import Final
 
@@ -10,21 +10,13 @@ MEMBERS: Final = {"Vehicle": ["from_preset", "from_file"]}
 MODULES: Final = ("mambo_nmpc.curves",)
 """Modules with public names of their own."""
 
-INTRODUCTION: Final = """\
-# Python API
 
-All public names of `mambo_nmpc`; [From Python](python.md) shows them at work. n is the number of drones,
-(...) the shape of a batch of them. `mambo_codegen` and `mambo_sil` are importable too, but may change with
-any version.
-"""
-
-
-def python_page() -> str:
-    """Return the page: for mkdocstrings the place of each public name, in the folders of the repository."""
+def python_part() -> str:
+    """Return for mkdocstrings the place of each public name, in the folders of the repository."""
     homes = {name: getattr(mambo_nmpc, name).__module__ for name in mambo_nmpc.__all__}
     blocks = [
         f"::: {home.removeprefix('mambo_nmpc.')}.{name}\n"
         + (f"    options:\n      members: {MEMBERS[name]}\n" if name in MEMBERS else "")
         for name, home in homes.items()
     ]
-    return "\n".join([INTRODUCTION, *blocks, *(f"::: {name}\n" for name in MODULES)])
+    return "\n".join([*blocks, *(f"::: {name}\n" for name in MODULES)])

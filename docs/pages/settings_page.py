@@ -13,31 +13,10 @@ from mambo_sil.drone.vehicles.vehicle_file import form
 UNITS: Final = {"_m_s2": "m/s^2", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_m": "m", "_s": "s"}
 """The unit that the end of a setting's name stands for; the first end that fits counts."""
 
-CONTROLLER: Final = """\
-# Settings: controller.toml
 
-`mambo-nmpc init` writes such a file with the explanation of every key. A missing key has its default, which
-is preset `table1`; an unknown key, a value out of range, and a value that would have no effect are refused
-with the rule and the fix. `mambo-nmpc schema` prints the JSON schema, with which editors check and complete
-the file.
-
-The method is `cost.norm`. A key that only one method uses says so. The last column is preset `mambo`.
-"""
-
-VEHICLE: Final = """\
-# Drones: vehicle.toml
-
-`mambo-nmpc vehicles generic` prints such a file, with the source of every value; [Vehicles](vehicles.md)
-explains what the sections do, [your own drone](../tutorials/own-drone.md) has a short example. The unit is in
-the name of a key, in SI. `mambo-nmpc vehicles --schema` prints the JSON schema, with which editors check and
-complete the file.
-
-"""
-
-
-def controller_page() -> str:
-    """Return the page of controller.toml: a table for each section."""
-    parts = [CONTROLLER]
+def controller_part() -> str:
+    """Return what the code writes on the page of controller.toml: a table for each section."""
+    parts = ["The last column is preset `mambo`."]
     for section, description in SECTIONS.items():
         rows = [_row(key) for path, key in KEYS.items() if path.rpartition(".")[0] == section]
         head = ["key", "meaning", "allowed", "default", "`mambo`"]
@@ -68,11 +47,11 @@ def _row(key: Key) -> list[str]:
     ]
 
 
-def vehicle_page() -> str:
-    """Return the page of vehicle.toml: a table for each section, and for each of its kinds."""
-    parts = [VEHICLE]
+def vehicle_part() -> str:
+    """Return what the code writes on the page of vehicle.toml: a table for each section and each kind."""
+    parts = []
     shown: set[str] = set()
-    for attitude, sensors in (("cascade", "mambo"), ("first_order", "mocap"), ("mambo", "none")):
+    for attitude, sensors in (("cascade", "mambo"), ("first_order", "mocap"), ("mambo", "true")):
         found = form(attitude, sensors)
         kinds = {"attitude": attitude, "sensors": sensors}
         for section, description in found.sections.items():

@@ -81,7 +81,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
     return between(value, -limit, limit);
 }
 
-/* Saturate `value` at +/- `limit`. */
+/* Clamp `value` at +/- `limit`. */
 NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     return (value > limit) ? limit : ((value < -limit) ? -limit : value);
@@ -1440,7 +1440,15 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0, 0 }, { 260899300, 260899300 }, 1244700, 304895, 213426, 41943040, 201326592, 11744051, { 23041, 23041 }
+        { 0, 0 }, /* centre_m */
+        { 260899300, 260899300 }, /* clear_m */
+        1244700, /* margin_m */
+        304895, /* knee_m */
+        213426, /* near_m */
+        41943040, /* speed_m_s */
+        201326592, /* braking_m_s2 */
+        11744051, /* tilt_rad */
+        { 23041, 23041 } /* command_m_step2 */
     };
 
     self->bounds = bounds;

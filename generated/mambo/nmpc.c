@@ -137,7 +137,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 }
 #endif
 
-/* Saturate `value` at +/- `limit`. */
+/* Clamp `value` at +/- `limit`. */
 NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     nmpc_real_t clamped = value;
@@ -1217,7 +1217,15 @@ void nmpc_default_limits(nmpc_limits_t *limits)
 static void limits_init(nmpc_t *self)
 {
     static const nmpc_bounds_t bounds = {
-        { 0.0f, 0.0f }, { 995.2518f, 995.2518f }, 4.74821f, 1.1630836f, 0.81415856f, 5.0f, 6.0f, 0.35f, { 0.00034335f, 0.00034335f }
+        { 0.0f, 0.0f }, /* centre_m */
+        { 995.2518f, 995.2518f }, /* clear_m */
+        4.74821f, /* margin_m */
+        1.1630836f, /* knee_m */
+        0.81415856f, /* near_m */
+        5.0f, /* speed_m_s */
+        6.0f, /* braking_m_s2 */
+        0.35f, /* tilt_rad */
+        { 0.00034335f, 0.00034335f } /* command_m_step2 */
     };
 
     self->bounds = bounds;

@@ -142,7 +142,7 @@ NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
 }
 #endif
 
-/* Saturate `value` at +/- `limit`. */
+/* Clamp `value` at +/- `limit`. */
 NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     nmpc_real_t clamped = value;

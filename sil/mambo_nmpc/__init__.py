@@ -1,4 +1,4 @@
-"""Nonlinear model predictive control in static-memory C99 for very small drones.
+"""Model predictive position control for small drones in static-memory C99.
 
     from mambo_nmpc import Controller, DroneState, TargetState, Vehicle, fly
 

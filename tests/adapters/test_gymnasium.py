@@ -64,14 +64,14 @@ def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
         assert np.ptp(heights) > 0.2
 
 
-def test_a_thrust_that_the_mixer_caps_is_told() -> None:
+def test_a_thrust_that_the_mixer_caps_is_reported() -> None:
     """Beside a large tilt the Crazyflie's motors do not give all that is commanded; at rest they do."""
     drone = SimulatedDrone(vehicle_toml.load("crazyflie"), 0.01)
     drone.advance(np.zeros(2), 9.81)
-    assert np.isnan(drone.tell_thrust())
+    assert np.isnan(drone.report_thrust())
     drone.advance(np.array([0.5, 0.0]), 15.9)
-    assert 9.0 < drone.tell_thrust() < 15.9
-    assert np.isnan(drone.tell_thrust())
+    assert 9.0 < drone.report_thrust() < 15.9
+    assert np.isnan(drone.report_thrust())
 
 
 @pytest.mark.long

@@ -142,9 +142,9 @@ class Moving:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"sensors": "x"}, 'sensors = "x" must be "none" or "mambo" or "mambo-derotated" or "mocap"'),
+        ({"sensors": "x"}, 'sensors = "x" must be "true" or "mocap" or "flow-deck" or "mambo"'),
         ({"sensors": None}, "sensors = None must be"),
-        ({"sensors": "mocap"}, 'sensors = "mocap" must be "none" or "mambo"'),
+        ({"sensors": "mocap"}, 'sensors = "mocap" must be "true" or "mambo"'),
         ({"start": "landed"}, 'start = "landed" must be "hover" or "take-off"'),
         (
             {"trajectory": "eight"},

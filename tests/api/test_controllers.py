@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
 from mambo_codegen.methods.shared.heading import slew_heading
@@ -61,6 +62,8 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     derived = controller_toml.parse(controller_text(vehicle_toml.read(file), "mine"), "mine")
     assert Controller.from_vehicle(file).settings == derived
     assert Controller.from_vehicle(str(file)).settings == derived
+    quick = Controller.from_vehicle(file, sensors="true").settings.observer
+    assert (quick.disturbance_noise, derived.observer.disturbance_noise) == (3.0, 1.0)
 
 
 @pytest.mark.long
@@ -121,6 +124,17 @@ def test_a_wrong_option_is_refused_by_name(options: dict[str, Any], message: str
     """With its value and what is allowed."""
     with pytest.raises(ArgumentError, match=message):
         Controller.from_vehicle("crazyflie", **options)
+
+
+def test_sensors_without_figures_are_refused_by_name() -> None:
+    """Of the vehicle; a name that no sensors have names those that there are."""
+    with pytest.raises(
+        InvalidSettingsError, match=r'sensors = "mambo" needs its figures, \[sensors\], in the file'
+    ):
+        Controller.from_vehicle("crazyflie", sensors="mambo")
+    wrong: Any = "autopilot"
+    with pytest.raises(ArgumentError, match='sensors = "autopilot" must be "true" or "mocap" or "flow-deck"'):
+        Controller.from_vehicle("crazyflie", sensors=wrong)
 
 
 def test_what_does_not_fit_together_is_refused() -> None:

@@ -41,7 +41,7 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleratio
             assert (found.status == 0).all()
         assert (ours.set_thrust([10.0, np.nan]) == theirs.set_thrust([10.0, np.nan])).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
-        for thrusts in ([10.0, expected.thrust_m_s2[1]], [10.5, 9.0]):  # told, commanded, told
+        for thrusts in ([10.0, expected.thrust_m_s2[1]], [10.5, 9.0]):  # reported, commanded, reported
             assert (ours.set_command((0.05, -0.1)) == 0).all()
             theirs.set_command(np.column_stack([[[0.05, -0.1]] * 2, thrusts]))
             assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
@@ -55,7 +55,7 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleratio
 
 
 @pytest.mark.long
-def test_a_reset_hovers_unless_a_thrust_is_told() -> None:
+def test_a_reset_hovers_unless_a_thrust_is_reported() -> None:
     """The first command after it is that of a new controller."""
     ours, new = Controller.from_vehicle("crazyflie"), Controller.from_vehicle("crazyflie")
     above = TargetState([0.0, 0.0, -1.01], np.zeros(3))

@@ -1,7 +1,6 @@
-"""Tables and pictures of the manual are those of this code, and README says what they say."""
+"""Tables and pictures of README and the manual are those of this code."""
 
 import json
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,16 +12,20 @@ from benchmarks.evidence import item as evidence
 from benchmarks.evidence import sources
 from benchmarks.evidence.item import (
     DATA,
-    PAGES,
+    PICTURES,
+    PLACE,
     EvidenceError,
     Item,
     changes,
     differences,
+    folded,
     make,
+    pages,
     read_stamp,
     record_lines,
     restamp,
     run,
+    with_tables,
 )
 from benchmarks.evidence.items import ITEMS
 from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
@@ -33,7 +36,6 @@ from mambo_codegen.settings.controller_toml import with_option
 from tests.support.tools import require
 
 ROOT = Path(__file__).parents[2]
-INCLUDE = re.compile(r"^\[Table: [^\]]+\]\([./\w-]*data/([\w-]+\.md)\)$", re.MULTILINE)
 NAMES = [item.name for item in ITEMS]
 
 
@@ -61,30 +63,57 @@ def test_a_release_has_figures_as_new_as_its_code(item: Item) -> None:
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=NAMES)
-def test_tables_are_those_of_the_figures(item: Item) -> None:
-    """No table was edited by hand; the stamp has all commands of the item, and a line a record."""
+def test_a_stamp_has_all_commands_of_its_item(item: Item) -> None:
+    """And a line a record; its pictures are there."""
     stamp = read_stamp(item)
     assert item.stamp.read_text("utf-8") == record_lines(stamp) + "\n"
     assert stamp["commands"] == list(item.commands)
-    for name, text in item.texts(stamp["figures"]).items():
-        assert (DATA / name).read_text("utf-8") == text, f"{name}: run python -m benchmarks.evidence"
     for name in item.pictures:
-        assert (PAGES / name).stat().st_size > 10_000, name
+        assert (PICTURES / name).stat().st_size > 10_000, name
+
+
+def all_tables() -> dict[str, str]:
+    """Return the tables of all stamps by name."""
+    return {name: text for item in ITEMS for name, text in item.texts(read_stamp(item)["figures"]).items()}
+
+
+def test_tables_on_pages_are_those_of_the_figures() -> None:
+    """No table was edited by hand."""
+    tables = all_tables()
+    texts = {page: page.read_text("utf-8") for page in pages()}
+    wrong = [str(page) for page, text in texts.items() if with_tables(text, tables) != text]
+    assert wrong == [], "run python -m benchmarks.evidence"
 
 
 def test_every_table_is_on_a_page() -> None:
-    """And every file of data belongs to an item, so that none is left over."""
-    made = {f"{item.name}.json" for item in ITEMS} | {f"{name}.md" for item in ITEMS for name in item.tables}
-    assert {path.name for path in DATA.iterdir()} == made
-    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs").rglob("*.md"))
-    assert set(INCLUDE.findall(pages)) == {name for name in made if name.endswith(".md")}
+    """Every place is that of a table, and every stamp that of an item, so that none is left over."""
+    assert {path.name for path in DATA.iterdir()} == {f"{item.name}.json" for item in ITEMS}
+    text = "".join(page.read_text("utf-8") for page in pages())
+    assert {place[2] for place in PLACE.finditer(text)} == set(all_tables())
+    assert text.count("<!-- table: ") == text.count("<!-- end of table -->") == len(PLACE.findall(text))
+
+
+def test_a_table_edited_by_hand_is_found() -> None:
+    """It is written again between its markers; what surrounds it, and other tables, stay."""
+    page = "A\n\n<!-- table: a -->\n{}\n<!-- end of table -->\n\n<!-- table: b -->\n<!-- end of table -->\n"
+    written = with_tables(page.format("| 1 |"), {"a": "| 2 |"})
+    assert written == page.format("\n| 2 |\n")
+    assert with_tables(written, {"a": "| 2 |"}) == written
+
+
+def test_a_table_of_more_than_fifteen_rows_is_folded() -> None:
+    """With its name and the number of rows."""
+    short = "\n".join(["| a |", "| - |", *["| 1 |"] * 15])
+    assert folded("a", short) == short
+    assert "<summary>Table: a b (16 rows)</summary>\n\n| a |" in folded("a-b", f"{short}\n| 1 |")
 
 
 def test_files_of_settings_are_presets_but_for_what_their_names_say() -> None:
-    """The 1-norm without tracker, as in the other benchmarks, and the preset in fixed point."""
+    """The 1-norm without tracker, as in the other benchmarks, the preset in fixed point, a derived one."""
     fixed = with_option(presets.load("mambo-1norm"), "code.scalar", "fixed")
     assert presets.load(str(ROOT / "benchmarks/evidence/one-norm.toml")) == ONE_NORM
     assert presets.load(str(ROOT / "benchmarks/evidence/mambo-1norm-fixed.toml")) == fixed
+    assert generated("benchmarks/evidence/height.toml") == generated("design crazyflie")
 
 
 C = '/* Words. */\n#define A 1.0f /* more */\n\nconst char *b = "/* no comment */"; // words\n'
@@ -183,80 +212,3 @@ def test_an_unknown_item_is_refused() -> None:
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ran.returncode == 2
     assert ran.stderr.startswith("table3: is no item of evidence; there are table2, ")
-
-
-# README
-
-SUMMARISED = ("table2.md", "opponents.md", "opponents-slow-motors.md")
-"""Tables whose figures README repeats."""
-
-
-def cells(line: str) -> list[str]:
-    """Return the cells of a line of a table, links by their text."""
-    return [cell.strip() for cell in re.sub(r"\]\([^)]*\)", "]", line).strip().strip("|").split("|")]
-
-
-def rows(text: str) -> list[list[str]]:
-    """Return the rows of all tables, without heads."""
-    lines = text.splitlines()
-    rules = [number for number, line in enumerate(lines) if re.fullmatch(r"\|[|\s:-]+", line)]
-    heads = {number - 1 for number in rules}
-    return [cells(line) for number, line in enumerate(lines) if line.startswith("|") and number not in heads]
-
-
-def numbers(words: list[str]) -> list[str]:
-    """Return the numbers in cells, without separators of thousands."""
-    return re.findall(r"(?<![\w-])\d+(?:\.\d+)?(?![\w-])", re.sub(r"(?<=\d),(?=\d{3})", "", " ".join(words)))
-
-
-def place(number: str) -> float:
-    """Return the value of the last significant place: 10 of 4300 and 1750, 0.01 of 63.02, 1 of 40."""
-    whole, _, decimals = number.partition(".")
-    if decimals:
-        return 10.0 ** -len(decimals)
-    return 1.0 if len(whole) < 4 else 10.0 ** (len(whole) - len(whole.rstrip("0")))
-
-
-def is_rounded(shorter: str, longer: str) -> bool:
-    """Return whether one number is another, itself rounded, with as many or fewer places."""
-    nearly = abs(float(shorter) - float(longer)) <= 0.5 * (place(shorter) + place(longer)) * (1 + 1e-9)
-    return float(shorter) == float(longer) or (place(shorter) > place(longer) and nearly)
-
-
-def subject(cell: str) -> str:
-    """Return letters and digits of a first cell, as far as it names who flies or what is measured."""
-    named = cell.casefold().removesuffix(", flown").removesuffix(", printed")
-    return re.sub(r"[^a-z0-9]", "", named)
-
-
-def unfounded(text: str) -> list[str]:
-    """Return the figures of tables that have another value, or none, in `SUMMARISED`, with their row."""
-    known: dict[str, list[str]] = {}
-    for name in SUMMARISED:
-        for first, *others in rows((DATA / name).read_text("utf-8")):
-            known.setdefault(subject(first), []).extend(numbers(others))
-    wrong = []
-    for first, *others in rows(text):
-        names = [name for name in known if subject(first).startswith(name)]
-        figures = known.get(max(names, key=len, default=""), [])
-        wrong += [
-            f"{first}: {one}" for one in numbers(others) if not any(is_rounded(one, x) for x in figures)
-        ]
-    return wrong
-
-
-def test_readme_says_what_the_evidence_says() -> None:
-    """Every figure in a table of README is in a row of the same name of the evidence."""
-    text = (ROOT / "README.md").read_text("utf-8")
-    assert len([row for row in rows(text) if len(numbers(row[1:])) >= 4]) >= 3
-    assert unfounded(text) == []
-
-
-def test_a_wrong_figure_in_readme_is_found() -> None:
-    """A digit, a row under another name, a figure of nobody; fewer digits are none."""
-    head = "| | IAE | ISE |\n|---|---|---|\n"
-    assert unfounded(f"{head}| `mambo`: words | 0.945 | 0.0278 |\n") == []
-    assert unfounded(f"{head}| [`mambo`](page.md#part-2) | 0.94 | 0.028 |\n") == []
-    assert unfounded(f"{head}| `mambo` | 0.946 | 0.0278 |\n") == ["`mambo`: 0.946"]
-    assert unfounded(f"{head}| `table1` | 0.945 | 0.938 |\n") == ["`table1`: 0.945"]
-    assert unfounded(f"{head}| x | 1 | 2 |\n") == ["x: 1", "x: 2"]

@@ -61,3 +61,10 @@ def test_every_command_has_its_line() -> None:
     assert all(f"─ {panel} ─" in said for panel in PANELS)
     for name in (name for commands in PANELS.values() for name in commands):
         assert f"│ {name} " in said
+
+
+def test_help_of_fly_fits_on_two_screens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 80 columns, because the values of an option stand in its explanation, not beside its name."""
+    monkeypatch.setenv("COLUMNS", "80")
+    said, _ = run("fly", "--help")
+    assert len(said.splitlines()) <= 110

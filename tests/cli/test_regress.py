@@ -18,7 +18,7 @@ same_bits = true
 duration_s = 1.0
 [flights.eight]
 yaw_rad = [0.0, 0.8]
-sensors = ["none", "mambo"]
+sensors = ["true", "mambo"]
 bounds = { iae_m_s = 0.5 }
 [flights.far]
 trajectory = "step"
@@ -92,7 +92,7 @@ def test_recorded_flights_are_the_same_again_and_others_fail() -> None:
     run("regress", "mine.toml", "-o", "out")
     Path("mambo.toml").write_text("[cost]\neffort_weight = 0.5\n", "utf-8")
     said, _ = run("regress", "mine.toml", "--controller", "./mambo.toml", "-o", "out", code=1)
-    assert "eight/yaw_rad=0,sensors=none: " in said
+    assert "eight/yaw_rad=0,sensors=true: " in said
     assert "recorded 0." in said
     assert "the trace differs from the recorded one" in said
     assert "the controller's settings have changed since the metrics were recorded" in said

@@ -102,8 +102,20 @@ def test_sensors_of_another_drone_are_refused() -> None:
     """With those it has."""
     _, said = run("fly", "--vehicle", "crazyflie", "--sensors", "mambo", code=2)
     assert said == (
-        '--sensors = "mambo" must be "none" or "mocap": vehicle crazyflie has sensors.kind = "mocap"\n'
+        '--sensors = "mambo" must be "true" or "mocap": vehicle crazyflie has sensors.kind = "mocap"\n'
     )
+
+
+def test_one_list_of_sensors_for_every_command() -> None:
+    """A wrong name prints it; the older one of the true state is read."""
+    kinds = "'true', 'mocap', 'flow-deck', 'mambo'"
+    for command, more in (("design", ""), ("fly", ", 'mambo-derotated'"), ("margins", ", 'mambo-derotated'")):
+        _, said = run(command, "crazyflie", "--sensors", "autopilot", code=2)
+        assert f"'autopilot' is not one of {kinds}{more}." in " ".join(said.replace("│", " ").split())
+    flags = ("--duration-s", "1", "--controller", "pd")
+    run("fly", "--sensors", "none", *flags, "-o", "older")
+    run("fly", "--sensors", "true", *flags, "-o", "newer")
+    assert Path("older/trace.csv").read_bytes() == Path("newer/trace.csv").read_bytes()
 
 
 @pytest.mark.long
@@ -151,12 +163,12 @@ def test_a_suite_flies_any_drone() -> None:
     Path("suite.toml").write_text(text.replace('["mambo", "mine.toml"]', '"gone"'), "utf-8")
     _, said = run("regress", "suite.toml", code=2)
     assert said.startswith("suite.toml: flights.eight.vehicle: gone is neither a shipped vehicle nor a file")
-    sensed = GROUP + 'sensors = ["none", "mambo"]\n'
+    sensed = GROUP + 'sensors = ["true", "mambo"]\n'
     Path("suite.toml").write_text(sensed, "utf-8")
     run("regress", "suite.toml", "--controller", "pd", "--vehicle", "mine.toml", "--update", "-o", "other")
     assert Path("suite.mine.pd.baseline.json").exists()
     assert [flight["name"] for flight in summary("other")["flights"]] == [
-        "eight/sensors=none",
+        "eight/sensors=true",
         "eight/sensors=mocap",
     ]
 

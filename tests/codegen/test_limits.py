@@ -104,17 +104,17 @@ def test_no_desired_velocity_exceeds_a_limit(base: str, scalar: str) -> None:
     settings = limited(base, scalar, fence=FENCE)
     position, target = random_flights(2)
     velocity, active = desired(settings, position, target)
-    acts = active != 0
-    assert 0.5 < np.mean(acts) < 1
+    limit_active = active != 0
+    assert 0.5 < np.mean(limit_active) < 1
     slack = 1e-5 if scalar != "float64" else 1e-12
-    assert np.max(np.hypot(*velocity[acts].T)) <= 2.0 * (1 + slack)
+    assert np.max(np.hypot(*velocity[limit_active].T)) <= 2.0 * (1 + slack)
     for axis, wall in ((0, 2.0), (1, 1.5)):
         for sign in (1, -1):
             room = wall - (sign * position[:, axis])
             towards = sign * velocity[:, axis]
-            inside = acts & (room > 0)
+            inside = limit_active & (room > 0)
             assert np.all(towards[inside] <= np.sqrt(2 * 2.0 * room[inside]) + (10 * slack) + 1e-5)
-            assert np.all(towards[acts & (room < -1e-3)] < 0), "outside it leads back in"
+            assert np.all(towards[limit_active & (room < -1e-3)] < 0), "outside it leads back in"
 
 
 @pytest.mark.parametrize("acceleration", ["tracked", "none"])
@@ -142,10 +142,10 @@ def test_the_law_is_that_of_the_page(acceleration: str) -> None:
     expected = np.where(clear, expected, np.clip(expected, -f(walls + position), f(walls - position)))
     size = np.maximum(np.hypot(*expected.T)[:, None], 1e-12)
     expected = np.where(size > 2.0, expected * 2.0 / size, expected)
-    acts = active != 0
-    assert velocity[acts] == pytest.approx(expected[acts], abs=1e-9)
+    limit_active = active != 0
+    assert velocity[limit_active] == pytest.approx(expected[limit_active], abs=1e-9)
     untouched = target[:, 2:4] + (k * error)
-    assert expected[~acts] == pytest.approx(untouched[~acts], abs=1e-9), (
+    assert expected[~limit_active] == pytest.approx(untouched[~limit_active], abs=1e-9), (
         "where no limit acts none would change it"
     )
 

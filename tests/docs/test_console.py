@@ -61,6 +61,7 @@ NOT_RUN = {
         "needs a Crazyflie",
     ),
     "tutorials/px4-ardupilot.md": ("needs PX4",),
+    "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }
 """The console blocks that are not run, by page: the reason, which is in the title of the block."""

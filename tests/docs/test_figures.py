@@ -1,6 +1,6 @@
 """Figures in prose: each equals what a command printed when its evidence was made.
 
-A table that a page includes is written by its command; a figure in a sentence is typed by hand, and stays
+A table between two markers is written by its command; a figure in a sentence is typed by hand, and stays
 when the command prints another one. So a sentence with such a figure has a row in `FIGURES`:
 
     Figure("docs/how-to/arduino.md", r"preset `mambo` takes (.+?) % of its period", lambda: ...)
@@ -44,7 +44,8 @@ def figures(item: str) -> Any:
 
 def board(name: str, controller: str = "mambo") -> Any:
     """Return the footprint of a controller on a board."""
-    return next(one for one in figures("footprint")[controller] if one["name"] == name)
+    found = figures("footprint") | figures("footprint-crazyflie")
+    return next(one for one in found[controller] if one["name"] == name)
 
 
 def instructions(name: str, controller: str = "mambo", kind: str = "mean") -> str:
@@ -52,15 +53,29 @@ def instructions(name: str, controller: str = "mambo", kind: str = "mean") -> st
     return f"{board(name, controller)['instructions'][kind]:.0f}"
 
 
-def step_us(name: str) -> str:
+def step_us(name: str, controller: str = "mambo") -> str:
     """Return the least and the longest time of a step in microseconds."""
-    least_s, most_s = board(name)["time_s"]
+    least_s, most_s = board(name, controller)["time_s"]
     return f"{1e6 * least_s:.0f} to {1e6 * most_s:.0f}"
 
 
-def period_percent(name: str) -> str:
-    """Return the longest time of a step of preset `mambo` as a share of its update period of 10 ms."""
-    return f"{100 * board(name)['time_s'][1] / 0.01:.2g}"
+def period_percent(name: str, controller: str = "mambo") -> str:
+    """Return the longest time of a step as a share of the update period of 10 ms."""
+    return f"{100 * board(name, controller)['time_s'][1] / 0.01:.2g}"
+
+
+def share_of_fixed() -> str:
+    """Return the least and the largest share of fixed point in the instructions of float32, without FPU."""
+    shares = [
+        board(name, FIXED)["instructions"]["mean"] / board(name)["instructions"]["mean"]
+        for name in ("mambo", "rp2040", "rv32")
+    ]
+    return f"{100 * min(shares):.0f} to {100 * max(shares):.0f}"
+
+
+def crashes(campaign: str, controller: str = "mambo") -> str:
+    """Return how many of 300 light drones with slow motors crash."""
+    return str(figures("opponents")[campaign]["controllers"][controller]["crashed"]["count"])
 
 
 def size(name: str) -> str:
@@ -93,6 +108,14 @@ def in_crazyflow(controller: str) -> str:
     return shown(sorted(found)[len(found) // 2])
 
 
+def in_firmware(curve: str, controller: str) -> str:
+    """Return the mean distance in cm over 60 s of a curve in the Crazyflie's firmware, of nine flights."""
+    record = json.loads((ROOT / "docs" / "evidence" / "records" / "firmware.json").read_text("utf-8"))
+    iae_m_s = record["figures"]["curves"][curve][controller]["iae_m_s"]
+    distance_cm = 100 * sum(iae_m_s) / len(iae_m_s) / 60
+    return f"{distance_cm:.1f}" if distance_cm < 10 else f"{distance_cm:.0f}"
+
+
 def ratio_of_pid(index: str) -> float:
     """Return the median, over 1000 random drones, of the tuned PID's index divided by that of `mambo`."""
     found = figures("opponents")["improvements"]
@@ -107,7 +130,10 @@ def frozen() -> str:
     return next(f"{one['largest_error_m']:.0f}" for one in found if one["fault"] == "state frozen, 5 s")
 
 
-FIXED = "mambo --scalar fixed"
+FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
+CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
+OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compatibility.md"
+HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
 BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
 WORK = "docs/evidence/constant-work.md"
 FIGURES = [
@@ -130,19 +156,48 @@ FIGURES = [
         r"for `mambo`, (\d+) for `mambo-1norm`",
         lambda: instructions("crazyflie", "mambo-1norm"),
     ),
-    Figure("README.md", r"\*\*(\S+) KB of flash", lambda: f"{board('crazyflie')['flash_bytes'] / 1000:.1f}"),
-    Figure("README.md", r"KB of flash, (\d+) bytes of RAM", lambda: str(board("crazyflie")["ram_bytes"])),
-    Figure("README.md", r"(\d+ to \d+) us a step\*\*", lambda: step_us("crazyflie")),
-    Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie")),
+    Figure(
+        "README.md",
+        r"\*\*(\S+) KB of flash",
+        lambda: f"{board('crazyflie', DERIVED)['flash_bytes'] / 1000:.1f}",
+    ),
+    Figure("README.md", r"flash, (\d+) bytes of RAM", lambda: str(board("crazyflie", DERIVED)["ram_bytes"])),
+    Figure("README.md", r"(\d+ to \d+) us a step\*\*", lambda: step_us("crazyflie", DERIVED)),
+    Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie", DERIVED)),
+    Figure(
+        "docs/index.md",
+        r"needs (\S+) KB of flash",
+        lambda: f"{board('crazyflie', DERIVED)['flash_bytes'] / 1000:.1f}",
+    ),
+    Figure("docs/index.md", r"flash and (\d+) bytes", lambda: str(board("crazyflie", DERIVED)["ram_bytes"])),
     Figure("README.md", r"\[(\d+) instructions instead of", lambda: instructions("mambo", FIXED)),
     Figure("README.md", r"instructions instead of (\d+)\]", lambda: instructions("mambo")),
-    Figure("README.md", r"the paper's PD (\d+) cm, this MPC", lambda: shown(figures("space")["pd"])),
-    Figure("README.md", r"altitude loop (\d+) cm", lambda: shown(figures("space")["preset"])),
+    Figure("README.md", r"the paper's PD (\d+) cm, a tuned", lambda: shown(figures("space")["pd"])),
     Figure("README.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
-    Figure("README.md", r"three axes (\S+) cm", lambda: shown(figures("space")["third-axis"])),
-    Figure("README.md", r"PID has (\S+) times", lambda: f"{ratio_of_pid('seen_iae_m_s'):.1f}"),
+    Figure("README.md", r"this MPC (\S+) cm", lambda: shown(figures("space")["third-axis"])),
+    Figure("README.md", r"PID's is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"),
+    Figure("README.md", r"(\d+) of 300 crash with `mambo`", lambda: crashes(FAST_EIGHT)),
+    Figure("README.md", r"with `mambo`, (\d+) with the PID", lambda: crashes(FAST_EIGHT, "pid-feedforward")),
     Figure(
-        "README.md", r"mostly drift, is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"
+        OPPONENTS, r"\*\*(\S+) times the error as estimated", lambda: f"{ratio_of_pid('seen_iae_m_s'):.1f}"
+    ),
+    Figure(OPPONENTS, r"\*\*(\d+) of 300 crash with", lambda: crashes("slow-motors", "pid-feedforward")),
+    Figure(OPPONENTS, r"crashes: (\d+) of 300 on a circle", lambda: crashes(CIRCLE)),
+    Figure(OPPONENTS, r"rad/s, (\d+) on the eight at 0.8", lambda: crashes(FAST_EIGHT)),
+    Figure(COMPATIBILITY, r"and (\d+) on a circle at", lambda: crashes(CIRCLE)),
+    Figure(HEIGHT, r"the mean distance is (\S+) cm;", lambda: shown(figures("space")["third-axis"])),
+    Figure(HEIGHT, r"cm; (\d+) cm with the drone's own", lambda: shown(figures("space")["preset"])),
+    Figure(FIXED_POINT, r"it takes (.+?) % of the instructions of float32", share_of_fixed),
+    Figure(FIXED_POINT, r"on the Mega (\d+) % of the update", lambda: period_percent("mega", FIXED)),
+    Figure(FIXED_POINT, r"where float32 takes (\d+) %", lambda: period_percent("mega")),
+    Figure("README.md", r"on an eight: (\S+) cm", lambda: in_firmware("eight", "design")),
+    Figure("README.md", r"Mellinger's controller (\S+) cm", lambda: in_firmware("eight", "mellinger")),
+    Figure("README.md", r"Lee's (\S+) cm", lambda: in_firmware("eight", "lee")),
+    Figure("README.md", r"cm, PID (\d+) cm", lambda: in_firmware("eight", "pid")),
+    Figure(
+        "README.md",
+        r"in the firmware, (\S+ to \S+) cm",
+        lambda: f"{in_firmware('circle', 'design')} to {in_firmware('circle', 'lee')}",
     ),
     Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
     Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
@@ -152,10 +207,9 @@ FIGURES = [
         lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
     ),
     Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
-    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("first")["pd"])),
-    Figure("docs/index.md", r"paper's NMPC (\S+) cm", lambda: shown(figures("first")["table1"])),
-    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("first")["pid-feedforward"], 1)),
-    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("first")["mambo"], 1)),
+    Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("space")["pd"])),
+    Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
+    Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("space")["third-axis"])),
     Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
     Figure(
         "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)

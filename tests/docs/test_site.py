@@ -8,20 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.tools import require_module
+from tests.support.tools import require, require_module
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the built manual; a link, an anchor or a page out of the navigation would have failed it."""
+    """Return the manual that plain `mkdocs` builds; a broken link or anchor would have failed it."""
     require_module("mkdocs")
     require_module("material")
     require_module("mkdocstrings")
     require_module("math_core")
     folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    script = Path(sys.executable).with_name("mkdocs")
+    command: list[str | Path] = [script, "build", "--strict", "--site-dir", folder]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return folder
@@ -39,6 +40,35 @@ def test_it_has_the_pages_that_the_code_writes(site: Path) -> None:
     assert re.findall(r'<h2 id="([\w-]+)"', commands)[:4] == ["init", "doctor", "playground", "presets"]
     python = (site / "reference" / "python-api.html").read_text("utf-8")
     assert [name for name in names if f'.{name}"' not in python] == []
+
+
+@pytest.mark.long
+def test_the_playground_is_part_of_its_page(site: Path) -> None:
+    """The manual has page, frame and script; nothing is left of what stands there outside of it."""
+    require("clang", "clang")
+    require("wasm-ld", "lld")
+    text = (site / "playground.html").read_text("utf-8")
+    assert ('<iframe id="play" src="play.html' in text, "outside the manual" in text) == (True, False)
+    assert "three-axes" in (site / "play.html").read_text("utf-8")
+
+
+def test_addresses_are_those_of_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They stand in pyproject.toml alone; without them the manual has none."""
+    require_module("mkdocs")
+    require_module("math_core")
+    from mkdocs.config.defaults import MkDocsConfig  # noqa: PLC0415
+
+    from docs.pages import hooks  # noqa: PLC0415 - it needs what the extra `docs` installs
+
+    monkeypatch.setattr(hooks, "ROOT", tmp_path)
+    project = tmp_path / "pyproject.toml"
+    project.write_text("[project.urls]\n", "utf-8")
+    config = hooks.on_config(MkDocsConfig())
+    assert [config.get(key) for key in ("site_url", "repo_url", "repo_name")] == [None, None, None]
+    urls = 'Documentation = "https://a.invalid/manual"\nRepository = "https://b.invalid/c/d"\n'
+    project.write_text(f"[project.urls]\n{urls}", "utf-8")
+    config = hooks.on_config(MkDocsConfig())
+    assert (config.site_url, config.repo_name) == ("https://a.invalid/manual/", "c/d")
 
 
 @pytest.mark.long
@@ -98,15 +128,43 @@ def test_long_tables_are_folded(site: Path) -> None:
     assert "<details" not in (site / "evidence" / "opponents.html").read_text("utf-8")
 
 
-def test_links_of_the_readme_lead_somewhere() -> None:
-    """README and its neighbours name files that are there, and headings that they have."""
-    for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"):
-        for link in re.findall(r"\]\(([^)\s]+)\)", (ROOT / name).read_text("utf-8")):
-            path, _, anchor = link.partition("#")
-            if "://" in link:
-                continue
-            assert (ROOT / path).exists(), f"{name}: {link}"
-            if anchor:
-                titles = re.findall(r"^#+ (.*)$", (ROOT / (path or name)).read_text("utf-8"), re.MULTILINE)
-                slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
-                assert anchor in slugs, f"{name}: {link}"
+PAGES = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"]
+PAGES += [str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").rglob("*.md"))]
+FENCE = re.compile(r"^(?P<fence>```+).*?^(?P=fence)$", re.DOTALL | re.MULTILINE)
+REFUSED = re.compile(
+    r"<(?:title|textarea|style|xmp|iframe|noembed|noframes|script|plaintext)\b", re.IGNORECASE
+)
+"""What the tag filter of GitHub Flavored Markdown shows as text, section 6.11 of its specification."""
+
+
+def prose(page: str) -> str:
+    """Return a page without its blocks of code."""
+    return FENCE.sub("", (ROOT / page).read_text("utf-8"))
+
+
+def slugs(page: str) -> set[str]:
+    """Return the anchors of the headings of a page, as a source host names them."""
+    titles = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere_without_mkdocs(page: str) -> None:
+    """To files that are there, and headings that they have."""
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        path, _, anchor = link.partition("#")
+        if "://" in link:
+            continue
+        target = (ROOT / page).parent / path if path else ROOT / page
+        assert target.exists(), f"{page}: {link}"
+        if anchor:
+            assert anchor in slugs(str(target.resolve().relative_to(ROOT))), f"{page}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_only_what_a_source_host_shows(page: str) -> None:
+    """No tag that it refuses, no front matter, and nothing that only MkDocs knows."""
+    text = prose(page)
+    assert not REFUSED.search(text)
+    assert not text.startswith("---")
+    assert not re.search(r"^(?:!!!|\?\?\?|:::) ", text, re.MULTILINE)

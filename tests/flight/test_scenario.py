@@ -68,6 +68,11 @@ def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
     assert read_record(tmp_path / "flight.json") == record
 
 
+def test_the_older_name_of_the_true_state_is_read() -> None:
+    """In records of version 0.1 the true state is "none"."""
+    assert Scenario.model_validate({"sensors": "none"}) == Scenario(sensors="true")
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -77,7 +82,7 @@ def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
         ({"seed": -1}, "scenario.seed: Input should be greater than or equal to 0"),
         (
             {"sensors": "radar"},
-            "scenario.sensors: Input should be 'none', 'mambo', 'mambo-derotated'",
+            "scenario.sensors: Input should be 'true', 'mocap', 'flow-deck', 'mambo'",
         ),
     ],
 )
@@ -207,9 +212,9 @@ def test_every_key_reaches_its_field_of_the_simulation() -> None:
     assert (flight.duration_s, flight.start, flight.update_period_s) == (2.0, "hover", 0.02)
     assert flight.seeds == (HARD.seed, CALM.seed)
     assert sensors.derotated
-    for name in ("none", "mambo"):
+    for name in ("true", "mambo"):
         other = flight_of([CALM.model_copy(update={"sensors": name})], 0.01).sensors
-        assert (other is None) if name == "none" else (isinstance(other, Sensors) and not other.derotated)
+        assert (other is None) if name == "true" else (isinstance(other, Sensors) and not other.derotated)
 
 
 NOTHING = (0, (0.0, 0.0), (0.0, 0.0, 0.0))
@@ -230,7 +235,7 @@ def test_by_default_nothing_disturbs_a_flight() -> None:
         "torque_factor_n_m_s2": MAMBO_AIRFRAME.torque_factor_n_m_s2,
         "drag_1_s": Vehicle.drag_1_s,
         "altitude_loop": "stock",
-        "sensors": "none",
+        "sensors": "true",
         "noise_scale": 1.0,
     }
 
@@ -274,7 +279,7 @@ def test_every_key_of_a_scenario_changes_its_flight() -> None:
 def test_scenarios_that_cannot_share_a_simulation_are_refused() -> None:
     """Scenarios with different sensors, or none at all, raise `FlightError`."""
     with pytest.raises(FlightError, match="sensors must be the same"):
-        flight_of([HARD, CALM.model_copy(update={"sensors": "none"})], 0.01)
+        flight_of([HARD, CALM.model_copy(update={"sensors": "true"})], 0.01)
     with pytest.raises(FlightError, match="flights = 0"):
         flight_of([], 0.01)
 

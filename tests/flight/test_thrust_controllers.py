@@ -57,8 +57,8 @@ def test_engine_and_reference_have_the_bits_of_numpy(batch: str, scalar: str, ac
 
 
 def test_a_command_is_the_thrust_over_the_gain() -> None:
-    """With a gain of 1/2 commands are twice as large, bit by bit, and so is what is told of the thrust."""
-    rng, told = np.random.default_rng(7), np.full(5, np.nan)
+    """With a gain of 1/2 commands are twice as large, bit by bit, and so is the reported thrust."""
+    rng, reported = np.random.default_rng(7), np.full(5, np.nan)
     plain, halved = (
         ThrustController(CompiledController(height_settings("float64", thrust_gain=gain), 5))
         for gain in (1.0, 0.5)
@@ -66,10 +66,10 @@ def test_a_command_is_the_thrust_over_the_gain() -> None:
     for step in range(60):
         state, target = rng.normal(0.0, 0.3, (5, 10)), rng.normal(0.0, 0.3, (5, 9))
         state[:, 9] = step % 4 == 0
-        one, other = plain.step(state, target, told), halved.step(state, target, 2.0 * told)
+        one, other = plain.step(state, target, reported), halved.step(state, target, 2.0 * reported)
         assert (2.0 * one.thrust_m_s2).tobytes() == other.thrust_m_s2.tobytes()
         assert one.command_rad.tobytes() == other.command_rad.tobytes()
-        told = np.where(rng.random(5) < 0.5, rng.uniform(5.0, 15.0, 5), np.nan)
+        reported = np.where(rng.random(5) < 0.5, rng.uniform(5.0, 15.0, 5), np.nan)
 
 
 def test_faults_have_the_bits_of_numpy() -> None:
@@ -96,7 +96,7 @@ class Recorder:
     controller: PositionController
     states: list[FloatArray]
     targets: list[FloatArray]
-    told: list[FloatArray]
+    reported: list[FloatArray]
 
     @classmethod
     def around(cls, settings: Settings, n: int = 1) -> "Recorder":
@@ -107,7 +107,7 @@ class Recorder:
         """Record and step."""
         self.states.append(state.copy())
         self.targets.append(target.copy())
-        self.told.append(thrust.copy())
+        self.reported.append(thrust.copy())
         return self.controller.step(state, target, thrust)
 
 
@@ -125,7 +125,7 @@ def test_the_thrust_of_the_trace_is_the_commanded_one_and_reaches_the_rotors() -
         recorder = Recorder.around(height_settings())
         assert_same(loop.fly(flight, recorder), trace)
         assert recorder.targets[-1][0, 6:].tolist() == [1.1, 0.0, 0.0]
-        assert np.isnan(recorder.told).all()
+        assert np.isnan(recorder.reported).all()
 
 
 @pytest.mark.long
@@ -143,30 +143,30 @@ def test_the_floor_is_reported_while_it_carries_the_drone() -> None:
     assert trace.thrust_acceleration_m_s2[0, 0] == pytest.approx(2.9)
 
 
-def test_a_thrust_that_the_mixer_caps_is_told() -> None:
+def test_a_thrust_that_the_mixer_caps_is_reported() -> None:
     """While a drone that starts tilted turns upright; then only, and less than was commanded."""
     drone = changed(CRAZYFLIE, rotors={"mixer": "lower"})
     scenario = Scenario(vehicle=drone, duration_s=1.0, start_tilt_rad=(0.8, 0.0))
     flight, recorder = flight_of([scenario], PERIOD_S), Recorder.around(height_settings())
     trace = loop.fly(flight, recorder)
-    told = np.array(recorder.told)[:, 0]
-    lowered = np.flatnonzero(np.isfinite(told))
+    reported = np.array(recorder.reported)[:, 0]
+    lowered = np.flatnonzero(np.isfinite(reported))
     assert 3 < len(lowered) < 20
-    assert (told[lowered] < trace.thrust_acceleration_m_s2[lowered - 1, 0]).all()
+    assert (reported[lowered] < trace.thrust_acceleration_m_s2[lowered - 1, 0]).all()
     still = Recorder.around(height_settings())
     loop.fly(flight_of([scenario.model_copy(update={"start_tilt_rad": (0.0, 0.0)})], PERIOD_S), still)
-    assert np.isnan(still.told).all()
+    assert np.isnan(still.reported).all()
 
 
-def test_the_mean_of_a_capped_period_is_told_once() -> None:
+def test_the_mean_of_a_capped_period_is_reported_once() -> None:
     """Of two drones one is capped in one of two ticks."""
     delivery, mass_kg = ThrustDelivery(CRAZYFLIE, 2), CRAZYFLIE.body.mass_kg
-    assert np.isnan(delivery.tell()).all()
+    assert np.isnan(delivery.report()).all()
     delivery.note(np.array([0.3, 0.3]), np.array([0.3, 0.2]))
     delivery.note(np.array([0.3, 0.3]), np.array([0.3, 0.3 + 1e-16]))
-    np.testing.assert_allclose(delivery.tell(), [np.nan, 0.25 / mass_kg], rtol=1e-12)
+    np.testing.assert_allclose(delivery.report(), [np.nan, 0.25 / mass_kg], rtol=1e-12)
     delivery.note(np.array([0.3, 0.3]), np.array([0.3, 0.3]))
-    assert np.isnan(delivery.tell()).all()
+    assert np.isnan(delivery.report()).all()
 
 
 def test_a_curve_in_space_is_followed_closer_than_by_any_altitude_loop() -> None:

@@ -14,7 +14,7 @@ _SHARES: Final = "shares = (shares / np.maximum(shares.max(axis=0), 1e-300)).max
 _ALIVE: Final = "alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)"
 _RESULTS: Final = "long tests write results: response.csv, drones.csv and pictures"
 _NO_LOAD: Final = "controllers without a height do not read the load"
-_LOADS: Final = "loads = hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0"
+_LOADS: Final = "loads = hover_thrust_n(flight.vehicle) / drone.weight_n if commands_thrust else 1.0"
 _MISSING: Final = "NumPy takes any negative length for the one that is missing"
 _LOWER: Final = "position_m[2] -= (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)"
 _LONG: Final = "a long test notices it: draws do not depend on how many there are"
@@ -111,7 +111,7 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
         for line, change, reason in (
             (
                 _LOADS,
-                "hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0 "
+                "hover_thrust_n(flight.vehicle) / drone.weight_n if commands_thrust else 1.0 "
                 "-> (hover_thrust_n(flight.vehicle) / drone.weight_n)",
                 _NO_LOAD,
             ),
@@ -123,8 +123,8 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
                 "only its shape counts",
             ),
             (
-                "controller = None if lifts else linear_controller(settings)",
-                "None if lifts else linear_controller(settings) -> (None)",
+                "controller = None if commands_thrust else linear_controller(settings)",
+                "None if commands_thrust else linear_controller(settings) -> (None)",
                 "the same system, made again for each drone",
             ),
         )
@@ -151,8 +151,8 @@ MARGIN_REASONS: Final[Mapping[Key, str]] = {
     ("response_file.py", "_COUNT: Final = 600", "600 -> 601"): _CHOICE,
     (
         "derived_margins.py",
-        'seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"',
-        'sensors if other.sensors.kind == drone.sensors.kind else "none" -> ("none")',
+        'seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "true"',
+        'sensors if other.sensors.kind == drone.sensors.kind else "true" -> ("true")',
     ): "settings derived for sensors have about the same margins without these: no other cause is known",
     (
         "response_file.py",

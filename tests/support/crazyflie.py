@@ -51,7 +51,7 @@ _INTERFACE.cdef(
     extern char host_console[1000];
     extern uint32_t host_time_ms;
     extern bool host_is_flying;
-    extern float host_variances[2];
+    extern float host_variances[6];
     extern bool host_has_variances;
     extern int host_scheduled;
     extern const struct variable host_logged[];
@@ -101,7 +101,7 @@ class Crazyflie:
         self._sensors = _INTERFACE.new("sensorData_t *")
         state.position.z = 1.0
         library.host_is_flying = True
-        library.host_variances = [0.0, 0.0]
+        library.host_variances = [0.0] * 6
         library.controllerOutOfTreeInit()
 
     @property

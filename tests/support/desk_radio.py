@@ -22,13 +22,15 @@ class DeskDrone(Drone):
     desk: Desk | None = None
     off_m: list[float] = field(default_factory=list)
     """Horizontal distance to the target while there is one, every 10 ms."""
+    hopped: int = 0
+    """How many of these were noted before the first landing."""
 
     def tick(self) -> None:
-        """Fly on, and read all logs but those of battery, supervisor and variances."""
+        """Fly on, and read all logs but those of battery, supervisor and the velocity's variances."""
         assert self.desk is not None
         self.desk.run(TICK_MS)
         for name in self.logged:
-            if not name.startswith(("pm.", "supervisor.", "kalman.")):
+            if not name.startswith(("pm.", "supervisor.", "kalman.varP")):
                 self.logged[name] = self.desk.log(name)
         if int(self.logged["supervisor.info"]) & FLYING and self.desk.log("ctrltarget.z") > 0.0:
             target = [self.desk.log("ctrltarget.x"), self.desk.log("ctrltarget.y")]
@@ -42,6 +44,7 @@ class DeskDrone(Drone):
         if name == "takeoff":
             self.desk.take_off(arguments[0], arguments[1], yaw_rad)
         elif name == "land":
+            self.hopped = self.hopped or len(self.off_m)
             self.desk.land(arguments[1], arguments[0], yaw_rad)
         elif name == "go_to":
             self.desk.go_to(arguments[:3], arguments[4], arguments[3])

@@ -91,7 +91,7 @@ int nmpc_is_saturated(const nmpc_t *);
 nmpc_status_t nmpc_last_estimate(const nmpc_t *, nmpc_estimate_t *);
 void observer_clear(nmpc_observer_t *);
 void observer_start(nmpc_observer_t *, const nmpc_state_t *);
-void observer_correct(nmpc_observer_t *, const nmpc_state_t * AGE_ARGUMENT);
+void observer_correct(nmpc_observer_t *, const nmpc_state_t * GUARD_ARGUMENT AGE_ARGUMENT);
 void observer_predict(nmpc_observer_t *, const nmpc_real_t *);
 nmpc_real_t observer_disturbance(const nmpc_observer_t *, int);
 void attitude_set_command(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
@@ -106,7 +106,7 @@ nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
 """
 _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "
-    "jerk_m_step2_update[2]; } nmpc_tracker_t;",
+    "jerk_m_step2_update[2]; ...; } nmpc_tracker_t;",
     "TRACKER_MEMBERS": "nmpc_tracker_t tracker; unsigned char has_target;",
     "TRACKER_ARGUMENT": "const nmpc_real_t *,",
     "TRACKER_FUNCTIONS": "void tracker_clear(nmpc_t *);\nvoid tracker_update(nmpc_t *, const nmpc_real_t *);",
@@ -130,6 +130,8 @@ def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     declarations = declarations.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
     aged = "NMPC_AGE_STEPS" in library
     declarations = declarations.replace("AGE_ARGUMENT", ", const nmpc_real_t *" if aged else "")
+    guarded = "NMPC_HAS_GUARD" in files["nmpc.h"]
+    declarations = declarations.replace("GUARD_ARGUMENT", ", unsigned int" if guarded else "")
     for place_holder, text in _TRACKER.items():
         declarations = declarations.replace(place_holder, text if tracked else "")
     given = "NMPC_HAS_TARGET_ACCELERATION" in files["nmpc.h"]

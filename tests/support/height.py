@@ -52,9 +52,17 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "ranges.position_m": 5.0,
         "ranges.velocity_m_s": 2.0,
     },
+    CRAZYFLIE
+    | {
+        "target.acceleration": "tracked",
+        "limits.speed_m_s": 1.5,
+        "guard.tilt_rad_s": 1.0,
+        "guard.thrust_m_s2": 3.0,
+        "guard.thrust_m_s3": 20.0,
+    },
 )
-"""One move and two, all that can be learnt, with and without tracker, limits, fence, age and feedback; drones
-that deliver less than the commanded thrust, and more."""
+"""One move and two, all that can be learnt, with and without tracker, limits, fence, age, feedback and
+guard; drones that deliver less than the commanded thrust, and more."""
 
 
 def height_case(index: int, scalar: str) -> Settings:

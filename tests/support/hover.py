@@ -18,7 +18,7 @@ from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians
 from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, SENT, PeriodicLoop, choose
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import Applied, flown, hover_command, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, Offset, PositionController, fly
 from mambo_sil.flight.traces import Trace
@@ -90,7 +90,7 @@ def grows_with_gains(settings: Settings, vehicle: Vehicle, axis: int, gains: Seq
     flight = _hover(settings, vehicle, axis, flights=len(gains))
     factors = np.ones((len(gains), 3))
     factors[:, axis] = gains
-    trace = fly(flight, Scaled(flown(CompiledController(settings, len(gains))), factors))
+    trace = fly(flight, Scaled(adapted(CompiledController(settings, len(gains))), factors))
     return _grown(trace, settings, axis)
 
 

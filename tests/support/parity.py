@@ -93,7 +93,7 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
 
     With a height the delivered thrust is set in every eleventh step.
     Halfway it is reset. What else its method sets is set then, if it is weights, or in every seventh step.
-    With limits, they change in every ninth step.
+    With limits, they change in every ninth step; with a guard, whether a position is measured, in every 13th.
     """
     rng = np.random.default_rng(seed)
     method = method_of(controller.settings)
@@ -112,6 +112,8 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
             found.setters.append(controller.set_command(command))
         if method.has_height and index % 11 == 10:
             found.setters.append(controller.set_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
+        if index % 13 == 6 and method.guard is not None:
+            found.setters.append(controller.set_position_measured(rng.random(len(command)) < 0.5))
         if index % 9 == 8 and method.limiting is not None:
             found.setters.append(controller.set_limits(random_limits(controller.settings, len(command), rng)))
         found.steps.append(controller.step(case.state, case.target, case.thrust))

@@ -195,8 +195,16 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     },
     TWO_MOVES
     | {"observer.disturbance_limit_m_s2": 0.0, "ranges.position_m": 5.0, "ranges.velocity_m_s": 2.0},
+    TWO_MOVES
+    | {
+        "target.acceleration": "tracked",
+        "damping.roll_rate_feedback_s": 0.02,
+        "limits.speed_m_s": 1.5,
+        "guard.tilt_rad_s": 1.0,
+        "guard.position_noise": 0.1,
+    },
 )
-"""One move and two, attitude measured and predicted, with tracker, feedback, drag, age, trim and without."""
+"""One move and two, attitude measured and predicted, with tracker, feedback, drag, age, trim and guard."""
 
 
 def quadratic_case(index: int, scalar: str) -> Settings:
@@ -256,7 +264,20 @@ def case_values(index: int) -> Values:
         drawn = limits_of(rng, 0.05 * tilt_rad, ranges)
         fence = {f"limits.fence.{name}": wall for name, wall in drawn.pop("fence").items()}
         values |= fence | {f"limits.{name}": value for name, value in drawn.items()}
-    return values
+    return values | _guard_of(index, tilt_rad)
+
+
+def _guard_of(index: int, tilt_rad: float) -> Values:
+    """Draw a guard, or none, in every other case; most spend their budget in a few steps."""
+    rng = np.random.default_rng([index, 1])
+    if index % 2:
+        return {}
+    return {
+        "guard.tilt_rad": min(10.0, tilt_rad * float(rng.uniform(2, 4))),
+        "guard.tilt_rad_s": float(10.0 ** rng.uniform(-1, 2)),
+        "guard.target_noise_m_s2": float(10.0 ** rng.uniform(-2, 1)),
+        "guard.position_noise": float(10.0 ** rng.uniform(-3, 1)),
+    }
 
 
 def quadratic_settings(scalar: str = "float32", **horizon: Any) -> Settings:

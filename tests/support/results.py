@@ -327,7 +327,7 @@ def margins_folder(folder: Path) -> None:
         source=HOSTILE,
         settings=Settings().digest,
         vehicle=HOSTILE,
-        sensors="none",
+        sensors="true",
         update_period_s=0.01,
         axes=[axis("roll", -1.0), axis("pitch", 0.5)],
         many=ManyDrones(

@@ -66,7 +66,7 @@ def ready(scripts: dict[str, ModuleType], patch: pytest.MonkeyPatch) -> Drone:
     logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
     logged |= dict.fromkeys(scripts["radio"].PLACE, 0.0)
     logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
-    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
+    logged |= dict.fromkeys(("kalman.varPX", "kalman.varPY", "kalman.varPZ", "kalman.varX"), 1e-4)
     logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
     parameters = {
         "nmpc.settings": int(SETTINGS.short_digest[:8], 16),

@@ -47,6 +47,8 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     absent = {"_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"}
     if method_of(settings).limiting is None:
         absent |= {"_host_set_limits", "_host_limits_active"}
+    if settings.guard is None:
+        absent |= {"_host_set_position_measured"}
     if settings.height is None:
         absent |= {"_host_set_thrust", "_host_last_thrust"}
     names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name not in absent]

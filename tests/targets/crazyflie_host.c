@@ -18,7 +18,7 @@ int host_pid_calls;
 char host_console[1000];
 uint32_t host_time_ms;
 bool host_is_flying;
-float host_variances[2]; /* of the Kalman filter: position and velocity along x */
+float host_variances[6]; /* of the Kalman filter: position and velocity along x, height, roll, pitch, yaw */
 bool host_has_variances = true;
 int host_scheduled; /* functions that the worker was given */
 
@@ -51,10 +51,15 @@ float powerDistributionGetMaxThrust(void) { return 0.48f; }
 
 logVarId_t logGetVarId(const char *group, const char *name)
 {
-    if (!host_has_variances || (strcmp(group, "kalman") != 0)) {
-        return 0xffffU;
+    static const char *const names[] = { "varX", "varPX", "varZ", "varD0", "varD1", "varD2" };
+    uint16_t k;
+
+    for (k = 0; k < 6; k++) {
+        if (host_has_variances && (strcmp(group, "kalman") == 0) && (strcmp(name, names[k]) == 0)) {
+            return k;
+        }
     }
-    return (strcmp(name, "varX") == 0) ? 0U : (strcmp(name, "varPX") == 0) ? 1U : 0xffffU;
+    return 0xffffU;
 }
 
 float logGetFloat(logVarId_t id) { return host_variances[id]; }

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.desk import desk_library
 from mambo_sil.board.desk.desk_flight import Desk, DeskConditions, DeskSensors
@@ -29,11 +30,19 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "36 g": {"mass_kg": 0.036, "thrust_gain": 0.9},
 }
 
+QUIET = ("still air", "noisy cameras", "36 g")
+
 
 @pytest.fixture(scope="module")
 def app() -> Path:
     """Return the library of the app with preset crazyflie, whose scripts the tests run."""
     return desk_library.build(SETTINGS, host_toolchain())
+
+
+@pytest.fixture(scope="module")
+def flow_app() -> Path:
+    """Return the library of that app with an observer for a flow deck."""
+    return desk_library.build(with_option(SETTINGS, "observer.position_noise", 0.04), host_toolchain())
 
 
 def fly(
@@ -59,7 +68,11 @@ def test_thirty_degrees_are_found_and_landed(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Before the figure, within 0.3 m of the target; the sentence says the side, and roughly the angle."""
+    """Before the figure; the sentence says the side, and roughly the angle.
+
+    In still air with quick sensors, it stays within 0.1 m of the target until then, else within 0.2 m,
+    of which wind and biases take 0.08 m with a right heading, too.
+    """
     heading_deg, name = case
     conditions = DeskConditions(
         seed=4, camera_offset_ms=2, heading_rad=math.radians(heading_deg), **CONDITIONS[name]
@@ -75,6 +88,7 @@ def test_thirty_degrees_are_found_and_landed(
     assert float(found[1]) == pytest.approx(30.0, abs=15.0)
     assert "--start-heading" in error
     assert len(drone.of("go_to")) == 1
+    assert max(drone.off_m[: drone.hopped]) < (0.1 if name in QUIET else 0.2)
     assert largest_m(drone) < 0.3
     assert drone.desk is not None
     assert drone.desk.state.position_m[2] < 0.02
@@ -99,7 +113,7 @@ def test_a_heading_that_is_far_off_ends_low_above_the_floor(
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("name", [*CONDITIONS, "flow deck"])
+@pytest.mark.parametrize("name", CONDITIONS)
 @pytest.mark.parametrize("heading_deg", [0.0, 10.0])
 def test_a_heading_that_is_right_flies_on(
     heading_deg: float,
@@ -109,9 +123,22 @@ def test_a_heading_that_is_right_flies_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """To ten degrees, which no hover minds."""
-    varied = CONDITIONS.get(name, {"sensors": DeskSensors.FLOW_DECK})
-    conditions = DeskConditions(seed=6, camera_offset_ms=5, heading_rad=math.radians(heading_deg), **varied)
+    conditions = DeskConditions(
+        seed=6, camera_offset_ms=5, heading_rad=math.radians(heading_deg), **CONDITIONS[name]
+    )
     drone, code = fly(app, scripts, monkeypatch, conditions)
+    assert code == 0
+    assert len(drone.of("go_to")) == 4
+
+
+def test_any_heading_flies_on_over_a_flow_deck(
+    flow_app: Path, scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which measures along the drone: a wrong heading turns the course, and does no other harm."""
+    conditions = DeskConditions(
+        seed=6, camera_offset_ms=5, heading_rad=math.radians(90.0), sensors=DeskSensors.FLOW_DECK
+    )
+    drone, code = fly(flow_app, scripts, monkeypatch, conditions)
     assert code == 0
     assert len(drone.of("go_to")) == 4
 

@@ -34,7 +34,7 @@ def test_a_figure_is_uploaded_and_flown_by_the_high_level_commander(
     flown = ["upload", "define_trajectory", "takeoff", "go_to", "start_trajectory"]
     assert drone.names() == [*PREPARED, *flown, *LANDED]
     assert drone.of("takeoff")[0][1] == (pytest.approx(0.4), 1.5, None)
-    assert drone.of("go_to")[0][1] == pytest.approx((1.3, -0.5, 0.4, math.radians(30.0), 1.5))
+    assert drone.of("go_to")[0][1] == pytest.approx((1.15, -0.5, 0.4, math.radians(30.0), 1.5))
     assert drone.of("go_to")[1][1] == pytest.approx((1.0, -0.5, 0.7, math.radians(30.0), 2.0))
     pieces = uploaded(drone)
     assert drone.of("define_trajectory")[0][1] == (1, 0, len(pieces))
@@ -86,7 +86,7 @@ def test_goto_goes_along_x_and_back(scripts: dict[str, ModuleType], drone: Drone
     assert run(scripts, "goto", "--size", "0.5", "--rate", "1") == 0
     assert drone.names() == [*PREPARED, "takeoff", "go_to", *LANDED]
     moves = drone.of("go_to")
-    assert [arguments[0] for _, arguments in moves] == [1.3, 1.0, 1.5, 1.0]
+    assert [arguments[0] for _, arguments in moves] == [1.15, 1.0, 1.5, 1.0]
     assert all(
         after - before >= arguments[4] for (before, arguments), (after, _) in itertools.pairwise(moves)
     )

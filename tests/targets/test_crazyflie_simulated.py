@@ -24,7 +24,7 @@ def test_a_simulated_flight_makes_the_same_calls(
     for axis in "xy":
         error = rows[f"nmpctarget{axis.upper()}"] - rows[f"nmpc{axis}"]
         assert np.abs(error).max() < 0.02
-    extent = {"eight": (0.99, 0.49), "circle": (0.99, 0.99), "goto": (0.99, 0.0), "hover": (0.3, 0.0)}[
+    extent = {"eight": (0.99, 0.49), "circle": (0.99, 0.99), "goto": (0.99, 0.0), "hover": (0.15, 0.0)}[
         arguments[0]
     ]
     for axis, most in zip("xy", extent, strict=True):

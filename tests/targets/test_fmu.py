@@ -253,7 +253,7 @@ def test_the_heading_turns_from_the_measured_one(version: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_delivered_thrust_is_told_once_in_a_communication_step(version: str, tmp_path: Path) -> None:
+def test_the_delivered_thrust_is_reported_once_in_a_communication_step(version: str, tmp_path: Path) -> None:
     """As by nmpc_set_thrust before its first period; 0 means as commanded, out of range changes nothing."""
     settings = SUBJECTS["height"]
     unit = Unit(unpacked(built(settings, tmp_path) / f"nmpc_fmi{version}.fmu", tmp_path), version, settings)

@@ -197,8 +197,8 @@ def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
                 alone.reset([[*state[4:6], 0.0]])
             if not begun:
                 begun = update == 120
-                told = stock_n / mass_kg
-                alone.reset([[*present, told]]) if begun else alone.set_thrust([told])
+                reported_m_s2 = stock_n / mass_kg
+                alone.reset([[*present, reported_m_s2]]) if begun else alone.set_thrust([reported_m_s2])
             expected = alone.step(state[np.newaxis], target[np.newaxis, :6])
             present = expected.command_rad[0].astype(np.float64)
             for tick in range(2):

@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def drone() -> Drone:
     """Return a drone at rest."""
     logged = {f"stateEstimate.{name}": value for name, value in STATE.items()}
-    logged |= {f"kalman.varP{name}": 1e-4 for name in "XYZ"}
+    logged |= dict.fromkeys(("kalman.varPX", "kalman.varPY", "kalman.varPZ", "kalman.varX"), 1e-4)
     logged |= {"supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
     parameters = {"stabilizer.estimator": 2, "kalman.resetEstimation": 0, "kalman.initialYaw": 0.0}
     return Drone(Clock(), logged, parameters)

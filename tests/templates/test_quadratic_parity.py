@@ -89,7 +89,7 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
                 {name} if np.abs(getattr(estimate, name)).max() == blocks.scalar(limit) else set()
             )
 
-    for _ in range(CASES):
+    for case in range(CASES):
         estimate = Estimate(**{name: blocks.draw(limit) for name, limit in limits.items()})
         position, velocity = blocks.draw(ranges.position_m), blocks.draw(ranges.velocity_m_s)
         state = np.concatenate([position, velocity, blocks.draw(1.0, 3)], axis=1)
@@ -100,8 +100,10 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
         blocks.put("observer", **vars(estimate))
         found = np.array([lib.observer_disturbance(its_observer, axis) for axis in (0, 1)], blocks.scalar)
         assert found.tobytes() == observer.disturbance(estimate).tobytes()
-        lib.observer_correct(its_observer, *arguments)
-        compare(corrected := observer.correct(estimate, state, tilt))
+        is_coarse = blocks.method.guard is not None and bool(case % 2)
+        guarded = arguments[:1] + ((int(is_coarse),) if blocks.method.guard else ()) + arguments[1:]
+        lib.observer_correct(its_observer, *guarded)
+        compare(corrected := observer.correct(estimate, state, tilt, np.array([is_coarse])))
         lib.observer_predict(its_observer, start[1])
         compare(observer.predict(corrected, tilt))
         lib.observer_start(its_observer, start[0])

@@ -104,7 +104,7 @@ def test_every_case_has_the_bits_of_the_reference(scalar: str, tmp_path: Path) -
 
 @pytest.mark.long
 def test_no_call_breaks_a_promise(tmp_path: Path) -> None:
-    """With a thrust that is told, contact with the floor and limits of the height."""
+    """With a reported thrust, contact with the floor and limits of the height."""
     require("clang", "clang")
     result = fuzzing.check(subject(height_case(LIMITED, "float32"), tmp_path), runs=20_000)
     assert result.outcome is CheckOutcome.PASSED, result.evidence

@@ -18,8 +18,8 @@ from mambo_codegen.methods.shared.limits_constants import (
     LEAST_TURN_M2_S2,
     SPELLING,
     TURN_SHARE,
-    stored_quantities,
 )
+from mambo_codegen.methods.shared.members import bounds_members
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -37,9 +37,8 @@ def limits_context(method: Method) -> dict[str, object]:
     start = (
         FIXED_START if fixed else f"0x{STARTS[numbers.scalar][1]:X}{'UL' if scalar == 'float32' else 'ULL'}"
     )
-    stored = method.reference_controller().stored_limits[0].tolist()
-    bounds = [str(number) if fixed else literals.real(float(number), scalar) for number in stored]
-    others = bounds[len(stored_quantities()) :]
+    numbers_of_c = method.reference_controller().stored_limits[0].tolist()
+    stored = [str(number) if fixed else literals.real(float(number), scalar) for number in numbers_of_c]
     return {
         "limit_bits": {limit.name: limit.value for limit in ActiveLimit},
         "smallest_limit": SMALLEST_LIMIT,
@@ -49,22 +48,22 @@ def limits_context(method: Method) -> dict[str, object]:
         "root_iterations": FIXED_ITERATIONS,
         "root_terms": () if fixed else TERMS[numbers.scalar],
         "limits_shifts": limits_shifts(numbers.bits) if numbers.bits is not None else None,
-        "default_bounds": bounds,
-        "default_target_bounds": _target_bounds(method, others),
+        "default_bounds": _bounds(method, stored),
         "turning": limiting.turn_m_s_rad is not None,
-        "turn_zeros": others[-3:],
         "turn_share": TURN_SHARE,
         "turn_bits": TURN_BITS,
         "least_turn": LEAST_TURN_M2_S2,
-        "default_height_bounds": others[-4:],
         "outage_steps": method.outage_steps,
         "least_square": LEAST_SQUARE,
         "root_limit": 2 / math.sqrt(LEAST_SQUARE),
     }
 
 
-def _target_bounds(method: Method, others: list[str]) -> list[str]:
-    """Return what stands for the target's velocity before the first step, of the last bounds `others`."""
-    if method.limiting is not None and method.limiting.turn_m_s_rad is not None:
-        return others[:2]
-    return others[-6:-4] if method.has_height else others[-2:]
+def _bounds(method: Method, stored: list[str]) -> list[dict[str, str]]:
+    """Return name and initial value of each member of nmpc_bounds_t, whose numbers are `stored`."""
+    left, members = iter(stored), bounds_members(method).items()
+    values = {name: [next(left) for _ in range(count)] for name, count in members}
+    return [
+        {"name": name, "value": f"{{ {', '.join(value)} }}" if len(value) > 1 else value[0]}
+        for name, value in values.items()
+    ]

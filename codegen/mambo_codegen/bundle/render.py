@@ -43,6 +43,9 @@ from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
+FLOW_NOISE_M: Final = 0.02
+"""From this noise density of the position on, in m per root Hz, settings are for a flow deck: its position is
+an integral."""
 LIBRARY: Final = ("nmpc.h", "nmpc.c", "nmpc_self_test.h", "nmpc_self_test.c")
 """The controller, two files, and its self-test, two more, in the folder of a bundle."""
 
@@ -98,6 +101,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         "ticks_per_update": ticks,
         "update_period_ns": round(1e9 * settings.horizon.update_period_s),
         "variables": fmu_variables(settings),
+        "for_flow": settings.observer is not None and settings.observer.position_noise >= FLOW_NOISE_M,
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"
@@ -164,7 +168,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     scalar = settings.code.scalar
     return (
         products(fixed=numbers.formats is not None, weighs=method.has_height)
-        | {"height": None}
+        | {"height": None, "guard": None}
         | method.context
         | {
             "settings": settings,

@@ -118,7 +118,8 @@ class Method(Constants):
     def chapters(self) -> tuple[tuple[str, str], ...]:
         """The chapters of nmpc.c with these settings, and a word on each."""
         needs = (
-            *(("tracker", self.tracker), ("height", self.has_height), ("limits", self.limiting)),
+            *(("tracker", self.tracker), ("guard", self.guard), ("height", self.has_height)),
+            ("limits", self.limiting),
             ("float", self.numbers.formats),
         )
         absent = {name for name, needed in needs if not needed}

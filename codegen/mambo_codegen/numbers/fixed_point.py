@@ -13,6 +13,9 @@ LARGEST: Final = 2**WORD_BITS - 1
 SINE_BITS: Final = 30
 """Format of sine and cosine, which are at most 1."""
 
+FACTOR_BITS: Final = 26
+"""Format of factors, which are less than 32, intermediate results too."""
+
 PRODUCT_BITS: Final = 62
 """Most bits of a product without its sign: one less than the type has, because rounding adds half a unit."""
 

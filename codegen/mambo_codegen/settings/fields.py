@@ -107,6 +107,7 @@ class OnlyWith:
 
 ONE_NORM: Final = OnlyFor("1-norm")
 QUADRATIC: Final = OnlyFor("quadratic")
+WITH_GUARD: Final = OnlyWith("guard")
 WITH_HEIGHT: Final = OnlyWith("height")
 
 

@@ -35,9 +35,10 @@ class Settings(Sections):
 
     def _misplaced(self) -> list[Refusal]:
         """Refuse a section that needs another method."""
-        if self.height is None or self.cost.norm == "quadratic":
+        if self.cost.norm == "quadratic":
             return []
-        return [Refusal("cost", "norm", 'must be "quadratic" with [height]')]
+        placed = [name for name in ("height", "guard") if getattr(self, name) is not None]
+        return [Refusal("cost", "norm", f'must be "quadratic" with [{name}]') for name in placed[:1]]
 
     def _unused(self) -> Iterator[Refusal]:
         """Refuse every value that would have no effect, unless it is the default."""

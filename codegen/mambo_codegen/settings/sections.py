@@ -15,6 +15,7 @@ from mambo_codegen.settings import reserved
 from mambo_codegen.settings.fields import (
     ONE_NORM,
     QUADRATIC,
+    WITH_GUARD,
     WITH_HEIGHT,
     Lag,
     Number,
@@ -24,6 +25,7 @@ from mambo_codegen.settings.fields import (
     SettingsSection,
     type_of,
 )
+from mambo_codegen.settings.guard_section import Guard
 from mambo_codegen.settings.height_section import Height
 from mambo_codegen.settings.limits_section import Limits
 from mambo_codegen.settings.optimizer_section import Optimizer
@@ -333,7 +335,7 @@ class Code(SettingsSection):
     scalar: Literal["float32", "float64", "fixed"] = Field(
         "float32",
         description="Scalar type of the C: float32 is float, float64 is double, fixed is fixed point with "
-        "32-bit integers, for processors without an FPU.",
+        "32-bit integers, for 32-bit processors without an FPU.",
     )
     prefix: str = Field(
         "nmpc",
@@ -384,6 +386,11 @@ class Sections(SettingsSection):
         description="The height as a third axis of the controller, whose command is the thrust. Without this "
         "section it commands roll and pitch alone.",
     )
+    guard: Annotated[Guard | None, QUADRATIC, WITH_GUARD] = Field(
+        None,
+        description="The guard against commands that rattle, by noise in set-points or estimates. Without "
+        "this section commands vary as the cost asks.",
+    )
     ranges: Ranges = Field(
         Ranges(), description="The ranges of the inputs; a step refuses an input out of range with a status."
     )
@@ -411,9 +418,10 @@ class Sections(SettingsSection):
         """Return the value at a dotted path: of a key, or a section; of an absent section the default."""
         found: Any = self
         for name in path.split("."):
-            if found is None:
-                found = Height()
+            field = type(found).model_fields[name]
             found = getattr(found, name)
+            if found is None and path != name:
+                found = type_of(field)()
         return found
 
     @property

@@ -81,7 +81,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         if self._action == "target":
             target = TargetState.in_frame("NWU", [*scaled, height_m], [0.0, 0.0, climb_m_s])
             if has_height := self._controller.settings.height is not None:
-                self._controller.set_thrust(self._drone.tell_thrust())
+                self._controller.set_thrust(self._drone.report_thrust())
             known_m_s2 = None if has_height else self._drone.thrust_m_s2
             outcome = self._controller.step(self._drone.state, target, known_m_s2)
             command_rad = outcome.command_rad

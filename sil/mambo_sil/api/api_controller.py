@@ -34,7 +34,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
-from mambo_sil.flight.names import ALTITUDE_NAMES
+from mambo_sil.flight.names import ALTITUDE_NAMES, SENSORS_KINDS, SensorsKind
 from mambo_sil.model.derive.derived_settings import controller_text
 
 LARGEST_N: Final = 1_000_000
@@ -65,12 +65,25 @@ class Controller:
         self._heading = Heading(self._compiled)
 
     @classmethod
-    def from_vehicle(cls, vehicle: str | Path, n: int = 1, **options: Unpack[ControllerOptions]) -> Self:
+    def from_vehicle(
+        cls,
+        vehicle: str | Path,
+        n: int = 1,
+        *,
+        sensors: SensorsKind | None = None,
+        **options: Unpack[ControllerOptions],
+    ) -> Self:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
-        Raises SourceNotFoundError, UnreadableFileError, and InvalidSettingsError with all broken rules.
+        sensors: what measures, in place of the sensors in the file; "true" for the state of a simulator.
+
+        Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
+        InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
         """
         drone = _read_vehicle(vehicle)
+        if sensors is not None:
+            require_choice("sensors", sensors, SENSORS_KINDS)
+            drone = drone.with_sensors(sensors)
         settings = controller_toml.parse(controller_text(drone, drone.name), f"settings for {drone.name}")
         return cls._made(settings, n, drone, options)
 
@@ -219,6 +232,17 @@ class Controller:
         if not self._method.has_height:
             raise ArgumentError("set_thrust needs settings with [height]")
         return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
+
+    def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
+        """Tell whether a position is measured, as by cameras: one truth value for all or (...).
+
+        While none is, as over a flow deck, the observer takes coarser gains. Returns a status (n,), always 0.
+        Raises ArgumentError without `[guard]` in the settings.
+        """
+        if self.settings.guard is None:
+            raise ArgumentError("set_position_measured needs settings with [guard]")
+        measured = np.broadcast_to(np.asarray(is_measured, np.bool_).reshape(-1), self.n)
+        return self._compiled.set_position_measured(measured)
 
     def __getstate__(self) -> dict[str, Any]:
         return {

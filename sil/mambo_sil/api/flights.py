@@ -25,7 +25,7 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import Metrics, measure
-from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start
+from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start, present_sensors
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -63,7 +63,7 @@ def fly(
     rate_rad_s: float = 0.5,
     duration_s: float = 100.0,
     yaw_rad: PerFlight = 0.0,
-    sensors: SensorsName = "none",
+    sensors: SensorsName = "true",
     seeds: Sequence[int] = (0,),
     start: Start = "hover",
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0),
@@ -74,7 +74,7 @@ def fly(
                 rate `rate_rad_s`, or an object with its methods `target` and `acceleration`, and `vertical`
                 if it has a height, which the altitude loop of the vehicle then follows.
     yaw_rad:    constant heading, one for all flights or an array (n,).
-    sensors:    what controller and inner loops see: the truth ("none"), or the vehicle's sensors by name.
+    sensors:    what controller and inner loops see: the truth ("true"), or the vehicle's sensors by name.
     seeds:      of sensor noise, one for each of n flights.
     start:      hovering at the first point, or on the ground 5 s earlier ("take-off").
     push_m_s2:  steady acceleration along x and y of the world, each one number or an array (n,).
@@ -86,6 +86,7 @@ def fly(
     require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
     require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
     require_number("duration_s", duration_s, 0.0, LONGEST_S)
+    sensors = present_sensors(sensors)
     require_choice("sensors", sensors, SENSORS_NAMES)
     require_choice("start", start, STARTS)
     given = _as_seeds(seeds)

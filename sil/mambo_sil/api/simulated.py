@@ -52,9 +52,9 @@ class SimulatedDrone:
                 )
                 self._delivery.note(wanted_n, given_n)
 
-    def tell_thrust(self) -> float:
+    def report_thrust(self) -> float:
         """Return the thrust over mass of the last periods if the mixer capped it, else NaN."""
-        return float(self._delivery.tell()[0])
+        return float(self._delivery.report()[0])
 
     @property
     def state(self) -> DroneState:

@@ -54,10 +54,8 @@ mambo-nmpc fly controller.toml --port /dev/ttyACM0 --real-time --duration-s 20
 mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30
 mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
-mambo-nmpc fly --vehicle my-drone.toml -o my-drone
 mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
-mambo-nmpc fly controller.toml --app crazyflie --events my-events.toml -o events
 mambo-nmpc pilot controller.toml --link udp:127.0.0.1:14540 --trajectory circle --size-m 1
 mambo-nmpc pilot controller.toml --simulate px4 --vehicle my-drone.toml -o piloted
 mambo-nmpc table2 -o table2

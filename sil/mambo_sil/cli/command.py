@@ -55,7 +55,7 @@ OptionalSource = Annotated[
     ),
 ]
 Scalar = Annotated[
-    str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
+    str | None, typer.Option(help="Scalar type of the C: float32, float64 or fixed.", metavar="TYPE")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
 
@@ -180,12 +180,12 @@ def _root_options(
         typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version),
     ] = False,
 ) -> None:
-    """Generate a static-memory C99 NMPC for a very small drone, and fly it in simulation."""
+    """Generate model predictive control of a small drone in static-memory C99, and fly it in simulation."""
 
 
 def output_option(about: str) -> Any:
     """Return the option -o, a path; `about` is its help."""
-    return typer.Option("--output", "-o", help=about, metavar="<path>")
+    return typer.Option("--output", "-o", help=about, metavar="PATH")
 
 
 OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]

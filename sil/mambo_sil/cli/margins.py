@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
-from mambo_sil.cli.options import AsJson, OptionalResults, OtherDrone, Source, load, show
-from mambo_sil.flight.names import SensorsName
+from mambo_sil.cli.options import AsJson, OptionalResults, OtherDrone, Source, load, sensors_option, show
+from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
 
 if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_file import Campaign
@@ -25,9 +25,10 @@ def margins(
     vehicle: OtherDrone = None,
     sensors: Annotated[
         SensorsName | None,
-        typer.Option(
-            help="State that controller and inner loops get, as of `fly`; by default the true one, with "
-            "--campaign that of the campaign."
+        sensors_option(
+            SENSORS_NAMES,
+            "State that controller and inner loops get, as of `fly`; by default the true one, with "
+            "--campaign that of the campaign.",
         ),
     ] = None,
     campaign: Annotated[
@@ -63,11 +64,11 @@ def margins(
     settings = load(source, None)
     if campaign is None:
         drone = vehicle_toml.load(vehicle or vehicle_toml.DEFAULT)
-        subject = MarginSubject(source, settings, drone, sensors or "none")
+        subject = MarginSubject(source, settings, drone, sensors or "true")
         summary = measure(subject, _corners(subject) if uncertainty else None, output)
     else:
         drawing = _campaign(campaign, vehicle, sensors)
-        subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "none")
+        subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "true")
         summary = _measure_drawn(subject, campaign, drawing, drones, output)
     show(summary, margins_text(summary), as_json=as_json)
     if output is not None:

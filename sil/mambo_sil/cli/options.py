@@ -9,6 +9,7 @@ import typer
 from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
 from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.flight.names import present_sensors
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
 
-_OUTPUT: Final = output_option("Folder for the results; earlier results there are overwritten.")
+_OUTPUT: Final = output_option("Folder for the results; overwrites earlier ones.")
 Results = Annotated[Path, _OUTPUT]
 OptionalResults = Annotated[Path | None, _OUTPUT]
 Workers = Annotated[
@@ -26,6 +27,21 @@ Workers = Annotated[
 
 BOARD_NAMES: Final = BOARDS.names()
 VEHICLE_NAMES: Final = VEHICLES.names()
+
+
+def sensors_option(names: Sequence[str], about: str) -> Any:
+    """Return the option that chooses sensors by name, of which older ones are read."""
+
+    def read(text: str) -> str:
+        name = present_sensors(text)
+        if name not in names:
+            raise typer.BadParameter(f"{text!r} is not one of {', '.join(map(repr, names))}.")
+        return str(name)
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=complete)
 
 
 def complete_boards(incomplete: str) -> list[str]:
@@ -43,7 +59,7 @@ Boards = Annotated[
     typer.Option(
         "--board",
         help=f"{', '.join(BOARD_NAMES)}, or a board's TOML file; again for another; by default all.",
-        metavar="NAME|FILE",
+        metavar="NAME",
         autocompletion=complete_boards,
     ),
 ]
@@ -54,7 +70,7 @@ def _vehicle_option(about: str) -> Any:
     return typer.Option(
         "--vehicle",
         help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml{about}.",
-        metavar="NAME|FILE",
+        metavar="NAME",
         autocompletion=complete_vehicles,
     )
 
@@ -66,14 +82,17 @@ PortName = Annotated[
     str | None,
     typer.Option(
         "--port",
-        help="Serial port of a board with the firmware of `generate --for pil`; the C on it must have the "
-        "bits of that on this machine.",
-        metavar="DEVICE|socket://HOST:PORT",
+        help="Serial port of a board with the firmware of `generate --for pil`, or socket://HOST:PORT; its C "
+        "must have this machine's bits.",
+        metavar="DEVICE",
     ),
 ]
 BAUD: Final = 500000
 """The rate of the shipped boards."""
-Baud = Annotated[int | None, typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1)]
+Baud = Annotated[
+    int | None,
+    typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1, metavar="N"),
+]
 
 
 def load_boards(names: "Sequence[str] | None") -> "Sequence[Board]":

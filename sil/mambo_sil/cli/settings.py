@@ -4,7 +4,7 @@ import contextlib
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,8 +20,10 @@ from mambo_sil.cli.options import (
     Workers,
     complete_vehicles,
     output_option,
+    sensors_option,
     show,
 )
+from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind
 from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
@@ -181,8 +183,10 @@ def design(
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
     sensors: Annotated[
-        Literal["flow-deck"] | None,
-        typer.Option(help="What measures the position, in place of the sensors in the vehicle's file."),
+        SensorsKind | None,
+        sensors_option(
+            SENSORS_KINDS, "What measures, in place of the file's sensors: true, mocap, flow-deck or mambo."
+        ),
     ] = None,
 ) -> None:
     """Derive settings from a drone, write them with reasons, fly them; exit 1 if they do not fly well.
@@ -191,12 +195,11 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
-    from mambo_sil.drone.vehicles.vehicle_sections import FlowDeckSensors
     from mambo_sil.model.derive.derived_settings import controller_text
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
-        drone = drone.model_copy(update={"sensors": FlowDeckSensors()})
+        drone = drone.with_sensors(sensors)
     text = controller_text(drone, source)
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):

@@ -190,7 +190,7 @@ def _course(flown: FlySummary | Scenario) -> dict[str, str]:
     return {
         "vehicle": flown.vehicle.name,
         "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
-        "state": "true" if flown.sensors == "none" else f"estimated, sensors {flown.sensors}",
+        "state": "true" if flown.sensors == "true" else f"estimated, sensors {flown.sensors}",
     }
 
 

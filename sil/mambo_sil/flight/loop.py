@@ -34,7 +34,7 @@ from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
-from mambo_sil.flight.controllers.thrust_controller import flown, lifts, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import adapted, commands_thrust, numbers_of
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.thrust_delivery import ThrustDelivery
@@ -229,9 +229,9 @@ def fly(
 
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
-    controller = flown(controller)
-    lifting = lifts(controller)
-    times_s, targets = flight.times_s(), flight.targets_in_space if lifting else flight.given_targets
+    controller = adapted(controller)
+    has_thrust = commands_thrust(controller)
+    times_s, targets = flight.times_s(), flight.targets_in_space if has_thrust else flight.given_targets
     open_loop_until, landing = open_loop_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
@@ -243,7 +243,7 @@ def fly(
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = suite_of(flight, seeds, truth(state))
     trace = allocate_trace(times_s, flight.traced_targets, sensed=suite is not None)
-    drops, first = Drops(flight.link, seeds), first_command(flight, state, lifting=lifting)
+    drops, first = Drops(flight.link, seeds), first_command(flight, state, has_thrust=has_thrust)
     caller, wire = _Caller(controller, drops, targets, trace, first), Wire(flight.link, first)
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
@@ -255,22 +255,22 @@ def fly(
                 state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
                 seen = true if suite is None else suite.estimate(true)
-                stock = not lifting and not open_loop
+                stock = not has_thrust and not open_loop
                 thrust_n = altitude.thrust_n(wanted, seen) if stock else take_off_n
             if tick == 0:
                 grounded = landing & (true.position_m[2] >= 0.0)
-                told = delivery.tell() if lifting else thrust_n / mass_kg
-                caller.call(update, true, seen, grounded, told)
+                reported_m_s2 = delivery.report() if has_thrust else thrust_n / mass_kg
+                caller.call(update, true, seen, grounded, reported_m_s2)
                 if open_loop:
                     trace.thrust_acceleration_m_s2[update] = thrust_n / mass_kg
             command = wire.carry(caller.command)
             with np.errstate(all="ignore"):
-                if lifting and not open_loop:
+                if has_thrust and not open_loop:
                     thrust_n = np.clip(mass_kg * command[2], -most_n, most_n)
                 state, given_n = vehicle.advance(
                     state, command[:2], thrust_n, heading_rad, seen=seen, moment=moment
                 )
-                if lifting:
+                if has_thrust:
                     delivery.note(mass_kg * command[2], given_n)
                 if landing.any():
                     state = carry_on_ground(state, landing)
@@ -280,14 +280,14 @@ def fly(
     return trace
 
 
-def first_command(flight: Flight, state: VehicleState, *, lifting: bool) -> FloatArray:
+def first_command(flight: Flight, state: VehicleState, *, has_thrust: bool) -> FloatArray:
     """Return the commands (2, n) that drones have before the first of their controllers: level.
 
     With controllers of the height (3, n): and with the thrust over mass of hover, on the ground 0.
     """
     z_m = state.body[POSITION][2]
     level = np.zeros((2, len(z_m)))
-    if not lifting:
+    if not has_thrust:
         return level
     hover_m_s2 = GRAVITY_M_S2 / flight.vehicle.drone.thrust_gain
     return np.concatenate([level, np.where(z_m < 0.0, hover_m_s2, 0.0)[np.newaxis]])
@@ -396,9 +396,9 @@ class _Caller:
 
         A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
-        trace, lifting = self._trace, len(self.command) > len(COMMAND)
+        trace, has_thrust = self._trace, len(self.command) > len(COMMAND)
         rows = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
-        if lifting:
+        if has_thrust:
             rows += [-seen.position_m[2:], -seen.velocity_m_s[2:], grounded[np.newaxis].astype(np.float64)]
         measured = np.ascontiguousarray(np.concatenate(rows).T)
         dropped = self._drops.next()
@@ -418,5 +418,5 @@ class _Caller:
             command[:, dropped] = self.command[:, dropped]
             trace.status[update, dropped] = NOT_CALLED
         trace.command_rad[update] = command[:2].T
-        trace.thrust_acceleration_m_s2[update] = command[2] if lifting else thrust_m_s2
+        trace.thrust_acceleration_m_s2[update] = command[2] if has_thrust else thrust_m_s2
         self.command = command

@@ -1,6 +1,6 @@
 """Names by which options and files choose what is flown; light to import."""
 
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 CurveName = Literal[
     "bernoulli",
@@ -18,13 +18,15 @@ CurveName = Literal[
 """Level curves, then curves in space."""
 Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
-SensorsName = Literal["none", "mambo", "mambo-derotated", "mocap", "flow-deck"]
+SensorsKind = Literal["true", "mocap", "flow-deck", "mambo"]
+"""What measures: nothing, since the true state is known; motion capture; a flow deck; what the Mambo has."""
+SensorsName = Literal[SensorsKind, "mambo-derotated"]
 """`mambo-derotated` subtracts the rotation of the camera from the optical flow; `flow-deck` is for --app."""
 SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
-    "none": ("none",),
-    "mambo": ("none", "mambo", "mambo-derotated"),
-    "mocap": ("none", "mocap"),
-    "flow-deck": ("none",),
+    "true": ("true",),
+    "mocap": ("true", "mocap"),
+    "flow-deck": ("true",),
+    "mambo": ("true", "mambo", "mambo-derotated"),
 }
 """Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default. A
 flow deck is simulated on the desk alone."""
@@ -40,6 +42,7 @@ EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 
 STARTS: Final[tuple[Start, ...]] = get_args(Start)
+SENSORS_KINDS: Final[tuple[SensorsKind, ...]] = get_args(SensorsKind)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
@@ -70,3 +73,8 @@ RENAMED: Final = {
     **{f"push_{axis}_n_s": f"impulse_{axis}_n_s" for axis in "xyz"},
 }
 """Keys of version 0.1 and their names now, for messages."""
+
+
+def present_sensors(name: Any) -> Any:
+    """Return the name that sensors have now; version 0.1 called the true state "none"."""
+    return "true" if name == "none" else name

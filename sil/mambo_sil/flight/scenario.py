@@ -8,11 +8,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -36,7 +37,15 @@ from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF, AltitudeName, ControllerName, CurveName, SensorsName, Start
+from mambo_sil.flight.names import (
+    SENSORS_OF,
+    AltitudeName,
+    ControllerName,
+    CurveName,
+    SensorsName,
+    Start,
+    present_sensors,
+)
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 2
@@ -133,7 +142,7 @@ class Scenario(_Record):
     altitude_loop: AltitudeName = "stock"
     """What holds the height: the vehicle's loop, that with feed-forward, or a PID with feed-forward."""
 
-    sensors: SensorsName = "none"
+    sensors: Annotated[SensorsName, BeforeValidator(present_sensors)] = "true"
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of all sensor noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
@@ -215,7 +224,7 @@ def choose_sensors(
 
     Raises FlightError if it has others.
     """
-    if name == "none":
+    if name == "true":
         return None
     match drone.sensors:
         case MocapSensors() as figures if name == "mocap":

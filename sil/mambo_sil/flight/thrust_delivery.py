@@ -29,10 +29,10 @@ class ThrustDelivery:
         self._sum_n = self._sum_n + given_n
         self._capped |= np.abs(given_n - wanted_n) > self._least_n
 
-    def tell(self) -> FloatArray:
+    def report(self) -> FloatArray:
         """Return the mean since the last call (n,), NaN where the motors were commanded what arrived."""
-        told = np.full(self._flights, np.nan)
+        reported = np.full(self._flights, np.nan)
         if self._ticks:
-            told = np.where(self._capped, self._sum_n / self._ticks / self._mass_kg, np.nan)
+            reported = np.where(self._capped, self._sum_n / self._ticks / self._mass_kg, np.nan)
         self._begin()
-        return told
+        return reported

@@ -37,7 +37,7 @@ class ApiFunction(IntEnum):
     """The function of the C interface that a call calls.
 
     SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost, SET_LIMITS with limits, SET_THRUST
-    with a height.
+    with a height, SET_MEASURED with a guard.
     """
 
     STEP = 0
@@ -48,6 +48,7 @@ class ApiFunction(IntEnum):
     SET_LIMITS = 4
     SET_THRUST = 5
     SLEW_HEADING = 6
+    SET_MEASURED = 7
 
 
 _POINTERS: Final = {
@@ -58,6 +59,7 @@ _POINTERS: Final = {
     ApiFunction.SET_LIMITS: NULL_SELF | NULL_FIRST,
     ApiFunction.SET_THRUST: NULL_SELF,
     ApiFunction.SLEW_HEADING: 0,
+    ApiFunction.SET_MEASURED: NULL_SELF,
 }
 
 _OTHER_BIT: Final = 64
@@ -65,6 +67,7 @@ _WRITTEN_AS: Final = {
     ApiFunction.SET_LIMITS: ApiFunction.SET_WEIGHTS | _OTHER_BIT,
     ApiFunction.SET_THRUST: ApiFunction.INIT | _OTHER_BIT,
     ApiFunction.SLEW_HEADING: ApiFunction.RESET | _OTHER_BIT,
+    ApiFunction.SET_MEASURED: ApiFunction.STEP | _OTHER_BIT,
 }
 """How functions are written for which two bits are too few."""
 
@@ -79,6 +82,7 @@ def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
         ApiFunction.SET_LIMITS: method.limiting.quantities if method.limiting else (),
         ApiFunction.SET_THRUST: THRUST,
         ApiFunction.SLEW_HEADING: ("yaw",) * 3,
+        ApiFunction.SET_MEASURED: ("position",),
     }
 
 
@@ -151,6 +155,7 @@ class _Runs:
                 ApiFunction.SET_LIMITS: self._method.limiting is not None,
                 ApiFunction.SET_THRUST: self._method.has_height,
                 ApiFunction.SLEW_HEADING: True,
+                ApiFunction.SET_MEASURED: self._method.guard is not None,
             }[function]
         }
         self._level: dict[str, Any] = {"command_rad": 0}
@@ -183,16 +188,21 @@ class _Runs:
         with np.errstate(all="ignore"):
             resets = call(ApiFunction.RESET, controller.reset)
             others = call(ApiFunction.SET_WEIGHTS, set_other)
-            limits, thrusts = np.zeros_like(others), np.zeros_like(others)
+            limits, thrusts, measured = (np.zeros_like(others) for _ in range(3))
             if ApiFunction.SET_LIMITS in self._others:
                 limits = call(ApiFunction.SET_LIMITS, controller.set_limits)
             if ApiFunction.SET_THRUST in self._others:
                 thrusts = call(ApiFunction.SET_THRUST, lambda values: controller.set_thrust(values[:, 0]))
+            if ApiFunction.SET_MEASURED in self._others:
+                measured = call(
+                    ApiFunction.SET_MEASURED,
+                    lambda values: controller.set_position_measured(values[:, 0] > 0),
+                )
             steps = call(ApiFunction.STEP, step)
             none, slewed = np.zeros_like(steps), self._slewed(now)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none])
+        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none, measured])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)

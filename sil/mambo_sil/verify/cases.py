@@ -33,6 +33,26 @@ Floats = NDArray[np.floating]
 
 RANDOM_TAPES: Final = 1000
 
+Shares = dict[float, float]
+"""Values and with which probability each is drawn."""
+
+_MOST_TURNS: Final[Shares] = {0.01: 0.3, 0.04: 0.3, 1.0: 0.3, 0.0: 0.05, -0.1: 0.05}
+"""Most changes of the heading in a step, rad; the last two are refused."""
+_TILT_SHARES: Final[Shares] = {1.0: 0.5, 0.7: 0.25, 0.4: 0.1, 1.01: 0.05, -0.7: 0.05, math.nan: 0.05}
+"""Tilt limits over the largest one; the last three are refused."""
+_WIDTHS_M: Final[Shares] = {0.5: 0.3, 2.0: 0.3, 8.0: 0.38, -1.0: 0.02}
+"""Widths of a fence; the last one is refused."""
+_HEIGHTS_M: Final[Shares] = {0.3: 0.3, 2.0: 0.68, -1.0: 0.02}
+"""Distances of the ceiling from the floor; the last one is refused."""
+_OPEN_ENDS: Final[Shares] = {1.0: 0.95, 1.1: 0.05}
+"""Walls of an open fence over the range; the last one is refused."""
+_OPEN: Final = 0.2
+"""Probability that a fence is open along an axis."""
+_BAD_HEADING: Final = 0.03
+"""Probability that a number of a heading is NaN."""
+_BAD_COMMANDS: Final = (math.nan, math.inf, 4.0, -4.0)
+_BAD_EFFORT_WEIGHTS: Final = (-1.0, math.nan, math.inf, 1.1 * WEIGHT_LIMIT)
+
 
 @lru_cache(maxsize=2)
 def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
@@ -72,10 +92,10 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
         for index, drawn in enumerate(draws)
     ]
     command = rng.uniform(-1.5, 1.5, (n, 2)) * settings.limits.tilt_rad
-    command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
+    command[::5, 0] = rng.choice(_BAD_COMMANDS, len(command[::5]))
     weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
     weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
-    weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
+    weights[::7, 1] = rng.choice(_BAD_EFFORT_WEIGHTS, len(weights[::7]))
     limits = random_limits(settings, n, rng) if method.limiting else None
     if method.has_height:
         command = np.concatenate([command, _random_thrusts(settings, n, rng)], axis=1)
@@ -89,6 +109,11 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
         *([] if limits is None else [calls(settings, ApiFunction.SET_LIMITS, limits)]),
         calls(settings, ApiFunction.SLEW_HEADING, _random_headings(n, rng)),
         calls(settings, ApiFunction.STEP, steps[5]),
+        *(
+            [calls(settings, ApiFunction.SET_MEASURED, rng.uniform(-1, 1, (n, 1)))]
+            if method.guard is not None
+            else []
+        ),
         *(
             [calls(settings, ApiFunction.SET_THRUST, _random_thrusts(settings, n, rng))]
             if method.has_height
@@ -107,10 +132,15 @@ def _random_headings(n: int, rng: np.random.Generator) -> Array:
     beyond = previous - (np.sign(previous) * (2.0 * np.pi - rng.uniform(0, 0.2, n)))
     within = previous + (2.0 * np.pi * rng.integers(-3, 4, n)) + rng.uniform(-np.pi, np.pi, n)
     wanted = np.where(np.abs(previous) > YAW_LIMIT_RAD - 1.0, beyond, within)
-    most = rng.choice([0.01, 0.04, 1.0, 0.0, -0.1], n, p=[0.3, 0.3, 0.3, 0.05, 0.05])
+    most = _draw(rng, _MOST_TURNS, n)
     headings = np.stack([previous, wanted, most], axis=1)
-    headings[rng.random((n, 3)) < 0.03] = np.nan
+    headings[rng.random((n, 3)) < _BAD_HEADING] = np.nan
     return headings
+
+
+def _draw(rng: np.random.Generator, shares: Shares, shape: int | tuple[int, ...]) -> Array:
+    """Draw values with their probabilities."""
+    return np.asarray(rng.choice(list(shares), shape, p=list(shares.values())))
 
 
 def _random_thrusts(settings: Settings, n: int, rng: np.random.Generator) -> Array:
@@ -125,13 +155,12 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
     """Draw limits (n, k) in the order of nmpc_limits_t; a quarter of them are bad."""
     ranges, most_rad = settings.ranges, settings.limits.tilt_rad
     speed = np.exp(rng.uniform(np.log(0.05), np.log(1.2 * ranges.velocity_m_s), n))
-    share = rng.choice([1.0, 0.7, 0.4, 1.01, -0.7, np.nan], n, p=[0.5, 0.25, 0.1, 0.05, 0.05, 0.05])
-    tilt = most_rad * share
+    tilt = most_rad * _draw(rng, _TILT_SHARES, n)
     braking = rng.uniform(0.05, 0.11 + (9.0 * np.abs(np.nan_to_num(tilt))))
     low = rng.uniform(-3, 1, (n, 2))
-    high = low + rng.choice([0.5, 2.0, 8.0, -1.0], (n, 2), p=[0.3, 0.3, 0.38, 0.02])
-    is_open, reach_m = rng.random((n, 2)) < 0.2, ranges.position_m
-    ends_m = reach_m * rng.choice([1.0, 1.1], (2, n, 2), p=[0.95, 0.05])
+    high = low + _draw(rng, _WIDTHS_M, (n, 2))
+    is_open, reach_m = rng.random((n, 2)) < _OPEN, ranges.position_m
+    ends_m = reach_m * _draw(rng, _OPEN_ENDS, (2, n, 2))
     level = np.column_stack(
         [
             speed,
@@ -145,7 +174,7 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
     if height is None:
         return level
     floor_m = rng.uniform(-3, 1, n)
-    ceiling_m = floor_m + rng.choice([0.3, 2.0, -1.0], n, p=[0.3, 0.68, 0.02])
+    ceiling_m = floor_m + _draw(rng, _HEIGHTS_M, n)
     speeds = np.array([height.climb_m_s, height.descent_m_s]) * rng.uniform(0.3, 1.02, (n, 2))
     return np.column_stack([level, floor_m, ceiling_m, np.maximum(speeds, 0.1)])
 
@@ -208,9 +237,11 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         (ApiFunction.INIT, NULL_SELF),
         *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
         *([(ApiFunction.SET_THRUST, NULL_SELF)] if method_of(settings).has_height else []),
+        *([(ApiFunction.SET_MEASURED, NULL_SELF)] if method_of(settings).guard is not None else []),
     ):
         for nulls in range(pointers + 1):
-            values = [[0.1]] if function == ApiFunction.SET_THRUST else [[0.1, 0.2]]
+            takes_one = function in {ApiFunction.SET_THRUST, ApiFunction.SET_MEASURED}
+            values = [[0.1]] if takes_one else [[0.1, 0.2]]
             made = calls(settings, function, np.array(values), nulls)
             yield _surround(settings, rng, made)
 

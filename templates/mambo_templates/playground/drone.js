@@ -23,7 +23,7 @@ class Drone {
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
       module.at(address, [1, TARGET_COLUMNS, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
-    const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], lifting: [entry.lifts] };
+    const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], commands_thrust: [entry.commands_thrust] };
     this.setMembers("simulation", flies, BigInt64Array);
   }
 

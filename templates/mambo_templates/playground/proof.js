@@ -17,7 +17,7 @@ async function traceDigest(entry, data) {
   const [simulation, flight, sensors, gusts] =
     ["simulation", "flight", "sensors", "gusts"].map((name) => module.put(bytesOf(proof[name])));
   const targets = new Float64Array(bytesOf(proof.targets).buffer), columns = targets.length / updates;
-  module.at(simulation + data.offsets.simulation.lifting, 1, BigInt64Array)[0] = BigInt(entry.lifts);
+  module.at(simulation + data.offsets.simulation.commands_thrust, 1, BigInt64Array)[0] = BigInt(entry.commands_thrust);
   const arrays = TRACE_AXES.map((axes) => module.space(8 * axes * updates));
   module.calls.engine_fly(
     simulation, flight, 0n, module.put(new Uint8Array(times.buffer)), module.put(new Uint8Array(targets.buffer)),

@@ -11,9 +11,9 @@ CLOCKS_MS = (3, 7, 9)
 """Offsets of the clock of camera or flow deck, each with a seed of its own."""
 RATTLING = (*("noise-0-2-mm", "noise-0-5-mm", "noise-1-mm", "noise-4-mm", "packets-out-of-order"),)
 """Commands that rattle take the thrust, since the mixer serves attitude first: not cured yet."""
-FLOW = ("flow-low", "flow-hover", "flow-high", "flow-noise", "flow-ends")
+FLOW = ("flow-low", "flow-hover", "flow-high", "flow-noise", "flow-ends", "flow-for-camera")
 HEADING = ("heading-30-degrees",)
-"""The app cannot know the heading: scripts must ask for it."""
+"""The app cannot know the heading, and swings until the filter has learnt it: scripts ask, or hop first."""
 ONLY_WITH_A_HEIGHT = ("floor-then-land", "mass-in-grams", "table-above-its-height", "table-at-its-height")
 NOT_THE_PRESETS = (*RATTLING, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT)
 NAMES = [

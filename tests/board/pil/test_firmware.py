@@ -124,7 +124,7 @@ def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path
     """It changes the next step, on the board as on the desk; without one the command stands."""
     settings = height_settings(scalar, "given")
     replies = []
-    for told in (False, True):
+    for reported in (False, True):
         draw = np.random.default_rng(3)
         with (
             serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line,
@@ -134,14 +134,14 @@ def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path
             for step in range(20):
                 state, target = draw.normal(0.0, 0.3, (1, 10)), draw.normal(0.0, 0.3, (1, 9))
                 state[0, 9] = step % 2
-                if told and step == 10:
+                if reported and step == 10:
                     controller.set_thrust([4.0])
                 controller.step(state, target)
         assert (len(controller.replies), controller.different) == (20, [])
         replies.append([reply.bits for reply in controller.replies])
-    silent, told_of = replies
-    assert silent[:10] == told_of[:10]
-    assert silent[10] != told_of[10]
+    silent, answered = replies
+    assert silent[:10] == answered[:10]
+    assert silent[10] != answered[10]
 
 
 @pytest.mark.long

@@ -71,20 +71,20 @@ class Expected:
         self._compiled, self._seen = CompiledController(self.settings), list[tuple[ArrayLike, ...]]()
         hover = None if self.settings.height is None else np.array([GRAVITY_M_S2])
         self._held = BoardStep(np.zeros((1, 2)), np.array([NOT_CALLED]), hover)
-        self._told: ArrayLike = [np.nan]
+        self._reported: ArrayLike = [np.nan]
 
     def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
         """Keep it for the next step, with a height."""
-        self._told = thrust_m_s2
+        self._reported = thrust_m_s2
 
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
     ) -> BoardStep:
         """Return what the drone is commanded from this update on."""
         before = len(self._seen) - 1
-        told, self._told = self._told, [np.nan]
+        reported, self._reported = self._reported, [np.nan]
         self._seen.append(
-            (state, target, told if thrust_acceleration_m_s2 is None else thrust_acceleration_m_s2)
+            (state, target, reported if thrust_acceleration_m_s2 is None else thrust_acceleration_m_s2)
         )
         if before < 0 or before in self.without_step:
             return self._held

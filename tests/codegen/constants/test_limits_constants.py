@@ -218,12 +218,12 @@ def test_braking_begins_and_ends_where_its_curve_touches_the_line(acceleration: 
     assert first_m == pytest.approx(2 * braking_m_s2 * found.near_s2, abs=2 * distances_m[0])
     share = first_m / knee_m
     assert share == pytest.approx(1.0 if acceleration == "none" else 0.7, abs=2e-3)
-    acts = active != 0
-    steepest_1_s = max(k, np.max(speeds_m_s[acts] / distances_m[acts]))
+    limit_active = active != 0
+    steepest_1_s = max(k, np.max(speeds_m_s[limit_active] / distances_m[limit_active]))
     assert found.steepest_1_s == pytest.approx(steepest_1_s, rel=2e-3)
-    ahead_m = distances_m[acts] + knee_m - first_m
+    ahead_m = distances_m[limit_active] + knee_m - first_m
     expected_m_s = np.sqrt(2 * braking_m_s2 * (ahead_m - start_m))
-    assert speeds_m_s[acts] == pytest.approx(expected_m_s, abs=2e-3)
+    assert speeds_m_s[limit_active] == pytest.approx(expected_m_s, abs=2e-3)
 
 
 def test_the_rate_of_updates_makes_changes_of_the_desired_velocity_accelerations() -> None:

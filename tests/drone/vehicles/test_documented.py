@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.pages.settings_page import vehicle_page
+from docs.pages.settings_page import vehicle_part
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import form
 from tests.support.command import run
@@ -25,7 +25,7 @@ def example(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("sensors", ["none", "mocap"])
+@pytest.mark.parametrize("sensors", ["true", "mocap"])
 def test_the_example_is_short_and_flies(example: Path, sensors: str, tmp_path: Path) -> None:
     """Within 25 lines, without a crash."""
     assert len(example.read_text().splitlines()) <= MOST_LINES
@@ -37,9 +37,9 @@ def test_the_example_is_short_and_flies(example: Path, sensors: str, tmp_path: P
 
 def test_every_key_is_documented() -> None:
     """Of every kind of attitude loop and of sensors, on the page that the code writes."""
-    page = vehicle_page()
+    page = vehicle_part()
     for attitude in ("mambo", "cascade", "first_order"):
-        for sensors in ("none", "mambo", "mocap"):
+        for sensors in ("true", "mambo", "mocap"):
             for path in form(attitude, sensors).keys:
                 assert f"`{path.rpartition('.')[2]}`" in page, path
 

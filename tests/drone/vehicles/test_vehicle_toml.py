@@ -56,7 +56,7 @@ def test_a_drone_reads_from_a_file(tmp_path: Path) -> None:
     assert drone.step_s == 0.005
     assert (drone.altitude.p_n_m, drone.altitude.d_n_s_m) == (1.0, 0.5)
     assert drone.altitude.thrust_max_n == pytest.approx(2.0 * 0.981)
-    assert drone.sensors.kind == "none"
+    assert drone.sensors.kind == "true"
     assert vehicle_toml.parse(
         FLOWN + "[thrust]\ngain = 0.4\nlag_s = 0.1\n", "weak", "weak.toml"
     ).largest_thrust_n == (pytest.approx(2.0 * 0.981))

@@ -394,7 +394,7 @@ def test_a_file_names_its_drone(tmp_path: Path) -> None:
         f"{', '.join(VEHICLES.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
     ]
     assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
-        'flight.sensors = "mambo" must be "none" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'
+        'flight.sensors = "mambo" must be "true" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'
     ]
     both = written(tmp_path, '[flight]\nvehicle = "mambo"\nsensors = "mambo"\n')
     assert campaign_file.read(both, "crazyflie").file.flight.sensors == "mocap"

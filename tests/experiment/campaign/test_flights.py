@@ -97,7 +97,7 @@ def expected_row(trace: Trace, pd: str) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("pd", PD_NAMES)
-@pytest.mark.parametrize("sensors", ["none", "mambo-derotated"])
+@pytest.mark.parametrize("sensors", ["true", "mambo-derotated"])
 def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -> None:
     """Metrics of the true flight, with sensors also of the estimated error, and digest are those of `fly`."""
     flight = default().flight | {"duration_s": 1.0, "sensors": sensors}
@@ -108,7 +108,7 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
         alone = fly(single, pd_controller(pd, single))
         assert (alone.status == NOT_CALLED).any()
         assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
-        titles = {*columns([pd], sensed=sensors != "none", spatial=True), f"{pd}_saturated_share"}
+        titles = {*columns([pd], sensed=sensors != "true", spatial=True), f"{pd}_saturated_share"}
         assert set(row) == titles
 
 

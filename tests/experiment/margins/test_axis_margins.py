@@ -41,7 +41,7 @@ from mambo_sil.flight.trajectories import Hover
 from tests.support.height_settings import height_settings
 
 PAIRS: Final[tuple[tuple[str, SensorsName], ...]] = (
-    ("mambo", "none"),
+    ("mambo", "true"),
     ("crazyflie", "mocap"),
 )
 
@@ -103,7 +103,7 @@ def test_the_sensed_variation_is_that_of_a_covariance(name: str, sensors: Sensor
             margins.sensed_variation_m_s2 if margins.axis == "height" else margins.sensed_variation_rad
         )
         first = BY_SEEN + len(SEEN_OF[number])
-        if sensors == "none":
+        if sensors == "true":
             assert variation is None
             continue
         noisy = choose(loop, list(range(first, loop.inputs.shape[2])), [SENT])
@@ -215,7 +215,7 @@ def _exponential(matrix: Any) -> Any:
 
 def test_frequencies_end_at_half_the_rates() -> None:
     """Of updates and of ticks; at 0.02 rad/s they begin."""
-    loops, _, period_s = hovering("mambo", "none")
+    loops, _, period_s = hovering("mambo", "true")
     updates, ticks = frequencies(loops[0], period_s, 50)
     assert updates[[0, -1]] == pytest.approx([0.02, math.pi / period_s])
     assert ticks[[0, -1]] == pytest.approx([0.02, math.pi / loops[0].step_s])
@@ -269,6 +269,6 @@ def test_an_unstable_loop_has_no_margins_and_no_bounded_answer() -> None:
 def test_a_subject_has_the_axes_of_its_loops() -> None:
     """None if its law is not linear."""
     drone = vehicle_toml.preset("mambo")
-    _, found, _ = hovering("mambo", "none")
+    _, found, _ = hovering("mambo", "true")
     assert axes_on(MarginSubject("mine", preset("mambo"), drone)) == list(found)
     assert axes_on(MarginSubject("mine", preset("mambo-1norm"), drone)) is None

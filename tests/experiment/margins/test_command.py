@@ -92,7 +92,7 @@ def test_draws_do_not_depend_on_how_many_there_are() -> None:
     assert len(many) == 11
     assert list(map(repr, few)) == list(map(repr, many[:3]))
     first = ("--campaign", "default", "--drones", "1")
-    drawn, true = measured(*first), measured(*first, "--sensors", "none")
+    drawn, true = measured(*first), measured(*first, "--sensors", "true")
     assert drawn["many"]["spreads"] != true["many"]["spreads"]
 
 

@@ -105,12 +105,12 @@ def test_linear_controller_commands_what_the_c_commands() -> None:
     """In 100 steps of small random states commands differ from those at rest as the linear system says."""
     settings = height_settings("float64")
     system, controller = linear_controller(settings), ThrustController(CompiledController(settings, 2))
-    memory, target, told = np.zeros(len(system.a)), np.zeros((2, 9)), np.full(2, np.nan)
+    memory, target, reported = np.zeros(len(system.a)), np.zeros((2, 9)), np.full(2, np.nan)
     states = 1e-6 * np.random.default_rng(5).standard_normal((100, 10))
     states[:, [6, 9]] = 0.0
-    controller.step(np.zeros((2, 10)), target, told)
+    controller.step(np.zeros((2, 10)), target, reported)
     for state in states:
-        rest, sent = numbers_of(controller.step(np.stack([np.zeros(10), state]), target, told))
+        rest, sent = numbers_of(controller.step(np.stack([np.zeros(10), state]), target, reported))
         assert system.c @ memory + system.d @ state[:9] == pytest.approx(sent - rest, rel=1e-3, abs=1e-8)
         memory = system.a @ memory + system.b @ state[:9]
 

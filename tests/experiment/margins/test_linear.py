@@ -21,7 +21,7 @@ from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover
 
 SEEN: list[tuple[str, SensorsName]] = [
-    ("mambo", "none"),
+    ("mambo", "true"),
     ("mambo", "mambo-derotated"),
     ("crazyflie", "mocap"),
 ]

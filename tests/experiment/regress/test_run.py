@@ -60,7 +60,7 @@ def test_flights_are_flown_in_groups_of_one_kind_and_come_back_in_order(tmp_path
         [flights.eight]
         yaw_rad = [0.0, 0.5]
         duration_s = [0.2, 0.1]
-        sensors = ["none", "mambo"]
+        sensors = ["true", "mambo"]
         """,
     )
     pd, finished = load_entrant("pd", tmp_path, "test"), list[int]()

@@ -36,7 +36,7 @@ def test_lists_multiply_the_flights_of_a_group(tmp_path: Path) -> None:
         tmp_path,
         """
         [flights.eight]
-        sensors = ["none", "mambo"]
+        sensors = ["true", "mambo"]
         yaw_rad = [0.0, 0.5]
         push_m_s2 = [[0.5, 0.0], [0.0, -0.5]]
         [flights.hover]
@@ -46,7 +46,7 @@ def test_lists_multiply_the_flights_of_a_group(tmp_path: Path) -> None:
     )
     names = [flight.name for flight in found.flights]
     assert len(names) == len(set(names)) == 9
-    assert names[0] == "eight/yaw_rad=0,push_m_s2=0.5;0,sensors=none"
+    assert names[0] == "eight/yaw_rad=0,push_m_s2=0.5;0,sensors=true"
     assert names[-1] == "hover"
     assert found.flights[7].scenario == Scenario(yaw_rad=0.5, push_m_s2=(0.0, -0.5), sensors="mambo")
     assert found.flights[8].scenario == Scenario(trajectory="hover", push_m_s2=(0.1, 0.2))
@@ -139,7 +139,7 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
         ("yaw_rad = { from = 0, to = 1, count = 1001 }", "must have a count of 2 to 1000"),
         ("yaw_rad = { from = 0, to = nan, count = 3 }", "must be a value, a list of values, or { from ="),
         ("yaw_rad = { from = 0, to = 1, count = 1 }", "must have a count of 2 to 1000"),
-        ('sensors = "all"', "sensors = \"all\" must be 'none', 'mambo', 'mambo-derotated', 'mocap' or"),
+        ('sensors = "all"', "sensors = \"all\" must be 'true', 'mocap', 'flow-deck', 'mambo' or"),
         ("yaw_rad = 1979-05-27", "must be a valid number"),
         ("bounds = 3", "bounds = 3 must be a section; write [flights.eight.bounds] and its keys below"),
         ("bounds.iae_m_s = -1", "bounds.iae_m_s = -1 must lie in 0..1000000000000"),
@@ -237,7 +237,7 @@ def test_the_envelope_has_33_headings_over_the_full_turn() -> None:
         assert max(yaws_rad) - min(yaws_rad) == pytest.approx(6.28318)
         assert all("iae_m_s" in flight.bounds for flight in flights)
         sensors = {flight.scenario.sensors for flight in flights}
-        assert sensors == {"mambo-derotated" if group.endswith("-sensors") else "none"}
+        assert sensors == {"mambo-derotated" if group.endswith("-sensors") else "true"}
 
 
 def test_the_suite_in_space_flies_every_course_and_condition() -> None:

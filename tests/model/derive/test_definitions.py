@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml
@@ -201,12 +202,28 @@ def test_the_answer_to_a_step_begins_at_0_and_ends_at_1() -> None:
 
 def test_a_drone_without_sensors_is_calm() -> None:
     """With the noise of a filtered velocity, as with motion capture, and a third of its disturbance."""
-    seen = vehicle_toml.preset("generic").model_dump()
-    blind = settings_for(VehicleFile.model_validate(seen | {"sensors": {"kind": "none"}})).observer
+    seen = vehicle_toml.preset("generic").model_dump(exclude={"sensors"})
+    blind = settings_for(VehicleFile.model_validate(seen)).observer
     captured = settings_for(GENERIC).observer
     assert blind.velocity_noise == captured.velocity_noise == 0.15
     assert (blind.disturbance_noise, captured.disturbance_noise) == (1.0, 3.0)
     assert blind.position_noise == type(blind)().position_noise
+
+
+def test_the_true_state_has_a_quick_observer() -> None:
+    """Without noise and age, whether the file says it or an option; the older name says the same."""
+    true = settings_for(GENERIC.with_sensors("true")).observer
+    assert (true.position_noise, true.velocity_noise, true.disturbance_noise) == (0.001, 0.02, 3.0)
+    assert true.age_s == 0.0
+    for name in ("true", "none"):
+        said = VehicleFile.model_validate(GENERIC.model_dump() | {"sensors": {"kind": name}})
+        assert said.sensors.kind == "true"
+        assert settings_for(said).observer == true
+    assert GENERIC.with_sensors("mocap") == GENERIC
+    with pytest.raises(
+        InvalidSettingsError, match=r'^sensors = "mambo" needs its figures, \[sensors\], in the file'
+    ):
+        GENERIC.with_sensors("mambo")
 
 
 def test_a_flow_deck_has_a_noise_of_its_own() -> None:

@@ -74,7 +74,7 @@ FLOWN = vehicle_toml.parse(VEHICLES.text("crazyflie-flown") + THRUST, "mine", "m
                     "attitude": {name: {"dead_time_s": 0.0} for name in ("roll", "pitch")}
                 },
                 "thrust.dead_time_s = 0.02": {"thrust": {"dead_time_s": 0.0}},
-                "sensors.kind": {"sensors": {"kind": "none"}},
+                "sensors.kind": {"sensors": {"kind": "true"}},
             },
         ),
         (
@@ -84,13 +84,13 @@ FLOWN = vehicle_toml.parse(VEHICLES.text("crazyflie-flown") + THRUST, "mine", "m
                 "dead_time_s of roll and pitch": {
                     "attitude": {name: {"dead_time_s": 0.0} for name in ("roll", "pitch")}
                 },
-                "sensors.kind": {"sensors": {"kind": "none"}},
+                "sensors.kind": {"sensors": {"kind": "true"}},
             },
         ),
         (
             CRAZYFLIE,
             True,
-            {"rotors.lag_s": {"rotors": {"lag_s": 0.0}}, "sensors.kind": {"sensors": {"kind": "none"}}},
+            {"rotors.lag_s": {"rotors": {"lag_s": 0.0}}, "sensors.kind": {"sensors": {"kind": "true"}}},
         ),
     ],
 )
@@ -103,7 +103,7 @@ def test_a_drone_without_a_property_differs_in_nothing_else(
     for (words, other), (begin, sections) in zip(found.items(), changes.items(), strict=True):
         assert words.startswith(begin)
         if "sensors" in sections:
-            expected = drone.model_dump() | {"sensors": {"kind": "none"}}
+            expected = drone.model_dump() | {"sensors": {"kind": "true"}}
             assert other.model_dump(exclude_none=True) == VehicleFile.model_validate(expected).model_dump(
                 exclude_none=True
             )
@@ -133,7 +133,7 @@ def test_a_thrust_without_a_dead_time_is_none() -> None:
 
 def blind(**sections: Any) -> VehicleFile:
     """Return a drone whose true state is seen."""
-    document = changed(GENERIC, **sections).model_dump() | {"sensors": {"kind": "none"}}
+    document = changed(GENERIC, **sections).model_dump(exclude={"sensors"})
     return VehicleFile.model_validate(document)
 
 
@@ -181,7 +181,7 @@ def test_the_cause_is_the_property_without_which_most_is_left(
     left = {
         words: min(map(_reserve, measure_drone(settings_for(other), other, seen)))
         for (words, other), seen in zip(
-            _without(drone, height=False), (SENSORS_OF["mocap"][-1], "none"), strict=True
+            _without(drone, height=False), (SENSORS_OF["mocap"][-1], "true"), strict=True
         )
     }
     cause = max(left, key=lambda words: left[words])
@@ -208,7 +208,7 @@ def test_a_quick_drone_is_not_warned_of() -> None:
 def reserve_of(drone: VehicleFile, ends: Mapping[str, int]) -> float:
     """Return the least reserve at ends of the intervals, with its own settings."""
     settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
-    return min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "none")))
+    return min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "true")))
 
 
 @pytest.mark.parametrize(
@@ -219,12 +219,10 @@ def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dea
     axis = {"gain": 1.0, "lag_s": 0.15, "dead_time_s": dead_time_s}
     uncertainty = {"roll_gain": gain_width, "pitch_dead_time_s": 0.01}
     sections = {"attitude": {"roll": axis, "pitch": axis}, "uncertainty": uncertainty}
-    drone = VehicleFile.model_validate(
-        changed(GENERIC, **sections).model_dump() | {"sensors": {"kind": "none"}}
-    )
+    drone = VehicleFile.model_validate(changed(GENERIC, **sections).model_dump(exclude={"sensors"}))
     settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
     found, ends = judge_margins(settings, drone), list(corners(drone))
-    measured = [measure_drone(settings, at_ends(drone, one), "none") for one in ends]
+    measured = [measure_drone(settings, at_ends(drone, one), "true") for one in ends]
     assert [_reserve(axis) for axis in found.axes] == [
         min(map(_reserve, of_one)) for of_one in zip(*measured, strict=True)
     ]
@@ -254,7 +252,7 @@ def test_an_interval_is_taken_away_at_the_worst_ends_of_the_others() -> None:
     drone = blind(attitude={"roll": axis | {"gain": 1.3}, "pitch": axis}, uncertainty=widths)
     settings = settings_for(of_gains(0.5, 0.5))
     late, strong = (
-        min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "none")))
+        min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "true")))
         for ends in ({"gain": 0, "dead_time_s": 1}, {"gain": 1, "dead_time_s": 0})
     )
     assert late < strong < 1.0

@@ -49,7 +49,7 @@ def flown(settings: Settings, drone: VehicleFile, curve: CurveName, *, noisy: bo
             rate_rad_s=rate_rad_s,
             duration_s=20.0,
             yaw_rad=2.0 * math.pi * number / HEADINGS,
-            sensors=SENSORS_OF[drone.sensors.kind][-1] if noisy else "none",
+            sensors=SENSORS_OF[drone.sensors.kind][-1] if noisy else "true",
             seed=number,
         )
         for number in range(HEADINGS)

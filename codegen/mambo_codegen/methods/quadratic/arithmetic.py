@@ -5,10 +5,10 @@ from typing import Any, Final
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats
 from mambo_codegen.methods.quadratic.height_constants import STEEPEST_RAD
-from mambo_codegen.methods.quadratic.height_formats import FACTOR_BITS, GAIN_CHANGE
+from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.shared.arithmetic import Arithmetic
 from mambo_codegen.methods.shared.math import Real
-from mambo_codegen.numbers.fixed_point import SINE_BITS
+from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS
 
 _ONE: Final = 2**SINE_BITS
 _MOST_GAIN_CHANGE: Final = round(GAIN_CHANGE * 2**FACTOR_BITS)
@@ -124,10 +124,6 @@ class QuadraticArithmetic(Arithmetic):
     def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
         """Return thrust over mass / T_s^2, m/s^2."""
         return self._nearest(per_s2 * thrust_m_step2, "thrust_product")
-
-    def factor_product(self, value: Real, factor: Real) -> Real:
-        """Return value * factor, in the format of the value."""
-        return self._nearest(value * factor, "factor_product")
 
     def to_factor(self, cosine: Real) -> Real:
         """Return a cosine in the format of factors."""

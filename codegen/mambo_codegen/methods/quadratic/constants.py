@@ -4,6 +4,7 @@ from functools import cached_property
 
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants, attitude_constants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats, formats
+from mambo_codegen.methods.quadratic.guard_constants import GuardConstants, guard_constants
 from mambo_codegen.methods.quadratic.height_constants import HeightConstants, height_constants
 from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
@@ -40,6 +41,11 @@ class QuadraticConstants(Constants):
         """The constants of the height, in float64; None without it."""
         return height_constants(self.settings)
 
+    @cached_property
+    def guard(self) -> GuardConstants | None:
+        """The constants of the guard, in float64; None without it."""
+        return guard_constants(self.settings)
+
     @property
     def climb_tracker(self) -> TrackerConstants | None:
         """The constants of the tracker of the target's height; None without one."""
@@ -59,9 +65,7 @@ class QuadraticConstants(Constants):
         """The quantity of each number in nmpc_t, in their order."""
         observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
-        tracker = ["acceleration"] * 4 if self.tracker else []
-        if self.tracker and not self.tracker.is_given:
-            tracker = ["velocity"] * 2 + tracker
+        tracker = [quantity for quantity in self._stored_tracker for _ in "xy"]
         limiting = stored_quantities("move", "move") if self.limiting else ()
         if self.limiting and self.tracker and self.tracker.is_given:
             limiting += ("velocity", "velocity")
@@ -69,7 +73,16 @@ class QuadraticConstants(Constants):
         if self.limiting and self.height:
             limiting += ("position",) * 4
         tilt = ["angle"] * 2 if self.feedback_steps else []
-        return (*observer, *attitude, *tracker, *height, *limiting, *tilt, "angle", "angle")
+        guard = ["angle"] * 2 if self.guard else []
+        return (*observer, *attitude, *tracker, *height, *limiting, *tilt, *guard, "angle", "angle")
+
+    @property
+    def _stored_tracker(self) -> tuple[str, ...]:
+        """The quantity of each number that a tracker stores along an axis, in their order."""
+        if self.tracker is None:
+            return ()
+        velocity = () if self.tracker.is_given else ("velocity",)
+        return (*velocity, "acceleration", "acceleration", *(("factor", "factor") if self.guard else ()))
 
     @property
     def _stored_height(self) -> tuple[str, ...]:
@@ -77,7 +90,6 @@ class QuadraticConstants(Constants):
         if self.height is None:
             return ()
         learnt = {"gain": ["factor"], "acceleration": ["acceleration"], "none": []}[self.height.learn]
-        tracker = ["acceleration"] * 2 if self.tracker else []
-        if self.tracker and not self.tracker.is_given:
-            tracker = ["velocity", *tracker]
-        return ("position", "speed", *learnt, *["acceleration"] * 3, "factor", "thrust", *tracker)
+        commands = ["thrust"] * (3 if self.guard else 1)
+        moved = [*["acceleration"] * 3, "factor", *commands]
+        return ("position", "speed", *learnt, *moved, *self._stored_tracker)

@@ -74,7 +74,7 @@ class QuadraticController:
         """
         given, good = self._command(command_rad)
         memory = self.memory
-        height = self._height.set_thrust(memory.height, given[:, 2:])
+        height = self._height.set_command(memory.height, given[:, 2:])
         change, weight = given[:, 0:2] - memory.command_rad, self._height.command_weight(height)
         attitude = self._model.change_command(memory.attitude, change, weight)
         new = replace(memory, command_rad=given[:, 0:2], attitude=attitude, height=height)
@@ -95,6 +95,16 @@ class QuadraticController:
         height = self._height.set_thrust(memory.height, self._height.limited(given))
         self.memory = choose(good, replace(memory, height=height), memory)
         return np.where(good, Status.OK, Status.BAD_THRUST)
+
+    def set_position_measured(self, is_measured: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Tell the controllers whether a position is measured (n,); while none is, coarse gains correct.
+
+        Returns a status (n,). Raises ValueError without a guard in the settings.
+        """
+        if self._constants.guard is None:
+            raise ValueError("the settings have no guard")
+        self.memory = replace(self.memory, is_coarse=np.logical_not(is_measured))
+        return np.full(len(is_measured), Status.OK)
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; k is 7, or 11 with a height.
@@ -166,6 +176,10 @@ class QuadraticController:
             missed=np.full(n, self.parts.at_rest),
             height=height,
             height_bounds=height_bounds,
+            budget_rad=np.full_like(command_rad, budget.full)
+            if (budget := self.parts.tilt_budget)
+            else zeros,
+            is_coarse=np.zeros(n, np.bool_),
         )
 
     @property
@@ -208,10 +222,10 @@ class QuadraticController:
         columns = [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2]
         columns += [attitude.tilt, attitude.integral, attitude.lagged, attitude.command]
         columns += [attitude.sine[:, None], attitude.cosine[:, None]]
-        if self._constants.tracker is not None:
-            columns += [] if self._constants.tracker.is_given else [motion.velocity_m_s]
-            columns += [motion.acceleration_m_step2, motion.jerk_m_step2_update]
+        columns += self.parts.tracker.stored(motion) if self.parts.tracker else []
         columns += [*self._height.stored(memory.height), self.stored_limits]
         if self._constants.feedback_steps is not None:
             columns += [memory.tilt_rad]
+        if self._constants.guard is not None:
+            columns += [memory.budget_rad]
         return np.concatenate([*columns, memory.command_rad], axis=1)

@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, attitude_constants
+from mambo_codegen.methods.quadratic.guard_constants import guard_constants
 from mambo_codegen.methods.quadratic.height_constants import height_constants
 from mambo_codegen.methods.quadratic.height_formats import (
     learnt_m_s2,
@@ -29,7 +30,7 @@ from mambo_codegen.methods.quadratic.observer_constants import observer_constant
 from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import tracker_constants
-from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
+from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.sections import Sections
@@ -92,14 +93,21 @@ def formats(settings: Sections) -> QuadraticFormats:
         settings.damping,
         settings.limits,
         settings.height,
+        settings.guard,
         settings.ranges,
     )
 
 
+_SECTIONS: Final = (
+    *("horizon", "model", "target", "cost", "observer", "damping"),
+    *("limits", "height", "guard", "ranges"),
+)
+"""The sections that formats depend on."""
+
+
 @lru_cache(maxsize=64)
 def _formats(*sections: Any) -> QuadraticFormats:
-    names = ("horizon", "model", "target", "cost", "observer", "damping", "limits", "height", "ranges")
-    settings = Sections.model_construct(**dict(zip(names, sections, strict=True)))
+    settings = Sections.model_construct(**dict(zip(_SECTIONS, sections, strict=True)))
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, height = law_constants(settings), height_constants(settings)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
@@ -107,10 +115,15 @@ def _formats(*sections: Any) -> QuadraticFormats:
     ranges = settings.ranges
     loops = np.concatenate([attitude.tilt_row, attitude.integral_row])
     laws, gain, ratios = law.rows, observer.gain[np.newaxis], np.abs(law.ratios)
+    if observer.coarse_gain is not None:
+        gain = np.concatenate([gain, observer.coarse_gain[np.newaxis]])
     if height is not None:
         laws = np.concatenate([laws, np.insert(height.rows, STATES.index("i"), 0.0, axis=1)[np.newaxis]])
         loops = np.concatenate([loops, np.insert(height.thrust_row, 1, 0.0)[np.newaxis]])
-        gain, ratios = np.stack([observer.gain, height.gain]), np.append(ratios, abs(height.ratio))
+        gain, ratios = (
+            np.concatenate([gain, height.gain[np.newaxis]]),
+            np.append(ratios, abs(height.ratio)),
+        )
 
     position = fractional_bits(bounds.position)
     speed = fractional_bits(bounds.speed)
@@ -136,6 +149,8 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "ratio": fractional_bits(*ratios) if law.moves == 2 else 0,
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
+        "per_noise": fractional_bits(tracker.noise.steps2_per_m) if tracker and tracker.noise else 0,
+        "factor": FACTOR_BITS,
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
     shifts = {
@@ -148,7 +163,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
     learns_gain = height is not None and height.learns_gain
     rows = {name: gain[:, row] for row, name in enumerate(("position", "velocity", "disturbance"))}
     if learns_gain:
-        rows |= {"disturbance": gain[:1, 2], "gain": gain[1:, 2]}
+        rows |= {"disturbance": gain[:-1, 2], "gain": gain[-1:, 2]}
     kinds = {"position": "position", "velocity": "speed", "disturbance": "acceleration", "gain": "factor"}
     for name, row in rows.items():
         innovations = [bounds.states["innovation"], bounds.states["innovation_step"]]
@@ -211,7 +226,7 @@ def _bounds(settings: Sections) -> _Bounds:
 def _level_bounds(settings: Sections) -> _Bounds:
     """Return the bounds along right and forward, and of what the axes share."""
     attitude, observer = attitude_constants(settings), observer_constants(settings)
-    law = law_constants(settings)
+    law, guard = law_constants(settings), guard_constants(settings)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
     reach_m, speed, limit = settings.ranges.position_m, observer.velocity_limit_m_step, attitude.limit_m_step2
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
@@ -223,6 +238,8 @@ def _level_bounds(settings: Sections) -> _Bounds:
     explained = (_TURN * tilted) + observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
     innovation_step = (2 * speed) + (observer.age_steps * explained)
     corrections = np.abs(observer.gain) @ [innovation, innovation_step]
+    if observer.coarse_gain is not None:
+        corrections = np.maximum(corrections, np.abs(observer.coarse_gain) @ [innovation, innovation_step])
     corrected_m, corrected = reach_m + corrections[0], speed + corrections[1]
     unexplained = observer.disturbance_limit_m_step2 + (observer.drag_1_step * corrected)
     acceleration = (_TURN * tilted) + unexplained
@@ -256,10 +273,16 @@ def _level_bounds(settings: Sections) -> _Bounds:
             (3 * target) + (2 * jerk),
         ),
         move=move,
-        angle=(2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
-        * max([1.0, *(feedback_steps(settings) or ())])
-        + (2 * settings.limits.tilt_rad),
-        thrust_m_s2=settings.ranges.thrust_acceleration_max_m_s2,
+        angle=max(
+            (2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
+            * max([1.0, *(feedback_steps(settings) or ())])
+            + (2 * settings.limits.tilt_rad),
+            guard.tilt_rad + guard.tilt_growth_rad if guard else 0.0,
+        ),
+        thrust_m_s2=max(
+            settings.ranges.thrust_acceleration_max_m_s2,
+            guard.thrust_m_s2 + guard.thrust_growth_m_s2 if guard and settings.height else 0.0,
+        ),
         learnt_m_s2=max(settings.observer.disturbance_limit_m_s2, 0.001),
     )
 
@@ -300,8 +323,10 @@ def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int
         "aged_position": ("age", "speed", "position"),
         "aged_velocity": ("age", "acceleration", "speed"),
         "target_product": ("tracker", target_input, "acceleration"),
+        "noise_product": ("per_noise", "acceleration", "factor"),
+        "factor_product": ("factor", "acceleration", "acceleration"),
     }
-    unused = {name for name in ("drag", "age", "tracker") if not bits[name]}
+    unused = {name for name in ("drag", "age", "tracker", "per_noise") if not bits[name]}
     shifts = {
         name: bits[one] + bits[other] - bits[result]
         for name, (one, other, result) in factors.items()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.guard import Budget
 from mambo_codegen.methods.quadratic.height_constants import (
     COSINE_TERMS,
     FLOOR_MARGIN_M,
@@ -31,7 +32,8 @@ class HeightState:
     thrust, lagged, command: sa, sc, su of the model of the thrust in nmpc.c, m/step^2.
     target:      the motion of the target, (n, 1).
     share:       of the thrust that acts vertically: the cosine of the tilt.
-    thrust_m_s2: the last command.
+    thrust_m_s2: the last command, or what the motors were given in place of it.
+    commanded_m_s2, budget_m_s2: the last command, and how much it may vary; zeros without a guard.
     """
 
     height_m: Real
@@ -44,6 +46,8 @@ class HeightState:
     target: TargetMotion
     share: Real
     thrust_m_s2: Real
+    commanded_m_s2: Real
+    budget_m_s2: Real
 
 
 @dataclass(frozen=True)
@@ -64,19 +68,19 @@ class HeightBounds:
 class Lift:
     """What a step knows of the height of n controllers.
 
-    lies:   (n,) whether the drone lies on the floor.
-    weight: (n,) by how much more the measured tilt counts than in hover; None if no more.
+    on_ground: (n,) whether the drone lies on the floor.
+    weight:    (n,) by how much more the measured tilt counts than in hover; None if no more.
     """
 
     state: HeightState
-    lies: Rows
+    on_ground: Rows
     weight: Real | None
 
 
 def unknown_height(like: Real) -> HeightState:
     """Return zeros for the height of controllers, with the shape (n,) and the type of `like`."""
     no, still = np.zeros_like(like), unknown_motion(like[:, None])
-    return HeightState(no, no, no, no, no, no, no, still, no, no)
+    return HeightState(no, no, no, no, no, no, no, still, no, no, no, no)
 
 
 class HeightAxis:
@@ -115,6 +119,9 @@ class HeightAxis:
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._tracker = Tracker(found.tracker, products) if found.tracker else None
+        self._budget: Budget | None = None
+        if guard := constants.guard:
+            self._budget = Budget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
         age_steps = constants.observer.age_steps
         self._age = constant(age_steps, "age") if age_steps else None
         self._height_limit = constant(settings.ranges.position_m, "position")
@@ -160,6 +167,9 @@ class HeightAxis:
         """Return the height of drones with a steady thrust (n, 1) and the attitude of commands (n, 2)."""
         unknown, share = unknown_height(thrust_m_s2[:, 0]), self._cosine(command_rad)
         command = self._vertical(share, thrust_m_s2[:, 0])
+        if self._budget is not None:
+            full = np.full_like(command, self._budget.full)
+            unknown = replace(unknown, commanded_m_s2=thrust_m_s2[:, 0], budget_m_s2=full)
         return replace(
             unknown,
             gain=np.full_like(command, self._one),
@@ -179,12 +189,17 @@ class HeightAxis:
         thrust = thrust_m_s2[:, 0]
         return replace(state, command=self._vertical(state.share, thrust), thrust_m_s2=thrust)
 
+    def set_command(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
+        """Change the last commands to `thrust_m_s2` (n, 1), within the limits."""
+        changed = self.set_thrust(state, thrust_m_s2)
+        return changed if self._budget is None else replace(changed, commanded_m_s2=thrust_m_s2[:, 0])
+
     def observe(
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""
-        state, lies = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
-        return Lift(state, lies, self.weight(self.lift(state, state.thrust)))
+        state, on_ground = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
+        return Lift(state, on_ground, self.weight(self.lift(state, state.thrust)))
 
     def command_weight(self, state: HeightState) -> Real:
         """Return by how much more tilts (n,) count with the last command than in hover."""
@@ -204,16 +219,16 @@ class HeightAxis:
 
         tilt_rad (n, 2) compensates the thrust. Returns also which drones (n,) lie on the floor.
         """
-        lies = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
+        on_ground = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
         step = self._products.speed_product(measured[:, 1])
         first, share = has_state & none_yet, self._cosine(tilt_rad)
         started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
         lying = replace(started, velocity_m_step=np.zeros_like(step))
         found = choose(none_yet, started, self._correct(state, measured, step))
-        corrected = choose(has_state, choose(lies, lying, found), state)
-        flown = self._vertical(share, state.thrust_m_s2)
-        steady = replace(corrected, thrust=flown, lagged=flown, command=flown)
-        return replace(choose(first, steady, corrected), share=share), lies
+        corrected = choose(has_state, choose(on_ground, lying, found), state)
+        delivered = self._vertical(share, state.thrust_m_s2)
+        steady = replace(corrected, thrust=delivered, lagged=delivered, command=delivered)
+        return replace(choose(first, steady, corrected), share=share), on_ground
 
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
@@ -253,13 +268,17 @@ class HeightAxis:
         command = np.where(rests, least, command)
         thrust = products.factor_product(self._gravity + command, self._inverse("thrust", share))
         thrust = self.limited(products.thrust_product(self._steps2, thrust))
+        if self._budget is not None:
+            thrust, budget = self._budget.spend(state.budget_m_s2, state.commanded_m_s2, thrust)
+            thrust = self.limited(thrust)
+            state = replace(state, commanded_m_s2=thrust, budget_m_s2=budget)
         command = self._vertical(state.share, thrust)
         return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
-    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
         products = self._products
-        acceleration = np.where(lies, 0, self._acceleration(state))
+        acceleration = np.where(on_ground, 0, self._acceleration(state))
         mean = state.velocity_m_step + products.half_change(acceleration)
         velocity = state.velocity_m_step + products.velocity_change(acceleration)
         return replace(
@@ -364,8 +383,6 @@ class HeightAxis:
         columns += [state.gain] if self._found.learns_gain else []
         columns += [state.disturbance_m_step2] if self._found.learns_acceleration else []
         columns += [state.thrust, state.lagged, state.command, state.share, state.thrust_m_s2]
-        if self._tracker is not None:
-            motion = state.target
-            columns += [] if self._tracker.is_given else [motion.velocity_m_s[:, 0]]
-            columns += [motion.acceleration_m_step2[:, 0], motion.jerk_m_step2_update[:, 0]]
-        return [column[:, None] for column in columns]
+        columns += [] if self._budget is None else [state.commanded_m_s2, state.budget_m_s2]
+        stored = [column[:, None] for column in columns]
+        return stored if self._tracker is None else [*stored, *self._tracker.stored(state.target)]

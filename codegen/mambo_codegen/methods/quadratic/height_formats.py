@@ -8,11 +8,8 @@ import numpy as np
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants
 from mambo_codegen.methods.quadratic.height_constants import LEAST_WEIGHT, ROW_STATES, HeightConstants
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants
-from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
+from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-
-FACTOR_BITS = 26
-"""Format of the factors of the height, which are less than 32, intermediate results too."""
 
 GAIN_CHANGE = 2.0
 """Beyond any change of the learnt gain; a correction is limited to it."""
@@ -88,7 +85,6 @@ def vertical_bounds(
 def vertical_bits(height: HeightConstants) -> dict[str, int]:
     """Return the fractional bits of the height's own quantities."""
     return {
-        "factor": FACTOR_BITS,
         "per_gravity": fractional_bits(height.per_gravity),
         "reach": fractional_bits(height.reach_steps),
         "step2": fractional_bits(height.step2_s2),
@@ -104,7 +100,6 @@ def vertical_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "angle_square": (2 * bits["angle"]) - SINE_BITS,
         "step2_product": bits["step2"] + bits["thrust"] - bits["acceleration"],
         "thrust_product": bits["thrust_per_step2"] + bits["acceleration"] - bits["thrust"],
-        "factor_product": FACTOR_BITS,
         "to_factor": SINE_BITS - FACTOR_BITS,
     }
 

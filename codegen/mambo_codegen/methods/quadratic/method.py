@@ -12,14 +12,18 @@ from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.guard_constants import refusals as guard_refusals
 from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.step_choices import step_choices
+from mambo_codegen.methods.shared.arithmetic import INVERSE_BITS
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
+from mambo_codegen.methods.shared.tracker_constants import MOST_NOISE
+from mambo_codegen.numbers.fixed_point import FACTOR_BITS
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.key import Refusal
 
@@ -40,6 +44,7 @@ class Quadratic(QuadraticConstants, Method):
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
         "optimizer": "the minimum of the cost",
+        "guard": "how much the commands may vary",
         "height": "the third axis, whose command is the thrust",
         "limits": "speed, braking and place",
         "step": "a control step",
@@ -63,7 +68,7 @@ class Quadratic(QuadraticConstants, Method):
     def refusals(self) -> list[Refusal]:
         """Return why a controller with a quadratic cost cannot have the settings."""
         settings = self.settings
-        refused = law.refusals(settings) or height_refusals(settings)
+        refused = law.refusals(settings) or height_refusals(settings) or guard_refusals(settings)
         return refused or (formats.refusals(settings) if settings.code.scalar == "fixed" else [])
 
     def reference_controller(self, n: int = 1) -> QuadraticController:
@@ -101,7 +106,7 @@ class Quadratic(QuadraticConstants, Method):
     def instance_bytes(self) -> int:
         """The size of nmpc_t: its numbers and single bytes, with padding."""
         number_bytes, _ = self.numbers.bytes
-        flags = 1 + (self.tracker is not None) + (self.limiting is not None)
+        flags = 1 + sum(part is not None for part in (self.tracker, self.limiting, self.guard))
         return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
 
     @property
@@ -137,6 +142,11 @@ class Quadratic(QuadraticConstants, Method):
             "law": self.law,
             **height_context(self.height),
             "gain_change": GAIN_CHANGE,
+            "guard": self.guard,
+            "factor_bits": FACTOR_BITS,
+            "inverse_bits": INVERSE_BITS,
+            "most_noise": MOST_NOISE,
+            "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),
             "stored_quantities": self.stored,
             "row_quantities": ROW,
@@ -166,6 +176,14 @@ def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: flo
     return loop[np.ix_(kept, kept)]
 
 
+def _observer_gain_names(constants: QuadraticConstants) -> list[str]:
+    """Return the names that the gains of the observer have in the C, row by row."""
+    rows = ("POSITION", "VELOCITY", "DISTURBANCE")
+    if constants.guard is None:
+        return [f"NMPC_{row}_BY_{by}" for row in rows for by in rows[:2]]
+    return [f"observer_gains[which][{row}][{column}]" for row in range(3) for column in range(2)]
+
+
 def _number_macro(shift: int) -> str:
     """Return the macro of the C that shifts a sum by so many bits to a number."""
     names = ((32, "NMPC_NUMBER_ABOVE"), (17, "NMPC_NUMBER_BELOW"), (0, "(nmpc_real_t)NMPC_ROUNDED"))
@@ -193,6 +211,7 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
 
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
+    tells_noise = constants.guard is not None and constants.tracker is not None
     wanted = {
         "speed_product": True,
         "tilt_product": True,
@@ -205,9 +224,11 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
         "feedback_product": constants.feedback_steps is not None,
         "ratio_product": constants.law.moves > 1,
         **dict.fromkeys(
-            ("reach_product", "gravity_product", "step2_product", "thrust_product", "factor_product"),
+            ("reach_product", "gravity_product", "step2_product", "thrust_product"),
             constants.has_height,
         ),
+        "factor_product": constants.has_height or tells_noise,
+        "noise_product": tells_noise,
         "target_product": constants.tracker is not None,
         "tracker_product": constants.tracker is not None,
     }

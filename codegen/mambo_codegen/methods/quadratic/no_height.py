@@ -34,10 +34,12 @@ class NoHeight:
         """Return the thrusts (n, 0)."""
         return thrust_m_s2
 
-    def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
+    def set_command(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
         """Return zeros."""
         del thrust_m_s2
         return state
+
+    set_thrust = set_command
 
     def observe(
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
@@ -56,9 +58,9 @@ class NoHeight:
         del target, measured, bounds
         return state, np.zeros_like(follows)
 
-    def predict(self, state: HeightState, lies: Rows) -> HeightState:
+    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Return zeros."""
-        del lies
+        del on_ground
         return state
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:

@@ -1,11 +1,14 @@
 """Observer: position, velocity and disturbance, by a Kalman filter with fixed gains."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real, clamp
 
 
@@ -24,16 +27,19 @@ class KalmanObserver:
     def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic) -> None:
         constant, observer = arithmetic.numbers.constant, constants.observer
         self._products = arithmetic
-        self._gain = [
-            [constant(observer.gain[row][column], name) for column, name in enumerate(names)]
-            for row, names in enumerate(
-                (
-                    ("position_by_position", "position_by_velocity"),
-                    ("velocity_by_position", "velocity_by_velocity"),
-                    ("disturbance_by_position", "disturbance_by_velocity"),
-                )
-            )
-        ]
+
+        def numbers(gain: NDArray[np.float64]) -> list[list[Any]]:
+            return [
+                [
+                    constant(value, f"{name}_by_{by}")
+                    for value, by in zip(row, ("position", "velocity"), strict=True)
+                ]
+                for row, name in zip(gain, ("position", "velocity", "disturbance"), strict=True)
+            ]
+
+        self._gain = numbers(observer.gain)
+        coarse = observer.coarse_gain
+        self._coarse_gain = self._gain if coarse is None else numbers(coarse)
         self._position_limit = constant(constants.settings.ranges.position_m, "position")
         self._velocity_limit = constant(observer.velocity_limit_m_step, "speed")
         self._disturbance_limit = constant(observer.disturbance_limit_m_step2, "acceleration")
@@ -55,8 +61,11 @@ class KalmanObserver:
         drag = self._products.drag_product(self._drag, estimate.velocity_m_step)
         return np.asarray(estimate.disturbance_m_step2 - drag)
 
-    def correct(self, estimate: Estimate, state: Real, tilt_m_step2: Real) -> Estimate:
-        """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y."""
+    def correct(self, estimate: Estimate, state: Real, tilt_m_step2: Real, is_coarse: Rows) -> Estimate:
+        """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y.
+
+        is_coarse (n,): whether no position is measured, so that the coarse gains count.
+        """
         products = self._products
         position, velocity = estimate.position_m, estimate.velocity_m_step
         measured = state[:, 0:2]
@@ -66,15 +75,22 @@ class KalmanObserver:
             measured = measured + products.aged_position(self._age, velocity)
             measured_step = measured_step + products.aged_velocity(self._age, acceleration)
         by_position, by_velocity = measured - position, measured_step - velocity
+        coarse = is_coarse[:, None]
         corrections = [
-            product(gain[0], by_position, gain[1], by_velocity)
-            for product, gain in zip(
+            product(
+                np.where(coarse, other[0], gain[0]),
+                by_position,
+                np.where(coarse, other[1], gain[1]),
+                by_velocity,
+            )
+            for product, gain, other in zip(
                 (
                     products.position_correction,
                     products.velocity_correction,
                     products.disturbance_correction,
                 ),
                 self._gain,
+                self._coarse_gain,
                 strict=True,
             )
         ]

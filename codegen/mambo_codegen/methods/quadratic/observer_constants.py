@@ -20,6 +20,7 @@ class ObserverConstants:
 
     gain:                  (3, 2) corrections of position, velocity and disturbance by the innovations of
                            position and velocity.
+    coarse_gain:           the same while no position is measured; None without a guard.
     disturbance_limit_m_step2: largest disturbance.
     velocity_limit_m_step: largest velocity, that of the input range.
     drag_1_step:           acceleration by drag per velocity.
@@ -29,6 +30,7 @@ class ObserverConstants:
     """
 
     gain: NDArray[np.float64]
+    coarse_gain: NDArray[np.float64] | None
     disturbance_limit_m_step2: float
     velocity_limit_m_step: float
     drag_1_step: float
@@ -44,6 +46,7 @@ def observer_constants(settings: Sections) -> ObserverConstants:
     period_s = Fraction(update_s)
     return ObserverConstants(
         gain=observer_gain(settings, observer.disturbance_noise),
+        coarse_gain=_coarse_gain(settings),
         disturbance_limit_m_step2=float(Fraction(observer.disturbance_limit_m_s2) * period_s**2),
         velocity_limit_m_step=float(Fraction(settings.ranges.velocity_m_s) * period_s),
         drag_1_step=float(Fraction(settings.model.drag_1_s) * period_s),
@@ -54,16 +57,19 @@ def observer_constants(settings: Sections) -> ObserverConstants:
     )
 
 
-def observer_gain(settings: Sections, disturbance_noise: float) -> NDArray[np.float64]:
+def observer_gain(
+    settings: Sections, disturbance_noise: float, position_noise: float | None = None
+) -> NDArray[np.float64]:
     """Return the gain (3, 2) of the stationary Kalman filter, for velocities in m/step and so on.
 
-    `disturbance_noise` is that along the axis; the other noises are those of all axes.
+    `disturbance_noise` is that along the axis, `position_noise` in place of observer.position_noise; the
+    other noises are those of all axes.
     """
     observer, period_s = settings.observer, settings.horizon.update_period_s
     noise = (
         observer.acceleration_noise,
         disturbance_noise,
-        observer.position_noise,
+        position_noise or observer.position_noise,
         observer.velocity_noise,
     )
 
@@ -73,3 +79,11 @@ def observer_gain(settings: Sections, disturbance_noise: float) -> NDArray[np.fl
         return solve_observer(period_s, noise)
 
     return np.array(keep("observer", (period_s, noise), solve))
+
+
+def _coarse_gain(settings: Sections) -> NDArray[np.float64] | None:
+    """Return the gain (3, 2) while no position is measured; None without a guard."""
+    if settings.guard is None:
+        return None
+    noise = max(settings.guard.position_noise, settings.observer.position_noise)
+    return observer_gain(settings, settings.observer.disturbance_noise, noise)

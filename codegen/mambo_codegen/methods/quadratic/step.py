@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.guard import Budget
 from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, HeightState, Lift
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
@@ -27,7 +28,8 @@ class QuadraticMemory:
     """State of n controllers between two steps.
 
     tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state.
-    height_bounds is None unless there are limits and a height.
+    height_bounds is None unless there are limits and a height. budget_rad (n, 2) is how much the commands may
+    vary, is_coarse (n,) whether no position is measured; zeros without a guard.
     """
 
     estimate: Estimate
@@ -39,6 +41,8 @@ class QuadraticMemory:
     missed: NDArray[np.int64]
     height: HeightState
     height_bounds: HeightBounds | None
+    budget_rad: Real
+    is_coarse: Rows
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,9 @@ class ControlStep:
         self.height: HeightAxis | NoHeight = NoHeight(constants)
         if constants.height:
             self.height = HeightAxis(constants, constants.height, products)
+        self.tilt_budget: Budget | None = None
+        if guard := constants.guard:
+            self.tilt_budget = Budget(products, guard.tilt_rad, guard.tilt_growth_rad, "angle")
         self._feedback = constants.feedback_steps and np.array(
             [constant(steps, "feedback") for steps in constants.feedback_steps]
         )
@@ -109,10 +116,10 @@ class ControlStep:
         lift = self.height.observe(memory.height, inputs.state[:, 7:10], tilt_rad, has_state, none_yet)
         tilt = np.where(seen, self.model.measure(angles, lift.weight), attitude.tilt)
         world = self._to_world(attitude, tilt)
-        estimate = self._observe(memory.estimate, inputs, none_yet, world)
+        estimate = self._observe(memory, inputs, none_yet, world)
         aim = self._aim(memory, inputs, lift, estimate)
         moves = self._minimize(attitude, estimate, aim, tilt)
-        attitude, command = self._command(memory, inputs, attitude, moves, aim)
+        attitude, command, budget = self._command(memory, inputs, attitude, moves, aim)
         return QuadraticMemory(
             estimate=self.observer.predict(estimate, world),
             attitude=attitude,
@@ -121,8 +128,10 @@ class ControlStep:
             tilt_rad=np.where(seen, angles, memory.tilt_rad),
             command_rad=command,
             missed=aim.missed,
-            height=self.height.predict(aim.height, lift.lies),
+            height=self.height.predict(aim.height, lift.on_ground),
             height_bounds=memory.height_bounds,
+            budget_rad=budget,
+            is_coarse=memory.is_coarse,
         )
 
     def _turn(self, attitude: AttitudeState, inputs: CheckedInputs, none_yet: Rows) -> AttitudeState:
@@ -136,12 +145,15 @@ class ControlStep:
         )
         return choose(inputs.has_state, measured, attitude)
 
-    def _observe(self, estimate: Estimate, inputs: CheckedInputs, none_yet: Rows, world: Real) -> Estimate:
+    def _observe(
+        self, memory: QuadraticMemory, inputs: CheckedInputs, none_yet: Rows, world: Real
+    ) -> Estimate:
         """Return the estimates after the measurement; world (n, 2) is the acceleration of the tilt."""
+        estimate, state = memory.estimate, inputs.state
         corrected = choose(
             none_yet,
-            self.observer.start(estimate, inputs.state),
-            self.observer.correct(estimate, inputs.state, world),
+            self.observer.start(estimate, state),
+            self.observer.correct(estimate, state, world, memory.is_coarse),
         )
         return choose(inputs.has_state, corrected, estimate)
 
@@ -155,7 +167,7 @@ class ControlStep:
         missed = self._count(memory.missed, inputs.has_state)
         columns, follows = self._level_columns, inputs.allows_command & (missed < self._no_estimate)
         level, upward = inputs.target[:, :columns], inputs.target[:, columns:]
-        height, acts = self.height.aim(
+        height, limit_active = self.height.aim(
             lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
         limits, motion, target = self.limits.aim(
@@ -167,19 +179,19 @@ class ControlStep:
         aim = _Aim(target, motion, limits, height, weight, missed, has_command=follows, rests=follows & False)
         if not self.limits.brake:
             return aim
-        return self._end_outage(aim, estimate, acts)
+        return self._end_outage(aim, estimate, limit_active)
 
-    def _end_outage(self, aim: _Aim, estimate: Estimate, acts: Rows) -> _Aim:
+    def _end_outage(self, aim: _Aim, estimate: Estimate, limit_active: Rows) -> _Aim:
         """Brake by the model's velocity where an outage lasts too long, until the model is at rest.
 
-        acts (n,): whether a limit of the height acts.
+        limit_active (n,): whether a limit of the height acts.
         """
         overdue = aim.missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = overdue & ~slow, overdue & slow
         stopped = np.concatenate([estimate.position_m, np.zeros_like(aim.target[:, 2:])], axis=1)
         active = np.where(brakes, ActiveLimit.BRAKING, np.where(rests, 0, aim.limits.active))
-        active = (active & ~ActiveLimit.HEIGHT) + np.where(acts, ActiveLimit.HEIGHT, 0)
+        active = (active & ~ActiveLimit.HEIGHT) + np.where(limit_active, ActiveLimit.HEIGHT, 0)
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),
@@ -198,8 +210,8 @@ class ControlStep:
         attitude: AttitudeState,
         moves: Real,
         aim: _Aim,
-    ) -> tuple[AttitudeState, Real]:
-        """Return the models with the next commands, and roll and pitch (n, 2) that are sent for them."""
+    ) -> tuple[AttitudeState, Real, Real]:
+        """Return the models with the next commands, roll and pitch (n, 2) that are sent, and the budgets."""
         moved = replace(attitude, command=self.products.move_acceleration(moves))
         command = self._angles(moved.command, aim.weight)
         held, tilt_limit = memory.command_rad, memory.limits.bounds.tilt_rad[:, None]
@@ -208,10 +220,17 @@ class ControlStep:
             command = np.where(fed, command + self._rate_feedback(memory, inputs), command)
             without = clamp(self._angles(attitude.command, aim.weight), tilt_limit)
             held = np.where(fed & (memory.missed == 0)[:, None], without, held)
-        command = np.where(aim.has_command[:, None], clamp(command, tilt_limit), held)
+        command, budget = clamp(command, tilt_limit), memory.budget_rad
+        if self.tilt_budget is not None:
+            wanted = command
+            command, left = self.tilt_budget.spend(budget, memory.command_rad, wanted)
+            command, budget = clamp(command, tilt_limit), np.where(aim.has_command[:, None], left, budget)
+            told = self.model.change_command(moved, command - wanted, aim.weight)
+            moved = choose((command != wanted).any(axis=1), told, moved)
+        command = np.where(aim.has_command[:, None], command, held)
         attitude, level = choose(aim.has_command, moved, attitude), np.zeros_like(command)
         attitude = choose(aim.rests, self.model.set_command(attitude, level, aim.weight), attitude)
-        return attitude, np.where(aim.rests[:, None], level, command)
+        return attitude, np.where(aim.rests[:, None], level, command), budget
 
     def _rate_feedback(self, memory: QuadraticMemory, inputs: CheckedInputs) -> Real:
         """Return what the change of the measured angles since the last step adds to commands (n, 2)."""

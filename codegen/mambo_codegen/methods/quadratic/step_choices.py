@@ -34,9 +34,9 @@ class StepChoices:
     goal, follows: the variable for the target, and the condition that a step may follow it.
     most_right, most_forward: the largest moves.
     tilt:       the tilt from which the optimizer starts.
-    limiter, tilt_limit: the function that saturates a command, and the limit.
+    limiter, tilt_limit: the function that clamps a command, and the limit.
     fed:        the angles with rate feedback.
-    limited:    the angles that a step without limits saturates.
+    limited:    the angles that a step without limits clamps.
     held:       the statement of a step with limits that holds the last command.
     cleared:    the calls that forget the target after an outage.
     rested:     the members of the target that stands for rest.
@@ -100,7 +100,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         most_right="bounds->command_m_step2[NMPC_RIGHT]" if has_limits else "NMPC_RIGHT_LIMIT_M_STEP2",
         most_forward="bounds->command_m_step2[NMPC_FORWARD]" if has_limits else "NMPC_FORWARD_LIMIT_M_STEP2",
         tilt="attitude->tilt_m_step2" if constants.settings.model.attitude == "predicted" else "tilt_m_step2",
-        limiter="saturate" if has_height else "clamp",
+        limiter="shared_clamp" if has_height else "clamp",
         tilt_limit="self->bounds.tilt_rad" if has_limits else "NMPC_TILT_LIMIT_RAD",
         angles=angles,
         fed=fed,
@@ -110,7 +110,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         rested=target_members(constants),
         target_motion="acceleration_m_s2" if is_given else "velocity_m_s",
         closing=(
-            *(("height_predict(height, lies)",) if has_height else ()),
+            *(("height_predict(height, on_ground)",) if has_height else ()),
             *(f"self->{part} = own_{part}" for part in own),
         ),
     )
@@ -122,9 +122,9 @@ def _angle(index: int, name: str, axis: str, feedback: float) -> Angle:
 
 
 def _locals(*, has_height: bool, has_limits: bool) -> tuple[str, ...]:
-    names = ["nmpc_real_t weight", "nmpc_real_t inverse", "const nmpc_target_t *good", "int lies = 0"]
+    names = ["nmpc_real_t weight", "nmpc_real_t inverse", "const nmpc_target_t *good", "int on_ground = 0"]
     found = names if has_height else []
-    found += ["int acts"] if has_height and has_limits else []
+    found += ["int limit_active"] if has_height and has_limits else []
     return (*found, *(("nmpc_target_t limited", "const nmpc_target_t *aim = NULL") if has_limits else ()))
 
 

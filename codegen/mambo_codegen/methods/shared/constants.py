@@ -59,6 +59,11 @@ class Constants(ABC):
         return tracker_constants(self.settings, self.step_s)
 
     @property
+    def guard(self) -> object | None:
+        """The constants of the guard; None without one."""
+        return None
+
+    @property
     def climb_tracker(self) -> TrackerConstants | None:
         """The constants of the tracker of the target's height; None without one."""
         return None

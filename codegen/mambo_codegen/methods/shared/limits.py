@@ -312,11 +312,11 @@ class LimitsLaw:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
         memory, fastest = self._turn_speed(memory, target[:, 2:4])
         desired, active = self._desire(memory.bounds, fastest, position, target)
-        acts = (active != 0)[:, None]
-        velocity = np.where(acts, desired, target[:, 2:4])
-        columns = [np.where(acts, position, target[:, 0:2]), velocity]
+        limit_active = (active != 0)[:, None]
+        velocity = np.where(limit_active, desired, target[:, 2:4])
+        columns = [np.where(limit_active, position, target[:, 0:2]), velocity]
         if self.is_given:
-            columns.append(np.where(acts, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
+            columns.append(np.where(limit_active, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
             memory = replace(memory, velocity_m_s=velocity)
         return replace(memory, active=active), np.concatenate(columns, axis=1)
 

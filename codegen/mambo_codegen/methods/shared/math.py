@@ -68,13 +68,13 @@ def rounded(product: Real, bits: int) -> Real:
 
 
 def clamp(values: Real, limit: Any) -> Real:
-    """Saturate `values` at plus or minus `limit`, with the comparisons of the C."""
+    """Clamp `values` at plus or minus `limit`, with the comparisons of the C."""
     clamped: Real = np.where(values > limit, limit, np.where(values < -limit, -limit, values))
     return clamped
 
 
 def confine(values: Real, low: Any, high: Any) -> Real:
-    """Saturate `values` at `low` and `high`, with the comparisons of the C."""
+    """Clamp `values` at `low` and `high`, with the comparisons of the C."""
     limited = np.where(values > high, high, values)
     confined: Real = np.where(limited < low, low, limited)
     return confined

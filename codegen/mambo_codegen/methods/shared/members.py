@@ -23,5 +23,20 @@ def limits_members(constants: Constants) -> tuple[str, ...]:
     return (*level, "floor_m", "ceiling_m", "climb_m_s", "descent_m_s") if constants.has_height else level
 
 
+def bounds_members(constants: Constants) -> dict[str, int]:
+    """Return the members of nmpc_bounds_t, and how many numbers each holds."""
+    is_given = constants.tracker is not None and constants.tracker.is_given
+    is_turning = constants.limiting is not None and constants.limiting.turn_m_s_rad is not None
+    return {
+        "centre_m": 2,
+        "clear_m": 2,
+        **dict.fromkeys(("margin_m", "knee_m", "near_m", "speed_m_s", "braking_m_s2", "tilt_rad"), 1),
+        **({"command_m_step2": 2} if constants.settings.cost.norm == "quadratic" else {}),
+        **({"velocity_m_s": 2} if is_given else {}),
+        **({"target_m_s": 2, "turn_m2_s2": 1} if is_turning else {}),
+        **(dict.fromkeys(("floor_m", "ceiling_m", "up_m", "down_m"), 1) if constants.has_height else {}),
+    }
+
+
 def _pairs(*names: str) -> tuple[str, ...]:
     return tuple(f"{name}[{axis}]" for name in names for axis in range(2))

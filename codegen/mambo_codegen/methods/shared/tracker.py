@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.shared.arithmetic import Arithmetic
 from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
+from mambo_codegen.methods.shared.tracker_constants import TargetNoise, TrackerConstants
 
 
 @dataclass(frozen=True)
@@ -17,19 +17,58 @@ class TargetMotion:
     velocity_m_s:         (n, 2) velocity along x, y in the last good step; 0 if the acceleration is given.
     acceleration_m_step2: (n, 2) tau^2 times the estimated acceleration.
     jerk_m_step2_update:  (n, 2) estimated change of that from one control step to the next.
+    deviation:            (n, 2) what was new of the acceleration in the last step, over the most that counts.
+    reversal:             (n, 2) mean product of successive deviations of opposite sign. 0 without a guard.
     is_known:             (n,) whether there was a good step.
     """
 
     velocity_m_s: Real
     acceleration_m_step2: Real
     jerk_m_step2_update: Real
+    deviation: Real
+    reversal: Real
     is_known: NDArray[np.bool_]
 
 
 def unknown_motion(like: Real) -> TargetMotion:
     """Return the motion before the first step, with the shape (n, 2) and the type of `like`."""
     zeros = np.zeros_like(like)
-    return TargetMotion(zeros, zeros, zeros, np.zeros(len(like), np.bool_))
+    return TargetMotion(zeros, zeros, zeros, zeros, zeros, np.zeros(len(like), np.bool_))
+
+
+class TargetNoiseShare:
+    """The share of what is new that a tracker believes: the less, the more it reverses its sign."""
+
+    def __init__(self, noise: TargetNoise, constants: TrackerConstants, arithmetic: Arithmetic) -> None:
+        constant = arithmetic.numbers.constant
+        self._arithmetic = arithmetic
+        self._per_noise = constant(noise.steps2_per_m, "per_noise")
+        self._limit = constant(noise.limit_m_step2, "acceleration")
+        self._share, self._rest = constant(noise.share, "factor"), constant(1 - noise.share, "factor")
+        self._whole = constant(1.0, "factor")
+        self._bound = constant(constants.acceleration_bound_m_step2, "acceleration")
+
+    def update(self, deviation: Real, reversal: Real, difference: Real) -> tuple[Real, Real, Real]:
+        """Return deviations and reversals after what is new of accelerations (n, 2), and the shares."""
+        product = self._arithmetic.factor_product
+        new = self._arithmetic.noise_product(self._per_noise, clamp(difference, self._limit))
+        both = product(new, deviation)
+        latest = np.where(both < 0, -both, np.zeros_like(both))
+        mean = clamp(product(self._rest, reversal) + product(self._share, latest), self._whole)
+        return new, mean, self._arithmetic.noise_share(mean)
+
+    def believe(self, difference: Real, share: Real) -> Real:
+        """Return a share (n, 2) of accelerations (n, 2)."""
+        return self._arithmetic.factor_product(difference, share)
+
+    def fade(self, predicted: Real, share: Real) -> Real:
+        """Return accelerations or jerks (n, 2), the nearer to 0 the less of what is new is believed."""
+        product, unbelieved = self._arithmetic.factor_product, self._whole - share
+        return product(predicted, self._whole - product(self._share, product(unbelieved, unbelieved)))
+
+    def limited(self, acceleration: Real) -> Real:
+        """Return accelerations (n, 2) within their bound, which none exceeds but by rounding."""
+        return clamp(acceleration, self._bound)
 
 
 class Tracker:
@@ -46,6 +85,13 @@ class Tracker:
         self._gain = constant(constants.gain, "sine")
         self._rest = constant(1 - constants.gain, "sine")
         self._jerk_gain = constant(constants.jerk_gain, "sine")
+        self._noise = TargetNoiseShare(constants.noise, constants, arithmetic) if constants.noise else None
+
+    def stored(self, motion: TargetMotion) -> list[Real]:
+        """Return the columns (n, k) that nmpc_t stores of motions, in their order."""
+        velocity = [] if self.is_given else [motion.velocity_m_s]
+        noise = [motion.deviation, motion.reversal] if self._noise else []
+        return [*velocity, motion.acceleration_m_step2, motion.jerk_m_step2_update, *noise]
 
     def update(self, motion: TargetMotion, given: Real) -> TargetMotion:
         """Take what the tracker reads of the target (n, 2) in a control step into the estimates.
@@ -64,11 +110,20 @@ class Tracker:
             measured = self._arithmetic.target_product(self._factor, change)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
-        acceleration = product(self._rest, predicted) + product(self._gain, measured)
-        jerk = clamp(motion.jerk_m_step2_update + product(self._jerk_gain, difference), self._jerk_limit)
+        jerk, deviation, reversal = motion.jerk_m_step2_update, motion.deviation, motion.reversal
+        if self._noise is None:
+            acceleration = product(self._rest, predicted) + product(self._gain, measured)
+        else:
+            deviation, reversal, share = self._noise.update(deviation, reversal, difference)
+            difference = self._noise.believe(difference, share)
+            predicted, jerk = (self._noise.fade(given, share) for given in (predicted, jerk))
+            acceleration = self._noise.limited(predicted + product(self._gain, difference))
+        jerk = clamp(jerk + product(self._jerk_gain, difference), self._jerk_limit)
         return TargetMotion(
             velocity_m_s=velocity,
             acceleration_m_step2=np.where(steady, acceleration, at_first),
             jerk_m_step2_update=np.where(steady, jerk, np.zeros_like(jerk)),
+            deviation=np.where(steady, deviation, motion.deviation),
+            reversal=np.where(steady, reversal, motion.reversal),
             is_known=np.ones_like(motion.is_known),
         )

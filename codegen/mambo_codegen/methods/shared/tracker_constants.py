@@ -16,6 +16,26 @@ JUMP_MARGIN: Final = 1.5
 JERK_SHARE: Final = 0.1
 """The largest estimated jerk, per update, as a share of the largest acceleration."""
 
+MOST_NOISE: Final = 16
+"""What is new of the target's acceleration counts up to this many times its noise."""
+
+NOISE_MEMORY_S: Final = 0.5
+"""The time over which a guard averages how much the target's motion reverses."""
+
+
+@dataclass(frozen=True)
+class TargetNoise:
+    """Constants of a target's noise, float64.
+
+    limit_m_step2: what is new of the target's acceleration counts up to this, MOST_NOISE times its noise.
+    steps2_per_m:  1 over that.
+    share:         of the latest reversal in their mean.
+    """
+
+    limit_m_step2: float
+    steps2_per_m: float
+    share: float
+
 
 @dataclass(frozen=True)
 class TrackerConstants:
@@ -28,6 +48,7 @@ class TrackerConstants:
     acceleration_limit_m_step2: the acceleration of the largest input, M.
     jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
     gain, jerk_gain: alpha and beta.
+    noise: that of the guard; None without one.
     """
 
     is_given: bool
@@ -37,6 +58,7 @@ class TrackerConstants:
     jerk_limit_m_step2_update: float
     gain: float
     jerk_gain: float
+    noise: TargetNoise | None
 
     @property
     def acceleration_bound_m_step2(self) -> float:
@@ -82,4 +104,16 @@ def tracker_constants(
         jerk_limit_m_step2_update=JERK_SHARE * acceleration_m_step2,
         gain=gain,
         jerk_gain=gain * gain / (2 - gain),
+        noise=_target_noise(settings, step_s),
+    )
+
+
+def _target_noise(settings: Sections, step_s: float) -> TargetNoise | None:
+    if settings.guard is None:
+        return None
+    limit_m_step2 = MOST_NOISE * settings.guard.target_noise_m_s2 * step_s * step_s
+    return TargetNoise(
+        limit_m_step2=limit_m_step2,
+        steps2_per_m=1 / limit_m_step2,
+        share=min(settings.horizon.update_period_s / NOISE_MEMORY_S, 1.0),
     )

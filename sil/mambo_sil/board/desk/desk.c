@@ -103,12 +103,16 @@ int consolePrintf(const char *format, ...)
 
 /* Variables by name: those of what surrounds the app, and the app's own. */
 
-static float variances[2];
+static float variances[6];
 static float target_m[3];
 
 static const struct variable LOGGED[] = {
     { LOG_FLOAT, "kalman.varX", &variances[0] },
     { LOG_FLOAT, "kalman.varPX", &variances[1] },
+    { LOG_FLOAT, "kalman.varZ", &variances[2] },
+    { LOG_FLOAT, "kalman.varD0", &variances[3] },
+    { LOG_FLOAT, "kalman.varD1", &variances[4] },
+    { LOG_FLOAT, "kalman.varD2", &variances[5] },
     { LOG_FLOAT, "stateEstimate.x", &estimate.position.x },
     { LOG_FLOAT, "stateEstimate.y", &estimate.position.y },
     { LOG_FLOAT, "stateEstimate.z", &estimate.position.z },
@@ -294,6 +298,10 @@ static void externalize(void)
     estimate.attitude = (attitude_t){ now_ms, (float)(DEGREES * angles_rad[0]), (float)(DEGREES * angles_rad[1]), (float)(DEGREES * angles_rad[2]) };
     variances[0] = (float)filter.variance[0][0];
     variances[1] = (float)filter.variance[3][3];
+    variances[2] = (float)filter.variance[2][2];
+    for (int k = 0; k < 3; k++) {
+        variances[3 + k] = (float)filter.variance[6 + k][6 + k];
+    }
 }
 
 /* The supervisor: what the age of the set-point, the thrust and the attitude allow. */
@@ -444,6 +452,8 @@ void desk_jump(const double wanted_m[3], int frames)
     memcpy(jump_m, wanted_m, sizeof jump_m);
     jumping_frames = frames;
 }
+
+void desk_switch(int to) { flight.sensors = to; }
 
 void desk_kick(const double velocity_m_s[3])
 {

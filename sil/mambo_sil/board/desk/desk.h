@@ -60,6 +60,9 @@ void desk_go_to(const double position_m[3], double yaw_rad, double duration_s);
 /* Whether the camera, or the flow deck, measures. */
 void desk_measure(int is_on);
 
+/* Let DESK_MOCAP or DESK_FLOW_DECK measure from now on. */
+void desk_switch(int to);
+
 /* Let the camera's next frames be off by a jump; one that is not a number is a frame that is not. */
 void desk_jump(const double jump_m[3], int frames);
 

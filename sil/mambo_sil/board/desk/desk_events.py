@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from mambo_sil.board.desk.desk_flight import Desk
-from mambo_sil.board.desk.events_file import EventSection, EventsFile, MeasureName
+from mambo_sil.board.desk.events_file import SENSORS, EventSection, EventsFile, MeasureName
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.trajectories import CURVES, vertical_of
@@ -111,6 +111,8 @@ class _Flight:
         desk, vector = self.desk, event.vector
         if event.do in ("sensors-on", "sensors-off"):
             desk.measure(on=event.do == "sensors-on")
+        elif event.do == "switch":
+            desk.switch(SENSORS[event.sensors])
         elif event.do in ("radio-on", "radio-off"):
             self._sends = event.do == "radio-on" and self._period_ms > 0
         elif event.do == "jump":

@@ -145,6 +145,10 @@ class Desk:
         """Let the camera, or the flow deck, measure, or not."""
         self._c.desk_measure(on)
 
+    def switch(self, sensors: DeskSensors) -> None:
+        """Let the cameras or the flow deck measure from now on."""
+        self._c.desk_switch(sensors)
+
     def jump(self, jump_m: Three, frames: int) -> None:
         """Let the camera's next frames be off by a jump, which may be NaN."""
         self._c.desk_jump(self._vector(jump_m), frames)

@@ -89,6 +89,7 @@ class EventSection(FileSection):
     do: Literal[
         "sensors-off",
         "sensors-on",
+        "switch",
         "jump",
         "nan",
         "kick",
@@ -101,6 +102,8 @@ class EventSection(FileSection):
     name: str = ""
     """Parameter of the app to set, such as "tilt"."""
     value: float | Literal["nan"] = 0.0
+    sensors: SensorsKind = "mocap"
+    """What measures from now on."""
     vector: _Vector = (0.0, 0.0, 0.0)
     """Jump or place in m, kick in m/s."""
     frames: int = Field(1, ge=1, le=1000)

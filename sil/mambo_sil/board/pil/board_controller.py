@@ -72,23 +72,23 @@ class BoardInputs:
         return step
 
 
-class ToldThrust:
-    """The thrust of the next step of a controller on a board: that of the call, or told with a height."""
+class ReportedThrust:
+    """The thrust of a board's next step: the one of the call, or with a height the reported one."""
 
     def __init__(self) -> None:
-        self._told: ArrayLike = np.array([np.nan])
+        self._reported: ArrayLike = np.array([np.nan])
 
     def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
         """Tell which thrust over mass (1,) the drone got in place of the last command."""
-        self._told = thrust_m_s2
+        self._reported = thrust_m_s2
 
     def inputs(self, state: ArrayLike, target: ArrayLike, thrust_m_s2: ArrayLike | None) -> BoardInputs:
         """Return the inputs of the next step, whose thrust is None with a height."""
-        told, self._told = self._told, np.array([np.nan])
-        return BoardInputs(state, target, told if thrust_m_s2 is None else thrust_m_s2)
+        reported, self._reported = self._reported, np.array([np.nan])
+        return BoardInputs(state, target, reported if thrust_m_s2 is None else thrust_m_s2)
 
 
-class BoardController(ToldThrust):
+class BoardController(ReportedThrust):
     """One controller on a board, called as soon as the desk has the next inputs.
 
     `replies` holds those of all steps, `different` the numbers of the steps whose bits are not the desk's.

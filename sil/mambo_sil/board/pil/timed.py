@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.board_controller import BoardInputs, BoardStep, ToldThrust, desk_bits
+from mambo_sil.board.pil.board_controller import BoardInputs, BoardStep, ReportedThrust, desk_bits
 from mambo_sil.board.pil.connection import NO_FLIGHT, Connection, command_bytes
 from mambo_sil.board.pil.serial_messages import (
     DAMAGED,
@@ -54,7 +54,7 @@ class Arrival:
         return self.number + 1 + self.reply.overruns
 
 
-class TimedController(ToldThrust):
+class TimedController(ReportedThrust):
     """One controller on a board, called by the clock of the board.
 
     `arrivals` holds the replies that came, `different` the numbers of those whose bits are not the desk's.

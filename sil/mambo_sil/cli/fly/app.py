@@ -1,6 +1,6 @@
 """`fly --app`: fly a generated app on the desk, with what surrounds it in its firmware."""
 
-from typing import Final, Literal, get_args
+from typing import Final, get_args
 
 import typer
 from pydantic import ValidationError
@@ -18,7 +18,7 @@ from mambo_sil.flight.names import CurveName
 from mambo_sil.results.folders import new_results
 
 OF_AN_APP: Final = frozenset(
-    {"app", "events", "source", "scalar", "sensors", "seed", "output", "pictures", "as_json"}
+    {"app", "events", "source", "scalar", "sensors", "seed", "output", "no_pictures", "as_json"}
 )
 """Options allowed with --app and an events file, which says all else."""
 OF_A_COURSE: Final = frozenset({"trajectory", "size_m", "rate_rad_s", "duration_s"})
@@ -48,7 +48,7 @@ def fly_app(
         trace = fly_events(library, file, conditions.seed)
         measures = measure(trace, file)
         write_trace(trace, folder / "trace.csv")
-        if output.pictures:
+        if not output.no_pictures:
             draw_flight(trace, file, events or course.trajectory, folder / "flight")
         summary = DeskSummary(
             app=name,
@@ -63,7 +63,7 @@ def fly_app(
         )
         summary.write(folder)
     show(summary, desk_text(summary), as_json=output.as_json)
-    written = DESK_FILES if output.pictures else DESK_FILES[:1]
+    written = DESK_FILES[:1] if output.no_pictures else DESK_FILES
     typer.echo(f"{echo(str(output.output))}: {', '.join(written)}", err=True)
     if not summary.good:
         raise typer.Exit(1)
@@ -91,9 +91,7 @@ def _course(course: Course) -> EventsFile:
 
 def _with_sensors(file: EventsFile, name: str) -> EventsFile:
     """Return an events file with other sensors; raises FlightError."""
-    kinds: tuple[Literal["mocap", "flow-deck"], ...] = get_args(events_file.SensorsKind)
-    for kind in kinds:
-        if name == kind:
-            sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": kind})
-            return file.model_copy(update={"sensors": sensors})
-    raise FlightError(f"--sensors {echo(name)} must be {' or '.join(kinds)} with --app")
+    if name not in events_file.SENSORS:
+        raise FlightError(f"--sensors {echo(name)} must be {' or '.join(events_file.SENSORS)} with --app")
+    sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": name})
+    return file.model_copy(update={"sensors": sensors})

@@ -9,30 +9,52 @@ from typing import Annotated, Any, Final, Literal
 import typer
 
 from mambo_sil.cli.command import AsJson, Scalar, complete_presets
-from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards
+from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards, sensors_option
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, ControllerName, SensorsName, Start
+from mambo_sil.flight.names import (
+    CURVE_NAMES,
+    SENSORS_NAMES,
+    AltitudeName,
+    ControllerName,
+    SensorsName,
+    Start,
+)
 
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
 """Of the Table II case."""
-CURVE_HELP: Final = f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m."
-SIZE_HELP: Final = f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}."
-RATE_HELP: Final = f"Angular rate of the curve, in rad/s; by default {RATE_RAD_S:g}."
+CurveChoice = Annotated[
+    str,
+    typer.Option(
+        help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m.", metavar="CURVE"
+    ),
+]
+CurveSize = Annotated[
+    float | None,
+    typer.Option(
+        help=f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}.", metavar="M"
+    ),
+]
+CurveRate = Annotated[
+    float | None,
+    typer.Option(help=f"Rate of the curve, in rad/s; by default {RATE_RAD_S:g}.", metavar="RATE"),
+]
+CurveTime = Annotated[float, typer.Option(help="Time on the curve, in s.", metavar="S")]
 
 
 @dataclass(frozen=True)
 class Course:
     """What is to be followed, from where, and for how long."""
 
-    trajectory: Annotated[str, typer.Option(help=CURVE_HELP)] = "bernoulli"
-    size_m: Annotated[float | None, typer.Option(help=SIZE_HELP)] = None
-    rate_rad_s: Annotated[float | None, typer.Option(help=RATE_HELP)] = None
-    duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0
-    start: Annotated[Start, typer.Option(help="Start hovering in the air, or 5 s earlier on the ground.")] = (
-        "hover"
-    )
-    yaw_rad: Annotated[float, typer.Option(help="Constant yaw, in rad.")] = 0.0
+    trajectory: CurveChoice = "bernoulli"
+    size_m: CurveSize = None
+    rate_rad_s: CurveRate = None
+    duration_s: CurveTime = 100.0
+    start: Annotated[
+        Start,
+        typer.Option(help="hover, or take-off: 5 s earlier on the ground.", metavar="START"),
+    ] = "hover"
+    yaw_rad: Annotated[float, typer.Option(help="Constant yaw, in rad.", metavar="RAD")] = 0.0
 
 
 @dataclass(frozen=True)
@@ -41,32 +63,34 @@ class Conditions:
 
     vehicle: Drone = "mambo"
     motor_lag_s: Annotated[
-        float | None, typer.Option(help="Time constant of the motors, in s; by default the vehicle's.")
+        float | None,
+        typer.Option(help="Time constant of the motors, in s; by default the vehicle's.", metavar="S"),
     ] = None
     sensors: Annotated[
         SensorsName,
-        typer.Option(
-            help="State that controller and inner loops get: the true one, or that of the vehicle's sensors, "
-            "which are the Mambo's, without or with compensation of the rotation in the optical flow, or "
-            "motion capture; with --app motion capture or a flow deck."
+        sensors_option(
+            SENSORS_NAMES,
+            "What state all loops get: true; mocap, motion capture; mambo or mambo-derotated, by optical flow "
+            "with its rotation or without; flow-deck, with --app.",
         ),
-    ] = "none"
+    ] = "true"
     altitude_loop: Annotated[
         AltitudeName,
         typer.Option(
-            help="What holds the height: the vehicle's loop, that with feed-forward of the target's motion, "
-            "or a PID with it."
+            help="What holds the height: stock, the vehicle's loop; feedforward or pid, which know the "
+            "target's motion.",
+            metavar="NAME",
         ),
     ] = "stock"
     push: Annotated[
         str,
-        typer.Option(help="Steady acceleration along x (north), y (east), in m/s^2.", metavar="X,Y"),
+        typer.Option(help="Steady acceleration north, east, in m/s^2.", metavar="X,Y"),
     ] = "0,0"
     wind: Annotated[
         str,
-        typer.Option(help="`gusts`: a mean wind towards north with light turbulence.", metavar="none|gusts"),
+        typer.Option(help="none, or gusts: light turbulence and a mean wind to north.", metavar="WIND"),
     ] = "none"
-    seed: Annotated[int, typer.Option(help="Seed of gusts and sensor noise, 0 or more.")] = 0
+    seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.", metavar="N")] = 0
 
 
 @dataclass(frozen=True)
@@ -82,15 +106,17 @@ class Runner:
     controller: Annotated[
         ControllerName,
         typer.Option(
-            help="The generated C (nmpc), the paper's PD, a PD with feed-forward of the target's velocity "
-            "and acceleration, a PID with more of it and a low-pass, or the reference in Python."
+            help="nmpc, the generated C; reference, the same in Python; pd, the paper's; pd-feedforward or "
+            "pid-feedforward, which know the target's motion.",
+            metavar="NAME",
         ),
     ] = "nmpc"
     scalar: Scalar = None
     on: Annotated[
         str | None,
         typer.Option(
-            help="Board on whose emulated core the C runs; its flight must equal this machine's bit for bit.",
+            help="Board on whose emulated core the C runs, with this machine's bits.",
+            metavar="BOARD",
             autocompletion=complete_boards,
         ),
     ] = None
@@ -100,8 +126,9 @@ class Runner:
         bool,
         typer.Option(
             "--real-time",
-            help="With --port: the board's own clock calls the step, and the drone flies by it; count late "
-            "inputs, lost replies and periods without a step.",
+            help="With --port: the board's own clock calls the step; count late inputs, lost replies and "
+            "missed periods.",
+            metavar="",
         ),
     ] = False
 
@@ -111,7 +138,10 @@ class Output:
     """What is written and printed."""
 
     output: Results = Path("flight")
-    pictures: Annotated[bool, typer.Option(help="Draw the flight, which takes most of the time.")] = True
+    no_pictures: Annotated[
+        bool,
+        typer.Option("--no-pictures", help="Draw nothing, which saves most of the time.", metavar=""),
+    ] = False
     as_json: AsJson = False
 
 
@@ -122,22 +152,19 @@ class OtherFlight:
     context: typer.Context
     repeat: Annotated[
         Path | None,
-        typer.Option(
-            help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
-        ),
+        typer.Option(help="Repeat a recorded flight; also write the optimizer's iterations.", metavar="FILE"),
     ] = None
     app: Annotated[
         Literal["crazyflie"] | None,
         typer.Option(
-            help="Fly the app that --for writes, unchanged, on the desk: with set-points, estimator, loops "
-            "and mixer as in its firmware."
+            help="crazyflie: fly the app that --for writes, unchanged, with estimator, loops and mixer as in "
+            "its firmware.",
+            metavar="TARGET",
         ),
     ] = None
     events: Annotated[
         str | None,
-        typer.Option(
-            help="With --app: what happens, a shipped events file or one of your own.", metavar="NAME|FILE"
-        ),
+        typer.Option(help="With --app: what happens, a shipped events file or your own.", metavar="NAME"),
     ] = None
 
     def refuse(self, allowed: Container[str], reason: str) -> None:

@@ -164,13 +164,13 @@ def _flown_s(flight: Flight) -> float:
 
 def written(output: Output) -> tuple[str, ...]:
     """Return the names of the files of one flight, without its summary."""
-    return FLIGHT_FILES if output.pictures else TRACE_FILES
+    return TRACE_FILES if output.no_pictures else FLIGHT_FILES
 
 
 def write_flight(trace: Trace, runner: Runner, settings: Settings, output: Output, folder: Path) -> None:
     """Write the files of `written`."""
     write_trace(trace, folder)
-    if output.pictures:
+    if not output.no_pictures:
         title = PD_TITLES.get(runner.controller, f"NMPC, {echo(named_source(runner))}")
         limit_m_s = 0.0 if runner.controller in PD_TITLES else settings.limits.speed_m_s
         draw_flight(trace, title, folder, walls_m(settings), limit_m_s)

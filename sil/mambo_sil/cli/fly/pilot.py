@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from mambo_sil.cli.fly.fly_options import CURVE_HELP, RATE_HELP, SIZE_HELP
+from mambo_sil.cli.fly.fly_options import CurveChoice, CurveRate, CurveSize, CurveTime
 from mambo_sil.cli.options import (
     VEHICLE_NAMES,
     AsJson,
@@ -36,7 +36,7 @@ def pilot(
     ] = None,
     simulate: Annotated[
         Literal["px4", "ardupilot"] | None,
-        typer.Option(help="Fly a simulated drone behind the messages of this autopilot instead."),
+        typer.Option(help="px4 or ardupilot: fly a simulated drone behind its messages.", metavar="NAME"),
     ] = None,
     vehicle: Annotated[
         str | None,
@@ -48,11 +48,13 @@ def pilot(
         ),
     ] = None,
     scalar: Scalar = None,
-    trajectory: Annotated[str, typer.Option(help=CURVE_HELP)] = "gerono",
-    size_m: Annotated[float | None, typer.Option(help=SIZE_HELP)] = None,
-    rate_rad_s: Annotated[float | None, typer.Option(help=RATE_HELP)] = None,
-    duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 30.0,
-    height_m: Annotated[float, typer.Option(help="Height above the place of take-off, in m.")] = 1.5,
+    trajectory: CurveChoice = "gerono",
+    size_m: CurveSize = None,
+    rate_rad_s: CurveRate = None,
+    duration_s: CurveTime = 30.0,
+    height_m: Annotated[
+        float, typer.Option(help="Height above the place of take-off, in m.", metavar="M")
+    ] = 1.5,
     output: Results = Path("piloted"),
     as_json: AsJson = False,
 ) -> None:

@@ -19,7 +19,7 @@ from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results
 
 INNER_STEPS = "inner-steps.npz"
-ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
+ALLOWED = frozenset({"repeat", "output", "no_pictures", "as_json"})
 """Options allowed with --repeat; the record contains all others."""
 
 
@@ -40,7 +40,7 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
         with progress_bar("repeating") as progress:
             trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
-        if output.pictures:
+        if not output.no_pictures:
             limits = record.settings.limits
             walls = walls_m(record.settings, record.scenario.fence_m)
             draw_flight(trace, file.name, folder, walls, limits.speed_m_s)
@@ -58,7 +58,7 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
             **judge(trace, record.settings, record.scenario.vehicle, limited),
         )
         summary.write(folder)
-    written = FLIGHT_FILES if output.pictures else TRACE_FILES
+    written = TRACE_FILES if output.no_pictures else FLIGHT_FILES
     finish(summary, flight_text(summary), output, written if watched is None else (*written, INNER_STEPS))
 
 

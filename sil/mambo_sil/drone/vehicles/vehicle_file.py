@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, Final, Self, get_args
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Form, Key, key_of, spell
 from mambo_sil.drone.vehicles.vehicle_sections import (
@@ -15,11 +16,12 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     AnySensors,
     Body,
     FirstOrderAttitude,
+    FlowDeckSensors,
     MamboSensors,
     MocapSensors,
-    NoSensors,
     RotorFigures,
     ThrustResponse,
+    TrueState,
     Uncertainty,
     VehicleSection,
 )
@@ -44,7 +46,7 @@ class VehicleFile(VehicleSection):
     thrust: ThrustResponse | None = Field(
         None, description="The response of the thrust of a drone without rotors."
     )
-    sensors: AnySensors = Field(NoSensors(), description="The sensors that --sensors switches on.")
+    sensors: AnySensors = Field(TrueState(), description="The sensors that --sensors switches on.")
     uncertainty: Uncertainty | None = Field(None, description="How well a log has shown these values.")
 
     @model_validator(mode="before")
@@ -67,6 +69,13 @@ class VehicleFile(VehicleSection):
         thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2 / gain
         gains = {"p_n_m": 10.0 * mass_kg, "d_n_s_m": 5.0 * mass_kg, "thrust_max_n": thrust_max_n}
         return {**document, "altitude": gains}
+
+    @field_validator("sensors", mode="before")
+    @classmethod
+    def _present_sensors(cls, section: Any) -> Any:
+        """Read the older name of the true state, "none"."""
+        is_old = isinstance(section, Mapping) and section.get("kind") == "none"
+        return {**section, "kind": "true"} if is_old else section
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -120,6 +129,24 @@ class VehicleFile(VehicleSection):
             loc=(section, found.kind, key) if section in KINDS else (section, key),
             input=getattr(found, key),
         )
+
+    @property
+    def knows_sensors(self) -> bool:
+        """Whether the file says what measures, if only that the true state is known."""
+        return "sensors" in self.model_fields_set
+
+    def with_sensors(self, kind: str) -> Self:
+        """Return the drone with a kind of sensors.
+
+        Raises InvalidSettingsError if its file has no figures of them.
+        """
+        if kind == self.sensors.kind and self.knows_sensors:
+            return self
+        plain = {"true": TrueState(), "flow-deck": FlowDeckSensors()}
+        if kind not in plain:
+            rule = f"needs its figures, [sensors], in the file of vehicle {echo(self.name)}"
+            raise InvalidSettingsError((f"sensors = {spell(kind)} {rule}",))
+        return self.model_copy(update={"sensors": plain[kind]})
 
     @property
     def weight_n(self) -> float:

@@ -188,10 +188,10 @@ class Uncertainty(VehicleSection):
     thrust_lag_s: HalfWidth | None = Field(None, description="That of thrust.lag_s.")
 
 
-class NoSensors(VehicleSection):
+class TrueState(VehicleSection):
     """Controller and loops get the true state."""
 
-    kind: Literal["none"] = Field("none", description="No sensors: the true state.")
+    kind: Literal["true"] = Field("true", description="No sensors: the true state.")
 
 
 class MamboSensors(VehicleSection):
@@ -227,4 +227,4 @@ class FlowDeckSensors(VehicleSection):
 
 
 AnyAttitude = Annotated[MamboAttitude | CascadeAttitude | FirstOrderAttitude, Field(discriminator="kind")]
-AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors | FlowDeckSensors, Field(discriminator="kind")]
+AnySensors = Annotated[TrueState | MamboSensors | MocapSensors | FlowDeckSensors, Field(discriminator="kind")]

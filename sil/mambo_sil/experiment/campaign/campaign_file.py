@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -48,6 +49,7 @@ from mambo_sil.flight.names import (
     PdName,
     SensorsName,
     Start,
+    present_sensors,
 )
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
@@ -91,7 +93,7 @@ class FlightSection(FileSection):
     start: Start = "hover"
     vehicle: str = vehicle_toml.DEFAULT
     """A shipped drone, or its vehicle.toml."""
-    sensors: SensorsName | None = None
+    sensors: Annotated[SensorsName | None, BeforeValidator(present_sensors)] = None
     """None: the vehicle's own."""
     altitude_loop: AltitudeName = "stock"
     """What holds the height."""

@@ -139,7 +139,7 @@ def _content(folder: Path, drawn: Drawn, flights: Table) -> dict[str, Any]:
 def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
     """Return statistics of a finished campaign, and the worst flights with the names of their records."""
     names = [entrant.name for entrant in campaign.entrants]
-    sensed = campaign.file.flight.sensors != "none"
+    sensed = campaign.file.flight.sensors != "true"
     return CampaignSummary(
         campaign=Drawn.model_validate(campaign.document()),
         flights=len(table[FLIGHT]),

@@ -32,7 +32,7 @@ def table_columns(campaign: Campaign) -> tuple[str, ...]:
 def result_columns(campaign: Campaign) -> tuple[str, ...]:
     """Return the columns of the results."""
     names = [entrant.name for entrant in campaign.entrants]
-    return columns(names, sensed=campaign.file.flight.sensors != "none", spatial=campaign.spatial)
+    return columns(names, sensed=campaign.file.flight.sensors != "true", spatial=campaign.spatial)
 
 
 def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:

@@ -14,7 +14,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 class ControllerInput:
     """Inputs of one controller at one update: state (7,), target (6,), thrust over mass.
 
-    Of a controller of the height: state (10,), target (9,), and the thrust that it is told.
+    Of a controller of the height: state (10,), target (9,), and the reported thrust.
     """
 
     state: FloatArray

@@ -50,13 +50,19 @@ def native_faulty(
         _fill_alteration(record, fault.alter)
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
-        record.controller, record.self, record.lifting = inner.step, inner.instance(row), inner.lifts
+        record.controller, record.self, record.commands_thrust = (
+            inner.step,
+            inner.instance(row),
+            inner.commands_thrust,
+        )
         record.computed = pointer("double *", history)
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))
             record.memory_bytes = instances.shape[1]
     kept = inner, histories, instances, saved
-    return Native(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept, inner.lifts)
+    return Native(
+        engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept, inner.commands_thrust
+    )
 
 
 def _fill_alteration(record: Any, alter: Alteration) -> None:
@@ -83,7 +89,7 @@ def _fill_alteration(record: Any, alter: Alteration) -> None:
 def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:
     """Return n callers with `patience` (n,) around `inner` that reset `compiled`."""
     hover_m_s2 = hover_thrust(compiled.settings)
-    reset, level = compiled.native_reset([(0.0, 0.0, hover_m_s2) if inner.lifts else (0.0, 0.0)])
+    reset, level = compiled.native_reset([(0.0, 0.0, hover_m_s2) if inner.commands_thrust else (0.0, 0.0)])
     memory = native(engine, compiled)
     records = ffi.new("engine_levelling_t[]", len(patience))
     for row, patient in enumerate(patience.tolist()):
@@ -91,6 +97,8 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.controller, record.self = inner.step, inner.instance(row)
         record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
         record.level, record.patience = pointer("char *", level), patient
-        record.hover_m_s2, record.lifting = hover_m_s2, inner.lifts
+        record.hover_m_s2, record.commands_thrust = hover_m_s2, inner.commands_thrust
     kept = inner, memory, level
-    return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept, inner.lifts)
+    return Native(
+        engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept, inner.commands_thrust
+    )

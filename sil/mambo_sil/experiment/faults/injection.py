@@ -16,7 +16,7 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import ControllerInput, Fault
 from mambo_sil.experiment.faults.faults_in_c import native_faulty, native_levelling
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import Applied, flown, hover_command, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
 from mambo_sil.flight.engine.native import Native
 from mambo_sil.flight.loop import PositionController
 
@@ -35,7 +35,7 @@ class FaultyController:
         faults: Sequence[Fault | None],
         instances: NDArray[np.uint8] | None = None,
     ) -> None:
-        self.controller = flown(controller)
+        self.controller = adapted(controller)
         self._instances = instances
         self._given = faults
         self._faults = [(row, fault) for row, fault in enumerate(faults) if fault is not None]
@@ -84,7 +84,7 @@ class LevellingCaller:
     def __init__(
         self, controller: PositionController, compiled: CompiledController, patience: IntArray
     ) -> None:
-        self.controller = flown(controller)
+        self.controller = adapted(controller)
         self._level = np.array(hover_command(self.controller))
         self._compiled = compiled
         self._patience = patience

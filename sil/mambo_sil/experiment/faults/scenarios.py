@@ -66,7 +66,7 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     a state that is missing to the end, or wrong for 5 s, is so for the thrust too, which a stock loop takes
     from the truth.
     """
-    lifts = settings.height is not None
+    commands_thrust = settings.height is not None
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
     outage = SetState(range(7), _NAN)
@@ -83,19 +83,21 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
         FaultScenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
         FaultScenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
-        FaultScenario("state NaN to the end", TO_THE_END, outage, answers=bad_state, may_crash=lifts),
+        FaultScenario(
+            "state NaN to the end", TO_THE_END, outage, answers=bad_state, may_crash=commands_thrust
+        ),
         FaultScenario(
             f"state NaN to the end, {levels_out}",
             TO_THE_END,
             outage,
             answers=bad_state,
             levelled=True,
-            may_crash=lifts,
+            may_crash=commands_thrust,
         ),
         FaultScenario("x infinite, 1 s", 1.0, SetState(range(1), math.inf), answers=bad_state),
         FaultScenario("vy minus infinite, 1 s", 1.0, SetState(range(3, 4), -math.inf), answers=bad_state),
         *(FaultScenario(f"state frozen, {span_s:g} s", span_s, FreezeState()) for span_s in (0.2, 1.0)),
-        FaultScenario("state frozen, 5 s", 5.0, FreezeState(), may_crash=lifts),
+        FaultScenario("state frozen, 5 s", 5.0, FreezeState(), may_crash=commands_thrust),
         FaultScenario("every 2nd tick dropped, 5 s", 5.0, drop_every=2, answers=_only(Status.OK, NOT_CALLED)),
         FaultScenario("all ticks dropped, 0.2 s", 0.2, drop_every=1, answers=_only(NOT_CALLED)),
         FaultScenario("all ticks dropped, 1 s", 1.0, drop_every=1, answers=_only(NOT_CALLED)),
@@ -106,11 +108,13 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
         FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
-        *(_of_the_height() if lifts else _of_the_thrust()),
+        *(_of_the_height() if commands_thrust else _of_the_thrust()),
         FaultScenario("yaw a turn off, to the end", TO_THE_END, shift_yaw(2.0 * math.pi)),
         FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, WrapYaw(), turning=True),
         FaultScenario("yaw half a turn off, 1 s", 1.0, shift_yaw(math.pi)),
-        FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD), may_crash=lifts),
+        FaultScenario(
+            "attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD), may_crash=commands_thrust
+        ),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
         *(_wrong_weights(settings) if method_of(settings).weight_limits else ()),

@@ -14,7 +14,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import flown, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import adapted, numbers_of
 
 _SETTLING_STEPS: Final = 100
 _LEARNING_S: Final = 30.0
@@ -140,7 +140,7 @@ def _step(controller: CompiledController, state: FloatArray, target: FloatArray)
     """Step controllers with one target, at hover thrust; with a height at the thrust that they commanded."""
     n = controller.n
     thrust_m_s2 = np.full(n, GRAVITY_M_S2 if controller.settings.height is None else np.nan)
-    return flown(controller).step(state, np.repeat(target, n, axis=0), thrust_m_s2)
+    return adapted(controller).step(state, np.repeat(target, n, axis=0), thrust_m_s2)
 
 
 def _numbers(controller: CompiledController, stored: int) -> FloatArray:

@@ -190,19 +190,19 @@ def _tick(
     vehicle: Vehicle, moving: _Moving, inputs: FloatArray, signals: Signals
 ) -> tuple[_Moving, FloatArray]:
     """Return n drones one tick later, and the outputs (rows, n) at this tick, for inputs (columns, n)."""
-    state, suite, lifts = moving.state, moving.suite, signals.axes > LEVEL_AXES
+    state, suite, commands_thrust = moving.state, moving.suite, signals.axes > LEVEL_AXES
     command, push = inputs[signals.command], inputs[signals.push]
     true = seen = truth(state)
     if suite is not None:
         suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[signals.noise :]))
         seen = suite.estimate(true)
-    if lifts:
+    if commands_thrust:
         thrust_n = hover_thrust_n(vehicle) + vehicle.drone.body.mass_kg * command[2]
     else:
         thrust_n = altitude_thrust(
             vehicle.drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
         )
-    moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if lifts else 0.0)
+    moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if commands_thrust else 0.0)
     demand = np.zeros((signals.axes, inputs.shape[1]))
     if isinstance(vehicle.loop, FirstOrderDrone):
         state = vehicle.step(state, command[:2], thrust_n, 0.0, seen=seen, moment=moment)
@@ -214,8 +214,8 @@ def _tick(
         motor_command = motor_command + hover * (signs.T @ inputs[signals.motor])
         state = VehicleState(*vehicle.integrate(state, motor_command, moment), memory)
     outputs = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
-    outputs += [-seen.position_m[2:], -seen.velocity_m_s[2:]] if lifts else []
-    outputs += [demand, true.position_m[1::-1], *([-true.position_m[2:]] if lifts else [])]
+    outputs += [-seen.position_m[2:], -seen.velocity_m_s[2:]] if commands_thrust else []
+    outputs += [demand, true.position_m[1::-1], *([-true.position_m[2:]] if commands_thrust else [])]
     return _Moving(state, suite), np.concatenate(outputs)
 
 

@@ -31,11 +31,11 @@ def hover_loops(settings: Settings, flight: Flight) -> Iterator[Loops]:
     With a height the controller has learnt the thrust of hover of that drone.
     Raises BuildError, CacheError.
     """
-    lifts, drone = settings.height is not None, flight.vehicle.drone
-    found = drone_jacobians(flight, LEVEL_AXES + lifts)
-    loads = hover_thrust_n(flight.vehicle) / drone.weight_n if lifts else 1.0
+    commands_thrust, drone = settings.height is not None, flight.vehicle.drone
+    found = drone_jacobians(flight, LEVEL_AXES + commands_thrust)
+    loads = hover_thrust_n(flight.vehicle) / drone.weight_n if commands_thrust else 1.0
     delays, loads = np.broadcast_arrays(flight.link.delay_ticks, loads, np.zeros(flight.flights))[:2]
-    controller = None if lifts else linear_controller(settings)
+    controller = None if commands_thrust else linear_controller(settings)
     for number, (delay_ticks, load) in enumerate(zip(delays.tolist(), loads.tolist(), strict=True)):
         whole = close_loop(
             controller or linear_controller(settings, load),

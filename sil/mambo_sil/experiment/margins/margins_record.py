@@ -104,7 +104,7 @@ class MarginsSummary(ReportedSummary):
             "many": self.many,
             "spreads": self.many.table if self.many else [],
         }
-        state = "the true state" if self.sensors == "none" else f"sensors {self.sensors}"
+        state = "the true state" if self.sensors == "true" else f"sensors {self.sensors}"
         return Section(
             template="margins",
             title=f"Margins of {self.source} on {self.vehicle}, {state}",

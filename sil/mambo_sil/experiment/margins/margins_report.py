@@ -10,7 +10,7 @@ from mambo_sil.results.terminal import sentence, table
 
 def margins_text(summary: MarginsSummary) -> str:
     """Format the margins of a controller."""
-    state = "the true state" if summary.sensors == "none" else f"sensors {summary.sensors}"
+    state = "the true state" if summary.sensors == "true" else f"sensors {summary.sensors}"
     period = f"{1e3 * summary.update_period_s:g} ms an update"
     lines = [sentence(f"{echo(summary.source)} on {echo(summary.vehicle)}, {state}, {period}")]
     lines += [sentence(one) for one in summary.verdicts]

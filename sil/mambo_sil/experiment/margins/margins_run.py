@@ -30,7 +30,7 @@ class MarginSubject:
     source: str
     settings: Settings
     drone: VehicleFile
-    sensors: SensorsName = "none"
+    sensors: SensorsName = "true"
 
 
 @dataclass(frozen=True)

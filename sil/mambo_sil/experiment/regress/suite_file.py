@@ -244,7 +244,7 @@ def _suite(file: SuiteFile, name: str, folder: Path, source: str, vehicle: str |
 def _replace_drone(values: Mapping[str, Values], drone: VehicleFile) -> dict[str, Values]:
     """Return the values of a group's keys with another drone, and its own sensors for those it has not."""
     possible = SENSORS_OF[drone.sensors.kind]
-    sensors = (one if one in possible else possible[-1] for one in values.get("sensors", ("none",)))
+    sensors = (one if one in possible else possible[-1] for one in values.get("sensors", ("true",)))
     return {VEHICLE: (drone,), **values} | {VEHICLE: (drone,), "sensors": tuple(dict.fromkeys(sensors))}
 
 

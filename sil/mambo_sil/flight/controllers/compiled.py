@@ -142,7 +142,7 @@ class CompiledController:
 
     @property
     def last_thrust_m_s2(self) -> NDArray[np.float64]:
-        """The thrusts over mass (n,) that were last commanded, set or told.
+        """The thrusts over mass (n,) that were last commanded, set or reported.
 
         Raises ValueError without a height in the settings.
         """
@@ -171,6 +171,18 @@ class CompiledController:
         self._demand_limits()
         quantities = setter_quantities(self._method, "set_limits")
         return self._set_each(self._library.nmpc_host_set_limits, limits, quantities)
+
+    def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
+        """Tell whether a position is measured (n,); returns a status (n,).
+
+        Raises ValueError without a guard in the settings.
+        """
+        if self.settings.guard is None:
+            raise ValueError("the settings have no guard")
+        measured, status = np.ascontiguousarray(is_measured, np.uint8), np.empty(self.n, np.intc)
+        function = self._library.nmpc_host_set_position_measured
+        function(self._controllers, self.n, _address(measured), ffi.cast("int *", _address(status)))
+        return status.astype(np.int64)
 
     @property
     def limits_active(self) -> NDArray[np.int64]:

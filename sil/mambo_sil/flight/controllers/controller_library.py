@@ -30,6 +30,7 @@ DECLARATIONS: Final = """
     void nmpc_host_last_thrust(const void *controllers, int n, void *thrust);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
     void nmpc_host_limits_active(const void *controllers, int n, int *active);
+    void nmpc_host_set_position_measured(void *controllers, int n, const void *is_measured, int *status);
     void nmpc_host_slew_heading(int n, const void *previous, const void *wanted, const void *most_change,
                                 void *next);
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
@@ -40,7 +41,7 @@ DECLARATIONS: Final = """
 
 nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost,
 nmpc_host_set_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits and
-nmpc_host_limits_active with limits.
+nmpc_host_limits_active with limits, nmpc_host_set_position_measured with a guard.
 `ffi` is made from them.
 """
 

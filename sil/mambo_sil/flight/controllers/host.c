@@ -67,7 +67,7 @@ void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_
     }
 }
 
-/* The thrusts that were last commanded, set or told. */
+/* The thrusts that were last commanded, set or reported. */
 void nmpc_host_last_thrust(const nmpc_t *controllers, int n, nmpc_real_t *thrust_m_s2)
 {
     int i;
@@ -96,6 +96,17 @@ void nmpc_host_limits_active(const nmpc_t *controllers, int n, int *active)
 
     for (i = 0; i < n; i++) {
         active[i] = (int)nmpc_limits_active(&controllers[i]);
+    }
+}
+#endif
+
+#ifdef NMPC_HAS_GUARD
+void nmpc_host_set_position_measured(nmpc_t *controllers, int n, const unsigned char *is_measured, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_position_measured(&controllers[i], (int)is_measured[i]);
     }
 }
 #endif
@@ -133,8 +144,8 @@ static nmpc_real_t number_of(double value, int bits)
 #endif
 
 /* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
- * of a state, whose last is not 0 on the floor, and 9 of a target; it is told a thrust that is no NaN, and returns the
- * next one behind the angles. */
+ * of a state, whose last is not 0 on the floor, and 9 of a target; a thrust that is no NaN is the
+ * reported one. It returns the next one behind the angles. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
                        double thrust_acceleration_m_s2, double *command)
 {

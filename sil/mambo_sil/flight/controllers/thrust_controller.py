@@ -61,14 +61,14 @@ class ThrustController:
 
     def wrap(self, _engine: Any, inner: Any) -> Any:
         """Return the same in the engine: `nmpc_host_step` has this interface."""
-        return replace(inner, lifts=True)
+        return replace(inner, commands_thrust=True)
 
 
-def flown(controller: Any) -> Any:
+def adapted(controller: Any) -> Any:
     """Return a controller as the closed loop calls it."""
     settings = getattr(controller, "settings", None)
-    is_lifting = getattr(settings, "height", None) is not None
-    return ThrustController(controller) if is_lifting else controller
+    has_height = getattr(settings, "height", None) is not None
+    return ThrustController(controller) if has_height else controller
 
 
 def innermost(controller: Any) -> Any:
@@ -78,7 +78,7 @@ def innermost(controller: Any) -> Any:
     return controller
 
 
-def lifts(controller: Any) -> bool:
+def commands_thrust(controller: Any) -> bool:
     """Return whether a controller, as the closed loop calls it, commands the thrust."""
     while not isinstance(controller, ThrustController):
         if not hasattr(controller, "controller"):
@@ -89,4 +89,8 @@ def lifts(controller: Any) -> bool:
 
 def hover_command(controller: Any) -> tuple[float, ...]:
     """Return roll and pitch of hover and, of a controller that commands the thrust, the thrust over mass."""
-    return (0.0, 0.0, hover_thrust(innermost(controller).settings)) if lifts(controller) else (0.0, 0.0)
+    return (
+        (0.0, 0.0, hover_thrust(innermost(controller).settings))
+        if commands_thrust(controller)
+        else (0.0, 0.0)
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.flight.controllers.compiled import SETTERS, CompiledController, Setter
-from mambo_sil.flight.controllers.thrust_controller import flown, innermost
+from mambo_sil.flight.controllers.thrust_controller import adapted, innermost
 from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign
 from mambo_sil.flight.loop import Outcome, PositionController
@@ -37,7 +37,7 @@ class AdjustedController:
     """
 
     def __init__(self, controller: PositionController, n: int, adjustments: Sequence[Adjustment]) -> None:
-        self.controller = flown(controller)
+        self.controller = adapted(controller)
         self._n = n
         self._adjustments = adjustments
         self._update = 0
@@ -94,4 +94,4 @@ class AdjustedController:
             records[row].adjustments, records[row].count = due, len(own)
             kept.append(due)
         size = ffi.sizeof("engine_adjusted_t")
-        return Native(engine.engine_adjusted_step, records, size, tuple(kept), inner.lifts)
+        return Native(engine.engine_adjusted_step, records, size, tuple(kept), inner.commands_thrust)

@@ -27,7 +27,7 @@ static double remainder_of(double value, double period)
 static void alter(const engine_faulty_t *faulty, int64_t since, double *state, double *target, double *thrust_m_s2)
 {
     const double *values = faulty->values;
-    const int64_t states = faulty->lifting ? 10 : 7;
+    const int64_t states = faulty->commands_thrust ? 10 : 7;
     int64_t i;
 
     switch (faulty->effect) {
@@ -73,8 +73,8 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
     const int64_t depth = faulty->late_updates + 1;
     const int active = (faulty->begin <= faulty->update) && (faulty->update < faulty->end);
     const int dropped = active && (faulty->drop_every > 0) && ((since % faulty->drop_every) == 0);
-    const size_t states = (faulty->lifting ? 10U : 7U) * sizeof(double);
-    const size_t targets = (faulty->lifting ? 9U : 6U) * sizeof(double);
+    const size_t states = (faulty->commands_thrust ? 10U : 7U) * sizeof(double);
+    const size_t targets = (faulty->commands_thrust ? 9U : 6U) * sizeof(double);
     double *computed = faulty->computed + (3 * (faulty->update % depth));
     const double *before = faulty->computed + (3 * ((faulty->update + faulty->late_updates) % depth));
     const double *sent = computed;
@@ -114,7 +114,7 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
 
         sent = faulty->computed + (3 * (((faulty->update + depth) - late) % depth));
     }
-    memcpy(command_rad, sent, (faulty->lifting ? 3U : 2U) * sizeof *sent);
+    memcpy(command_rad, sent, (faulty->commands_thrust ? 3U : 2U) * sizeof *sent);
     faulty->update++;
     return status;
 }
@@ -133,7 +133,7 @@ int64_t engine_levelling_step(void *self, const double *state, const double *tar
     if (caller->refused >= caller->patience) {
         command_rad[0] = 0.0;
         command_rad[1] = 0.0;
-        if (caller->lifting) {
+        if (caller->commands_thrust) {
             command_rad[2] = caller->hover_m_s2;
         }
     }

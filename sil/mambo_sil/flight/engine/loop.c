@@ -38,8 +38,9 @@ static inline void mark_lost(const engine_simulation_t *simulation, vehicle_stat
     }
 }
 
-/* Call the controllers, except of dropped updates, and record the update. The thrust is that of the altitude loop, or
- * what controllers that command it are told; the one recorded is that of the loop, of the controllers or of a take-off. */
+/* Call the controllers, except of dropped updates, and record the update. The thrust comes from the altitude
+ * loop, or is reported to controllers that command it; the trace has that of the loop, of the controllers or of a
+ * take-off. */
 static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                         int64_t update, const double *targets, const engine_draws_t *draws,
                         engine_controller_t controller, void *self, int64_t stride, const seen_t *truth_now,
@@ -83,7 +84,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         write_axes(trace->euler_rad, row, lane, 3, truth_now->euler_rad);
         write_axes(trace->command_rad, row, lane, 2, held);
         write_axes(trace->thrust_acceleration_m_s2, row, lane, 1,
-                   take_off ? &lift_m_s2 : (simulation->lifting ? &held[2] : &thrust_m_s2));
+                   take_off ? &lift_m_s2 : (simulation->commands_thrust ? &held[2] : &thrust_m_s2));
         trace->status[row] = status;
         if (simulation->sensed) {
             write_axes(trace->seen_position_m, row, lane, 3, seen->position_m);
@@ -207,7 +208,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         real_t shares[4];
         real_t steady_rad_s[4];
         real_t arriving[3];
-        real_t told_m_s2;
+        real_t reported_thrust_m_s2;
         real_t wanted_n;
         real_t given_n;
         seen_t truth_now;
@@ -237,23 +238,24 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             take(draws->sensors, rows, row, 8, drawn);
             seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
         }
-        if ((update >= simulation->open_loop_updates) && !simulation->lifting) {
+        if ((update >= simulation->open_loop_updates) && !simulation->commands_thrust) {
             thrust_n = altitude_thrust_n(simulation, &wanted, &seen, &flying->altitude_integral_n);
         }
         if (tick == 0) {
-            told_m_s2 = thrust_n / simulation->nominal_mass_kg;
-            if (simulation->lifting) {
-                told_m_s2 = choose((flying->capped > 0.0), (flying->given_n / (double)simulation->ticks_per_update)
-                                                               / simulation->nominal_mass_kg, splat(NAN));
+            reported_thrust_m_s2 = thrust_n / simulation->nominal_mass_kg;
+            if (simulation->commands_thrust) {
+                reported_thrust_m_s2 =
+                    choose((flying->capped > 0.0), (flying->given_n / (double)simulation->ticks_per_update)
+                                                       / simulation->nominal_mass_kg, splat(NAN));
                 flying->given_n = splat(0.0);
                 flying->capped = splat(0.0);
             }
             call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,
-                 told_m_s2, flying->command, trace);
+                 reported_thrust_m_s2, flying->command, trace);
         }
         carry(flight, ticks, flying->command, &flying->wire, arriving);
         wanted_n = simulation->nominal_mass_kg * arriving[2];
-        if ((update >= simulation->open_loop_updates) && simulation->lifting) {
+        if ((update >= simulation->open_loop_updates) && simulation->commands_thrust) {
             thrust_n = clip(wanted_n, -simulation->thrust_limit_n, simulation->thrust_limit_n);
         }
         if (simulation->attitude == FIRST_ORDER) {

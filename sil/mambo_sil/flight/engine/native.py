@@ -39,14 +39,14 @@ class Native:
     """n controllers in C: the function of a step, their instances, and the bytes from one to the next.
 
     kept: whatever the instances point to, which lives as long as this record.
-    lifts: whether they command the thrust.
+    commands_thrust: whether they command the thrust.
     """
 
     step: Any
     instances: Any
     stride: int
     kept: tuple[Any, ...] = ()
-    lifts: bool = False
+    commands_thrust: bool = False
 
     def instance(self, index: int) -> Any:
         """Return a pointer to the instance of flight `index`."""

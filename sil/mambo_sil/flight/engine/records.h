@@ -21,7 +21,7 @@ typedef struct {
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
-    int64_t lifting;          /* whether the controllers command the thrust */
+    int64_t commands_thrust;  /* whether the controllers command the thrust */
     int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
 
     double step_s;            /* a tick */
@@ -76,7 +76,7 @@ typedef struct {
     double integrated_error_m;
     double integral_limit_n;
     double take_off_thrust_n;
-    double capped_n;          /* a larger difference of thrusts is told to the controller */
+    double capped_n;          /* a larger difference of thrusts is reported to the controller */
 
     /* Mixer: the wrench that one unit of command of all rotors gives. */
     double wrench_per_command[4];
@@ -188,8 +188,8 @@ typedef struct {
 
 /* A position controller: reads a state of 7 and a target of 6 numbers, to which a course with a height adds height,
  * climb and vertical acceleration; writes roll and pitch, returns a status. One that commands the thrust reads states
- * of 10 and targets of 9 numbers, is told the thrust in place of that of the altitude loop, NaN for the commanded one,
- * and writes the thrust over mass behind the angles. */
+ * of 10 and targets of 9 numbers; its thrust is the reported one, NaN for the commanded one, and it writes the thrust
+ * over mass behind the angles. */
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
@@ -280,7 +280,7 @@ int64_t engine_pid_feedforward_step(void *self, const double *state, const doubl
 typedef struct {
     engine_controller_t controller;
     void *self;
-    int64_t lifting;          /* whether the controller commands the thrust */
+    int64_t commands_thrust;  /* whether the controller commands the thrust */
     int64_t effect;
     double values[10];
     int64_t columns[2];
@@ -312,7 +312,7 @@ typedef struct {
     void *memory;             /* of the generated controller */
     const void *level;        /* zero tilt, and with a thrust that of hover, in its numbers */
     double hover_m_s2;
-    int64_t lifting;
+    int64_t commands_thrust;
     int64_t patience;
     int64_t refused;
 } engine_levelling_t;

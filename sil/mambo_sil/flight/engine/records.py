@@ -45,10 +45,10 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = False) -> Record:
+def simulation_record(flight: Flight, times_s: FloatArray, *, commands_thrust: bool = False) -> Record:
     """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
 
-    `lifting` says whether the controllers command the thrust.
+    `commands_thrust` says whether the controllers command the thrust.
     """
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
@@ -74,8 +74,8 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = Fa
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
-            "lifting": lifting,
-            "target_columns": (flight.targets_in_space if lifting else flight.given_targets).shape[2],
+            "commands_thrust": commands_thrust,
+            "target_columns": (flight.targets_in_space if commands_thrust else flight.given_targets).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,

@@ -14,7 +14,7 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
-from mambo_sil.flight.controllers.thrust_controller import flown
+from mambo_sil.flight.controllers.thrust_controller import adapted
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.native import Native, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
@@ -52,7 +52,7 @@ def fly(
     machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
     UnwritableError if the engine cannot be built for want of a folder or space.
     """
-    controller = flown(controller)
+    controller = adapted(controller)
     engine = _engine(flight, [controller])
     if engine is None:
         return loop.fly(flight, controller, progress)
@@ -68,7 +68,7 @@ def fly_groups(
     which stays in the processor's cache. Engine, `progress` and errors as in `fly`; in NumPy all flights are
     one group.
     """
-    controllers = [flown(one) for one in controllers]
+    controllers = [adapted(one) for one in controllers]
     engine = _engine(flight, controllers)
     if engine is not None:
         yield from _fly_groups(engine, flight, controllers, progress)
@@ -84,7 +84,7 @@ def fly_compiled(
     """Simulate flights in a library of `engine_library.load`, group after group, with a controller in C."""
     simulation = _Simulation(engine, flight)
     trace = simulation.allocate(flight.flights)
-    called, record = native(engine, flown(controller)), trace_record(trace)
+    called, record = native(engine, adapted(controller)), trace_record(trace)
     for first in simulation.firsts:
         simulation.draw(first)
         simulation.fly(first, called, record, first)
@@ -139,7 +139,9 @@ class _Simulation:
         self.lanes = int(engine.engine_lanes())
         self.firsts = range(0, flight.flights, self.lanes)
         self._times_s = flight.times_s()
-        self._records = cache(lambda lifting: simulation_record(flight, self._times_s, lifting=lifting))
+        self._records = cache(
+            lambda commands_thrust: simulation_record(flight, self._times_s, commands_thrust=commands_thrust)
+        )
         self._groups = in_lanes(flight_records(flight, flight.given_targets[0]), self.lanes)
         updates = len(self._times_s)
         self._buffers = _Buffers(flight, self.lanes, updates, updates * flight.ticks_per_update)
@@ -156,8 +158,8 @@ class _Simulation:
 
     def fly(self, first: int, called: Native, record: Any, place: int) -> None:
         """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
-        flight, common = self._flight, self._records(called.lifts)
-        targets = flight.targets_in_space if called.lifts else flight.given_targets
+        flight, common = self._flight, self._records(called.commands_thrust)
+        targets = flight.targets_in_space if called.commands_thrust else flight.given_targets
         common["flights"] = place + min(self.lanes, flight.flights - first)
         self._engine.engine_fly(
             pointer("engine_simulation_t *", common),

@@ -60,7 +60,7 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
         sensors=choose_sensors(sensors, drone),
     )
     trace = fly(flight, CompiledController(settings, HEADINGS))
-    where = "true state" if sensors == "none" else f"through sensors {sensors}"
+    where = "true state" if sensors == "true" else f"through sensors {sensors}"
     fault = _fault(trace, drone, axes=2 if settings.height is None else 3)
     if fault is not None:
         return FlownSettings(good=False, words=f"flown for {DURATION_S:g} s: {fault} ({where})")

@@ -46,7 +46,7 @@ def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
     Raises BuildError, CacheError.
     """
     sensors = SENSORS_OF[drone.sensors.kind][-1]
-    where = "true state" if sensors == "none" else f"through sensors {sensors}"
+    where = "true state" if sensors == "true" else f"through sensors {sensors}"
     if drone.uncertainty is not None:
         where = f"{where}, at the worst of the intervals in [uncertainty]"
     drone = uncertain(drone, height=settings.height is not None)
@@ -88,7 +88,7 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
         certain = _at(drone, {**worst, name: 0})
         found.append((_reserve_of(measure_drone(settings, certain, sensors)), f"the interval of {words}"))
     for words, other in _without(drone, height=settings.height is not None):
-        seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"
+        seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "true"
         derived = controller_toml.parse(controller_text(other, drone.name), drone.name)
         found.append((_reserve_of(measure_drone(derived, _at(other, worst), seen)), words))
     if not found:
@@ -116,6 +116,6 @@ def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, Vehicle
         rotors = document["rotors"] | {"lag_s": 0.0}
         other = VehicleFile.model_validate(document | {"rotors": rotors})
         yield f"rotors.lag_s = {spell(drone.rotors.lag_s)}", other
-    if drone.sensors.kind != "none":
-        other = VehicleFile.model_validate(document | {"sensors": {"kind": "none"}})
+    if drone.sensors.kind != "true":
+        other = VehicleFile.model_validate(document | {"sensors": {"kind": "true"}})
         yield f"sensors.kind = {spell(drone.sensors.kind)}", other

@@ -18,7 +18,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     FlowDeckSensors,
     MamboSensors,
     MocapSensors,
-    NoSensors,
+    TrueState,
 )
 from mambo_sil.model.derive.step_response import fit_steps
 
@@ -36,6 +36,7 @@ MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
 LATE_VELOCITY_M_S: Final = 0.15
+TRUE_VELOCITY_M_S: Final = 0.02
 LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
 """Noise densities of the observer."""
@@ -46,6 +47,8 @@ LEAST_LAG_S, LONGEST_LAG_S = 0.03, 0.5
 THRUST_MIN_M_S2, THRUST_SHARE = 2.9, 0.95
 LEAST_THRUST_MAX_M_S2, MOST_THRUST_MAX_M_S2 = 10.8, 100.0
 """Bounds of height.thrust_max_m_s2."""
+TILT_SWINGS, TILT_SWINGS_1_S, THRUST_SWINGS_1_S = 3.0, 6.0, 4.0
+"""What a guard lets vary at once and in a second, over the tilt limit and over the range of the thrust."""
 DESCENT_M_S, DESCENT_S = 1.5, 0.265
 """Default of height.descent_m_s; and speed that is surely braked, over the acceleration upwards."""
 
@@ -78,7 +81,8 @@ def derive(drone: VehicleFile) -> list[Derived]:
         *_observer(drone),
         *_limits(drone),
         *_thrust_range(drone),
-        *_height(drone),
+        *(height := list(_height(drone))),
+        *_guard(drone, height),
     ]
 
 
@@ -166,7 +170,12 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
         yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
-    elif isinstance(sensors, NoSensors):
+    elif drone.knows_sensors and isinstance(sensors, TrueState):
+        yield Derived("observer", "position_noise", LEAST_POSITION_M, "The true state has no noise")
+        words = "Learns wind within tenths of a second"
+        yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
+        yield Derived("observer", "velocity_noise", TRUE_VELOCITY_M_S, "The true velocity is never late")
+    elif isinstance(sensors, TrueState):
         words = (
             "No sensors in the file: calm with those of the Mambo and with motion capture, best with neither"
         )
@@ -249,6 +258,22 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
         "" if descent_m_s < DESCENT_M_S else f", at most {DESCENT_M_S:g}"
     )
     yield Derived("height", "descent_m_s", min(descent_m_s, DESCENT_M_S), words)
+
+
+def _guard(drone: VehicleFile, height: list[Derived]) -> Iterator[Derived]:
+    """Yield the guard, by the tilt limit and, with settings of the height, the range of the thrust."""
+    tilt_rad = float(_tilt_limit(drone).value)
+    words = f"{TILT_SWINGS:g} times limits.tilt_rad: swings are free, and a mixer keeps its thrust"
+    yield Derived("guard", "tilt_rad", _round(TILT_SWINGS * tilt_rad), words)
+    words = f"{TILT_SWINGS_1_S:g} times limits.tilt_rad in a second: commands that rattle by more are bounded"
+    yield Derived("guard", "tilt_rad_s", _round(max(TILT_SWINGS_1_S * tilt_rad, 0.1)), words)
+    found = {each.key: float(each.value) for each in height}
+    if not found:
+        return
+    swing_m_s2 = (found["thrust_max_m_s2"] - found["thrust_min_m_s2"]) / drone.thrust_gain
+    yield Derived("guard", "thrust_m_s2", _round(swing_m_s2), "From the least thrust to the largest")
+    words = f"{THRUST_SWINGS_1_S:g} times that in a second"
+    yield Derived("guard", "thrust_m_s3", _round(THRUST_SWINGS_1_S * swing_m_s2), words)
 
 
 def _round(value: float) -> float:

@@ -148,10 +148,10 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     A row is of the update that the log counts, or of the one at its time; where the rows of several blocks
     have times of their own, each is of the nearest update. Raises LogError.
     """
-    is_given, lifts = settings.target.acceleration == "given", settings.height is not None
+    is_given, commands_thrust = settings.target.acceleration == "given", settings.height is not None
     wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
-    wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if lifts else ()
-    measured = (*STATE, *HEIGHT_STATE) if lifts else STATE
+    wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if commands_thrust else ()
+    measured = (*STATE, *HEIGHT_STATE) if commands_thrust else STATE
     log = _read(path, columns, (*measured, *wanted), settings.code.prefix)
     period_s = settings.horizon.update_period_s
     time_s, at = _updates(log, period_s)
@@ -168,12 +168,12 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         raise LogError((f"{log.name}: has no two updates with all inputs and commands",))
     filled = np.stack([_filled(name, found[:, k]) for k, name in enumerate(needed)], axis=1)
     state, target, command_rad = np.split(filled, [len(measured), len(measured) + len(wanted)], axis=1)
-    if lifts:
+    if commands_thrust:
         own = -state[:, len(STATE) :]
         state = np.column_stack([state[:, : len(STATE)], own, _held_or(log, GROUNDED, time_s, 0.0)])
     thrust_m_s2 = _held_or(log, THRUST, time_s, GRAVITY_M_S2)
     start_m_s2 = _held_or(log, START_THRUST, time_s, thrust_m_s2)
-    levelled = lifts & (_held_or(log, LEVELLED, time_s, 0.0) != 0.0)
+    levelled = commands_thrust & (_held_or(log, LEVELLED, time_s, 0.0) != 0.0)
     behind = _behind_gaps(is_logged, round(LONGEST_FILLED_S / period_s))
     begins = _take_overs(log, time_s) | behind
     begins |= np.diff(time_s, prepend=time_s[0]) > _PAUSE_UPDATES * period_s
@@ -188,7 +188,9 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         levelled=levelled,
         begins=begins,
         gaps=int(behind.sum()),
-        may_lie=_near_floor(state[:, -3]) if lifts and GROUNDED not in log.signals else np.zeros_like(begins),
+        may_lie=_near_floor(state[:, -3])
+        if commands_thrust and GROUNDED not in log.signals
+        else np.zeros_like(begins),
         is_exact=at is not None and _is_of_rows(log, needed),
         command_rad=command_rad,
         resampled=at is None,

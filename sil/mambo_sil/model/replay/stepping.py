@@ -17,20 +17,20 @@ def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: F
     command is none of the next ones.
     """
     n, settings = len(states), controller.settings
-    lifts = settings.height is not None
+    commands_thrust = settings.height is not None
     target = np.repeat(inputs.target[k : k + 1], n, axis=0)
-    done = controller.step(states, target, None if lifts else np.repeat(inputs.thrust_m_s2[k], n))
+    done = controller.step(states, target, None if commands_thrust else np.repeat(inputs.thrust_m_s2[k], n))
     sent = np.repeat(inputs.command_rad[k : k + 1], n, axis=0)
     if inputs.levelled[k]:
         sent = np.zeros_like(sent)
         done = replace(done, command_rad=sent.astype(done.command_rad.dtype))
     if settings.cost.norm == "quadratic" and (inputs.is_logged[k] or inputs.levelled[k]):
-        controller.set_command(np.column_stack([sent, done.thrust_m_s2]) if lifts else sent)
+        controller.set_command(np.column_stack([sent, done.thrust_m_s2]) if commands_thrust else sent)
     return done
 
 
 def begin(controller: CompiledController, inputs: LoggedInputs, k: int) -> None:
     """Reset a controller to the measured attitude, and with a height to the thrust, of update `k`."""
     held = inputs.state[k : k + 1, 4:6]
-    lifts = controller.settings.height is not None
-    controller.reset(np.column_stack([held, inputs.start_m_s2[k : k + 1]]) if lifts else held)
+    commands_thrust = controller.settings.height is not None
+    controller.reset(np.column_stack([held, inputs.start_m_s2[k : k + 1]]) if commands_thrust else held)

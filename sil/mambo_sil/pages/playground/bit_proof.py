@@ -61,7 +61,7 @@ def proof_flight(drone: VehicleFile, found: Sequence[PageController]) -> Flight:
 
     If one of the controllers commands the thrust, the height of the eight swings, for all of them.
     """
-    eight, spatial = Bernoulli(HALF_WIDTH_M, RATE_RAD_S), any(one.lifts for one in found)
+    eight, spatial = Bernoulli(HALF_WIDTH_M, RATE_RAD_S), any(one.commands_thrust for one in found)
     return Flight(
         InSpace(eight, Swing(SWING_M, SWING_RAD_S)) if spatial else eight,
         duration_s=DURATION_S,

@@ -33,7 +33,7 @@ class PageController:
         return PD_TITLES.get(self.source, echo(Path(self.source).resolve().name))
 
     @property
-    def lifts(self) -> bool:
+    def commands_thrust(self) -> bool:
         """Whether it commands the thrust too."""
         return isinstance(self.kind, Settings) and method_of(self.kind).has_height
 

@@ -115,8 +115,8 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
     """Return title, type of the C's numbers, and in base64 the record of a law without a model.
 
-    `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `lifts`: whether it
-    commands the thrust, and reads the height of its target. `walls`: floor and ceiling in m, if it has them.
+    `metre` is 1 m in the numbers of the C's limits; None: the controller has none. `commands_thrust`: whether
+    it does, and reads the height of its target. `walls`: floor and ceiling in m, if it has them.
     """
     if isinstance(one.kind, Settings):
         method = method_of(one.kind)
@@ -127,7 +127,7 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
             "scalar": one.kind.code.scalar,
             "constants": None,
             "metre": metre,
-            "lifts": one.lifts,
+            "commands_thrust": one.commands_thrust,
             "walls": (fence.floor_m, fence.ceiling_m) if fence.floor_m < fence.ceiling_m else (),
         }
     constants = pd_function(pd_controller(one.kind, flight))[1]
@@ -136,7 +136,7 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
         "scalar": "float64",
         "constants": _text(bytes(ffi.buffer(constants))),
         "metre": None,
-        "lifts": False,
+        "commands_thrust": False,
         "walls": (),
     }
 

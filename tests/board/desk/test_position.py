@@ -1,0 +1,97 @@
+"""The position as the app sees it: its source, whether it is lost, and how a lost drone comes down."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_sil.board.desk.desk_flight import Desk, DeskConditions, DeskSensors
+
+
+def started(library: Path, height_m: float, climb_s: float, conditions: DeskConditions) -> Desk:
+    """Return a drone that has begun a plan to a height."""
+    desk = Desk(library, conditions)
+    desk.run(1500)
+    desk.take_off(height_m, climb_s)
+    return desk
+
+
+def lost_ms(desk: Desk, milliseconds: int) -> int:
+    """Return for how many of the next milliseconds the position is lost."""
+    count = 0
+    for _ in range(milliseconds):
+        desk.run(1)
+        count += desk.log("nmpc.lost") > 0.0
+    return count
+
+
+@pytest.mark.parametrize("phase_ms", range(10))
+def test_a_flow_deck_is_no_lost_position_whenever_it_measures(phase_ms: int, flow_app: Path) -> None:
+    """In any of the ten milliseconds from prediction to prediction; its end is noticed in 0.3 s."""
+    flow = DeskConditions(seed=phase_ms, sensors=DeskSensors.FLOW_DECK, camera_offset_ms=phase_ms)
+    desk = started(flow_app, 2.5, 1.3, flow)
+    assert lost_ms(desk, 5000) == 0
+    desk.measure(on=False)
+    assert lost_ms(desk, 280) == 0
+    assert lost_ms(desk, 30) > 0
+
+
+@pytest.mark.parametrize("at_ms", [300, 500, 800, 1300, 1600])
+@pytest.mark.parametrize(("mass_kg", "bias_g"), [(0.03, 0.0), (0.03, -0.02), (0.036, 0.0)])
+def test_a_camera_lost_in_the_climb_brings_the_drone_down(
+    mass_kg: float, bias_g: float, at_ms: int, app: Path, preset_app: Path
+) -> None:
+    """It climbs no more than a tenth higher than the plan, and touches at 1.5 m/s at most."""
+    conditions = DeskConditions(
+        seed=at_ms, camera_offset_ms=3, mass_kg=mass_kg, accelerometer_bias_g=(0.0, 0.0, bias_g)
+    )
+    for library in (app, preset_app):
+        desk = started(library, 1.5, 1.5, conditions)
+        desk.run(at_ms)
+        desk.measure(on=False)
+        heights_m = []
+        for _ in range(400):
+            desk.run(25)
+            heights_m.append(desk.state.position_m[2])
+        assert max(heights_m) < 1.65
+        assert heights_m[-1] == 0.0
+        assert desk.log("nmpc.source") == 1.0
+        assert desk.state.touch_m_s < 1.5
+
+
+@pytest.mark.parametrize("period_ms", [2, 3, 4, 10, 33, 100])
+def test_a_measured_place_is_the_source_however_often_it_comes(period_ms: int, app: Path) -> None:
+    """Also several times a prediction, as base stations measure, and less often than the filter predicts."""
+    desk = started(app, 1.0, 2.0, DeskConditions(seed=period_ms, camera_period_ms=period_ms))
+    assert lost_ms(desk, 4000) == 0
+    assert (desk.log("nmpc.source"), desk.log("nmpc.badSource")) == (1.0, 0.0)
+    assert np.hypot(*desk.state.position_m[:2]) < 0.01
+
+
+def test_settings_for_another_source_are_named(app: Path, flow_app: Path) -> None:
+    """On the floor already, in the log and on the console, once."""
+    for library, sensors, found, words in (
+        (app, DeskSensors.FLOW_DECK, (2.0, 1.0), "only flow is measured: settings are for a measured place"),
+        (flow_app, DeskSensors.MOCAP, (1.0, 1.0), "a place is measured: settings are for a flow deck"),
+        (flow_app, DeskSensors.FLOW_DECK, (2.0, 0.0), ""),
+        (app, DeskSensors.MOCAP, (1.0, 0.0), ""),
+    ):
+        desk = Desk(library, DeskConditions(sensors=sensors, camera_offset_ms=3))
+        desk.run(2000)
+        desk.full_state(np.zeros((3, 3)))
+        desk.run(100)
+        assert (desk.log("nmpc.source"), desk.log("nmpc.badSource")) == found
+        assert desk.console.count("settings are for") == (words != "")
+        assert words in desk.console
+
+
+def test_the_source_changes_in_flight(flow_app: Path) -> None:
+    """A flow deck is found within a second, a camera within 20 ms."""
+    desk = started(flow_app, 1.0, 2.0, DeskConditions(camera_offset_ms=3))
+    desk.run(5000)
+    seen = []
+    for sensors, after_ms in ((DeskSensors.FLOW_DECK, 1000), (DeskSensors.MOCAP, 20)):
+        desk.switch(sensors)
+        desk.run(after_ms)
+        seen.append(desk.log("nmpc.source"))
+    assert seen == [2.0, 1.0]
