@@ -70,8 +70,8 @@ class Conditions:
         SensorsName,
         sensors_option(
             SENSORS_NAMES,
-            "What state all loops get: true; mocap, motion capture; mambo or mambo-derotated, by optical flow "
-            "with its rotation or without; flow-deck, with --app.",
+            "What state all loops get: true; mocap, motion capture; mambo or mambo-derotated, by optical "
+            "flow with its rotation or without; flow-deck, with --app.",
         ),
     ] = "true"
     altitude_loop: Annotated[
