@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.flights.wire import Faults, WiredLink
 from mambo_sil.api.states import TargetState
 from mambo_sil.errors import PilotError
 from mambo_sil.flight.trajectories import Circle, Gerono
@@ -18,7 +19,7 @@ from mambo_sil.link.records import PX4, STACKS, Arm, SetAttitude, SetMode, px4_m
 from mambo_sil.link.simulated import STARTS_M, Condition
 from mambo_sil.link.steering import Update
 from mambo_sil.model.replay.log_replay import replay_log
-from tests.support.links import Faults, WiredLink, controller, simulated
+from tests.support.links import controller, drone, simulated
 
 BOTH = tuple(STACKS)
 
@@ -68,7 +69,7 @@ def test_a_program_flies_to_places_with_headings_and_follows_its_targets() -> No
 @pytest.mark.parametrize("stack", BOTH)
 def test_a_bad_link_costs_little(stack: str) -> None:
     """Of both directions a fifth is lost, a tenth late, a tenth doubled, a tenth followed by garbage."""
-    link, updates = WiredLink(stack, seed=3), list[Update]()
+    link, updates = WiredLink(stack, drone(), seed=3), list[Update]()
     link.wire.to_pilot = link.wire.to_autopilot = Faults(lost=0.2, late=0.1, doubled=0.1, garbage=0.1)
     pilot = Pilot(controller(), lambda: link, updates.append)
     with pilot:
@@ -83,7 +84,7 @@ class Hovering:
     """A pilot that hovers at 1 m behind a wire, in a flight in which something happens."""
 
     def __init__(self, stack: str, condition: Condition | None = None) -> None:
-        self.link, self.updates = WiredLink(stack, condition), list[Update]()
+        self.link, self.updates = WiredLink(stack, drone(), condition), list[Update]()
         self.autopilot = self.link.autopilot
         self.away_m: list[float] = []
         self._happens: list[tuple[float, Callable[[], None]]] = []

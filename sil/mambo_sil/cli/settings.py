@@ -97,7 +97,7 @@ def identify(
     logs: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="Logs of one drone: CSV, also trace.csv and that of the Crazyflie's client, or ULog.",
+            help="Logs of one drone: CSV, trace.csv and that of the Crazyflie's client too; ULog; DataFlash.",
             metavar="LOG...",
         ),
     ] = None,
