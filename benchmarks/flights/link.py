@@ -26,7 +26,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
 from mambo_sil.flight.trajectories import Circle, Gerono, Trajectory
 from mambo_sil.link.pilot import Pilot
-from mambo_sil.link.records import STACKS, Estimate
+from mambo_sil.link.records import STACKS, EstimatedState
 from mambo_sil.link.simulated import Condition
 from mambo_sil.link.steady_frame import SteadyFrame
 from mambo_sil.link.steering import Update
@@ -61,13 +61,13 @@ HEIGHT_M: Final = 1.5
 class JumpingFrame(SteadyFrame):
     """The frame of the estimator as it is."""
 
-    def hold(self, estimate: Estimate) -> Estimate:
+    def hold(self, estimate: EstimatedState) -> EstimatedState:
         """Return the estimate."""
         return estimate
 
 
 @dataclass
-class Flown:
+class WiredFlight:
     """A flight: its steps, the end of it, and what has happened to the drone since it hovers."""
 
     updates: list[Update] = field(default_factory=list)
@@ -104,11 +104,11 @@ def fly(
     faults: Faults | None = None,
     happens: Callable[[WiredLink, float], None] = lambda link, time_s: None,  # noqa: ARG005 - nothing does
     frame: SteadyFrame | None = None,
-) -> Flown:
+) -> WiredFlight:
     """Fly a course from the ground to the ground; `happens` is called with the time since the take-over."""
     settings = controller_toml.parse(controller_text(drone, DRONE.name), DRONE.name)
     settings = controller_toml.with_option(settings, "target.acceleration", "given", "acceleration")
-    flown, begun_s = Flown(), math.inf
+    flown, begun_s = WiredFlight(), math.inf
     link = WiredLink(stack, drone, Condition(yaw_rad=heading_rad))
 
     def watch(_: Pilot) -> None:

@@ -24,7 +24,7 @@ class Faults:
     """Delay of all datagrams."""
 
 
-class Wire:
+class UdpWire:
     """Carries datagrams between an autopilot and a pilot by two sockets of the loopback."""
 
     def __init__(self, pilot_port: int, seed: int) -> None:
@@ -85,7 +85,7 @@ class WiredLink(UdpLink):
         self, stack: str, drone: VehicleFile, condition: Condition | None = None, seed: int = 0
     ) -> None:
         super().__init__(Address("127.0.0.1", 0))
-        self.wire = Wire(self.socket.port, seed)
+        self.wire = UdpWire(self.socket.port, seed)
         self.autopilot = SimulatedAutopilot(STACKS[stack], drone, self.wire.address, condition)
 
     def now_s(self) -> float:

@@ -17,7 +17,7 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     Order,
     Parameter,
@@ -45,9 +45,11 @@ def beat(stack: Stack = PX4, *, armed: bool = False, mode: int = 0, vehicle: int
     return Heartbeat(1, 1, stack.ident, vehicle, armed, mode)
 
 
-def estimate(time_s: float, height_m: float = 0.0, roll_rad: float = 0.0) -> Estimate:
+def estimate(time_s: float, height_m: float = 0.0, roll_rad: float = 0.0) -> EstimatedState:
     """Return an estimate at rest."""
-    return Estimate(time_s, np.array([0.0, 0.0, -height_m]), np.zeros(3), np.array([roll_rad, 0.0, 0.0]))
+    return EstimatedState(
+        time_s, np.array([0.0, 0.0, -height_m]), np.zeros(3), np.array([roll_rad, 0.0, 0.0])
+    )
 
 
 class Ground:
@@ -279,7 +281,7 @@ def test_the_state_out_of_range_makes_it_land() -> None:
     ground = flying()
     for _ in range(100):
         ground.now_s += PERIOD_S
-        far = Estimate(ground.now_s, np.array([9e5, 0.0, -1.0]), np.zeros(3), np.zeros(3))
+        far = EstimatedState(ground.now_s, np.array([9e5, 0.0, -1.0]), np.zeros(3), np.zeros(3))
         ground.tell(far)
     assert ground.life.phase is Phase.LANDING
     ground.tell(beat(armed=True, mode=PX4.land), beat(armed=False, mode=PX4.land))

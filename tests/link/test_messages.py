@@ -16,7 +16,7 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     OnGround,
     Order,
@@ -160,7 +160,7 @@ def test_a_position_and_an_attitude_make_an_estimate() -> None:
     sender.mav.local_position_ned_send(1200, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
     first, attitude, estimate, late = map(reader.read, sender.messages())
     assert (first, attitude, late) == (None, None, None)
-    assert isinstance(estimate, Estimate)
+    assert isinstance(estimate, EstimatedState)
     assert (estimate.time_s, estimate.resets) == (1.01, None)
     np.testing.assert_allclose(estimate.position_m, [1.0, 2.0, -3.0])
     np.testing.assert_allclose(estimate.velocity_m_s, [0.1, 0.2, -0.3], atol=1e-7)
@@ -177,7 +177,7 @@ def test_an_odometry_has_its_velocity_in_either_frame(child: int, velocity: list
         *(0.0, 0.0, 0.0, unknown, unknown, 4, 8),
     )
     (estimate,) = map(RecordReader().read, sender.messages())
-    assert isinstance(estimate, Estimate)
+    assert isinstance(estimate, EstimatedState)
     assert (estimate.time_s, estimate.resets) == (2.0, 4)
     np.testing.assert_allclose(estimate.velocity_m_s, velocity, atol=1e-7)
     np.testing.assert_allclose(estimate.attitude_rad, [0.0, 0.0, math.pi / 2.0], atol=1e-6)

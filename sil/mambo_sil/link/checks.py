@@ -10,7 +10,7 @@ from mambo_sil.link.records import (
     STACKS,
     AskParameter,
     Battery,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     Order,
     Parameter,
@@ -54,7 +54,7 @@ class Preflight:
         self._stack, self._period_s = stack, period_s
         self._parameters: dict[str, float] = {}
         self._battery: float | None = None
-        self._estimates: list[Estimate] = []
+        self._estimates: list[EstimatedState] = []
 
     def receive(self, record: Record) -> None:
         """Take a record that has come."""
@@ -63,7 +63,7 @@ class Preflight:
                 self._parameters[record.name] = record.value
             case Battery():
                 self._battery = record.share
-            case Estimate():
+            case EstimatedState():
                 self._estimates.append(record)
 
     def requests(self) -> list[Order]:

@@ -15,7 +15,7 @@ SOFT_S: Final = 4.0
 """Time in which a curve reaches its rate, and comes to rest at its end."""
 
 
-class Course(Protocol):
+class TargetCourse(Protocol):
     """Targets over time."""
 
     @property
@@ -65,7 +65,7 @@ class Along:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class TargetProgram:
     """The targets of a program."""
 
     function: Callable[[float], TargetState]

@@ -1,7 +1,7 @@
 """The life of a flight: connect, check, arm, climb, fly, land; without a socket and without a clock.
 
 Give it what comes (`receive`), and send what it wants (`orders`), both with the present time. Every way in
-which it can end is an `End` with a sentence.
+which it can end is an `FlightEnd` with a sentence.
 """
 
 import math
@@ -12,14 +12,14 @@ from typing import Final
 import numpy as np
 
 from mambo_sil.link.checks import Preflight, stack_of
-from mambo_sil.link.courses import Course, Place
+from mambo_sil.link.courses import Place, TargetCourse
 from mambo_sil.link.records import (
     COMPANION,
     SET_MODE,
     Answer,
     Arm,
     Beat,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     OnGround,
     Order,
@@ -67,7 +67,7 @@ _IN_FLIGHT: Final = (Phase.ARMING, Phase.CLIMBING, Phase.FLYING, Phase.LANDING)
 
 
 @dataclass(frozen=True)
-class End:
+class FlightEnd:
     """How a flight ended; good if as planned."""
 
     sentence: str
@@ -94,16 +94,16 @@ class LifeCycle:
     def __init__(self, steering: Steering, height_m: float) -> None:
         self.steering, self.height_m = steering, height_m
         self.phase = Phase.CONNECTING
-        self.end: End | None = None
+        self.end: FlightEnd | None = None
         self.stack: Stack | None = None
         self.system = 0
-        self.estimate: Estimate | None = None
-        self.course: Course = Place(np.zeros(3))
+        self.estimate: EstimatedState | None = None
+        self.course: TargetCourse = Place(np.zeros(3))
         self.course_time_s = 0.0
         """Time on the clock of the course, which stands still while there is no estimate."""
         self._begun_s: float | None = None
         self._preflight: Preflight | None = None
-        self._fresh: Estimate | None = None
+        self._fresh: EstimatedState | None = None
         self._landed, self._armed, self._mode = False, False, -1
         self._lands = False
         """Whether the autopilot has accepted to land."""
@@ -117,7 +117,7 @@ class LifeCycle:
 
     # What the pilot is told to do.
 
-    def fly(self, course: Course) -> None:
+    def fly(self, course: TargetCourse) -> None:
         """Fly a course from now on."""
         self.course, self.course_time_s = course, 0.0
 
@@ -164,7 +164,7 @@ class LifeCycle:
         match record:
             case Heartbeat():
                 self._receive_heartbeat(record)
-            case Estimate():
+            case EstimatedState():
                 self._receive_estimate(record, now_s)
             case Answer() if record.command == SET_MODE and self.phase is Phase.LANDING:
                 self._lands |= record.accepted
@@ -220,7 +220,7 @@ class LifeCycle:
                 good=False,
             )
 
-    def _receive_estimate(self, estimate: Estimate, now_s: float) -> None:
+    def _receive_estimate(self, estimate: EstimatedState, now_s: float) -> None:
         """Keep an estimate that is newer than the last one, and not late."""
         if self.estimate is not None and estimate.time_s <= self.estimate.time_s:
             return
@@ -358,7 +358,7 @@ class LifeCycle:
             return []
         return [self.steering.level(self.estimate.time_s + now_s - self._estimate_s)]
 
-    def _step(self, estimate: Estimate, now_s: float) -> list[Order]:
+    def _step(self, estimate: EstimatedState, now_s: float) -> list[Order]:
         """Step the controller; land if it refuses the state for long."""
         last_s, self._stepped_s = self._stepped_s, estimate.time_s
         passed_s = estimate.time_s - last_s
@@ -393,4 +393,4 @@ class LifeCycle:
         self._ask, self._arm, self._changes_mode = Timer(ASK_S), Timer(BEAT_S), Timer(BEAT_S)
 
     def _finish(self, sentence: str, *, good: bool) -> None:
-        self.phase, self.end = Phase.ENDED, End(sentence, good)
+        self.phase, self.end = Phase.ENDED, FlightEnd(sentence, good)

@@ -10,7 +10,7 @@ from mambo_sil.link.simulated import Condition, SimulatedAutopilot
 from mambo_sil.link.sockets import Address, MavlinkSocket
 
 
-class Link(Protocol):
+class AutopilotLink(Protocol):
     """What the pilot's loop needs of a link."""
 
     @property

@@ -24,7 +24,7 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     OnGround,
     Order,
@@ -158,11 +158,11 @@ def send_record(mav: Any, record: Record, stream: Stream | None = None) -> None:
             mav.sys_status_send(0, 0, 0, 0, 12000, -1, share, 0, 0, 0, 0, 0, 0)
         case Text():
             mav.statustext_send(4, record.text.encode())
-        case Estimate():
+        case EstimatedState():
             _send_estimate(mav, record, stream)
 
 
-def _send_estimate(mav: Any, estimate: Estimate, stream: Stream | None) -> None:
+def _send_estimate(mav: Any, estimate: EstimatedState, stream: Stream | None) -> None:
     position, velocity = estimate.position_m.tolist(), estimate.velocity_m_s.tolist()
     q, ms = quaternion(estimate.attitude_rad), _milliseconds(estimate.time_s)
     match stream:
@@ -219,7 +219,7 @@ class RecordReader:
         read = _READ.get(message.get_type())
         return self._estimate(message) if read is None else read(message)
 
-    def _estimate(self, message: Any) -> Estimate | None:
+    def _estimate(self, message: Any) -> EstimatedState | None:
         match message.get_type():
             case "ODOMETRY":
                 self._has_odometry = True
@@ -234,7 +234,7 @@ class RecordReader:
                 if abs(time_s - measured_s) > OLDEST_ATTITUDE_S:
                     return None
                 position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
-                return _finite(Estimate(time_s, np.array(position), np.array(velocity), attitude_rad))
+                return _finite(EstimatedState(time_s, np.array(position), np.array(velocity), attitude_rad))
         return None
 
 
@@ -242,7 +242,7 @@ OLDEST_ATTITUDE_S: Final = 0.1
 """Largest time between a position and the attitude that goes with it."""
 
 
-def _read_odometry(message: Any) -> Estimate | None:
+def _read_odometry(message: Any) -> EstimatedState | None:
     """Return the estimate of an ODOMETRY; None in frames other than NED."""
     attitude_rad = _attitude(message.q)
     velocity = np.array([message.vx, message.vy, message.vz])
@@ -253,10 +253,12 @@ def _read_odometry(message: Any) -> Estimate | None:
     elif message.child_frame_id != LOCAL_NED:
         return None
     position = np.array([message.x, message.y, message.z])
-    return _finite(Estimate(message.time_usec / 1e6, position, velocity, attitude_rad, message.reset_counter))
+    return _finite(
+        EstimatedState(message.time_usec / 1e6, position, velocity, attitude_rad, message.reset_counter)
+    )
 
 
-def _finite(estimate: Estimate) -> Estimate | None:
+def _finite(estimate: EstimatedState) -> EstimatedState | None:
     """Return an estimate of finite numbers, None for another."""
     return estimate if np.isfinite([estimate.position_m, estimate.velocity_m_s]).all() else None
 

@@ -20,11 +20,11 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import ArgumentError, PilotError
 from mambo_sil.flight.trajectories import Trajectory
-from mambo_sil.link.courses import Along, Course, Place, Program
+from mambo_sil.link.courses import Along, Place, TargetCourse, TargetProgram
 from mambo_sil.link.life_cycle import LifeCycle, Phase
-from mambo_sil.link.links import Link, SimulatedLink, UdpLink
+from mambo_sil.link.links import AutopilotLink, SimulatedLink, UdpLink
 from mambo_sil.link.messages import send_order
-from mambo_sil.link.records import PX4, STACKS, Estimate, SetMode
+from mambo_sil.link.records import PX4, STACKS, EstimatedState, SetMode
 from mambo_sil.link.sockets import parse_link
 from mambo_sil.link.steering import Steering, Update
 
@@ -48,7 +48,7 @@ class Pilot:
     def __init__(
         self,
         controller: Controller,
-        open_link: Callable[[], Link],
+        open_link: Callable[[], AutopilotLink],
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
         watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
     ) -> None:
@@ -108,7 +108,7 @@ class Pilot:
         require_number("duration_s", duration_s, 0.1, LONGEST_S)
         if not callable(targets):
             raise ArgumentError(f"targets = {targets!r} must be a function of the time")
-        self._fly(Program(targets, duration_s), lambda: self.life.is_course_over)
+        self._fly(TargetProgram(targets, duration_s), lambda: self.life.is_course_over)
 
     def land(self, why: str = "as planned") -> str:
         """Land by the autopilot's own controller; return how the flight ended."""
@@ -142,7 +142,7 @@ class Pilot:
         """Where the present target is (3,)."""
         return self.life.course.target(self.life.course_time_s).position_m
 
-    def _fly(self, course: Course, until: Callable[[], bool]) -> None:
+    def _fly(self, course: TargetCourse, until: Callable[[], bool]) -> None:
         if self.life.phase is not Phase.FLYING:
             raise PilotError(f"the drone does not fly (it is {self.life.phase.value}): take off first")
         self.life.fly(course)
@@ -223,7 +223,7 @@ class _Arrival:
     def __init__(self, position_m: FloatArray) -> None:
         self.position_m, self._since_s = position_m, math.inf
 
-    def is_at(self, estimate: Estimate | None) -> bool:
+    def is_at(self, estimate: EstimatedState | None) -> bool:
         """Return whether it has, at an estimate."""
         if estimate is None or float(np.linalg.norm(estimate.position_m - self.position_m)) > NEAR_M:
             self._since_s = math.inf

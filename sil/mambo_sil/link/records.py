@@ -127,7 +127,7 @@ class Heartbeat:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class EstimatedState:
     """The estimated state."""
 
     time_s: float
@@ -178,7 +178,7 @@ class Text:
     text: str
 
 
-Record = Heartbeat | Estimate | Parameter | Answer | OnGround | Battery | Text
+Record = Heartbeat | EstimatedState | Parameter | Answer | OnGround | Battery | Text
 
 
 # What the pilot sends.

@@ -27,7 +27,7 @@ from mambo_sil.link.records import (
     Arm,
     AskParameter,
     Battery,
-    Estimate,
+    EstimatedState,
     Heartbeat,
     OnGround,
     Order,
@@ -146,11 +146,11 @@ class SimulatedAutopilot:
         if not self.silent:
             self._send(estimate)
 
-    def _estimate(self, seen: Seen) -> Estimate:
+    def _estimate(self, seen: Seen) -> EstimatedState:
         """Return the estimate, with the jumps of its frame; its origin is where the drone starts."""
         attitude_rad = seen.euler_rad[:, 0] + np.array([0.0, 0.0, self._error_rad])
         attitude_rad[2] = float(wrapped(attitude_rad[2]))
-        return Estimate(
+        return EstimatedState(
             self.time_s,
             seen.position_m[:, 0] - np.array(STARTS_M) + self._error_m,
             seen.velocity_m_s[:, 0] + self.drift_m_s,
@@ -208,7 +208,7 @@ class SimulatedAutopilot:
         elif self.time_s - self._landed_s > DISARMS_S:
             self.armed = False
 
-    def _advance(self, seen: Seen, estimate: Estimate) -> None:
+    def _advance(self, seen: Seen, estimate: EstimatedState) -> None:
         """Move the plant by a tick."""
         self._state, moment = self._world.tick(self._state, self.time_s)
         if not self.armed and self.is_on_ground:
@@ -229,7 +229,7 @@ class SimulatedAutopilot:
         )
         self._state = carry_on_ground(self._state, self._there)
 
-    def _hold(self, estimate: Estimate) -> tuple[FloatArray, float]:
+    def _hold(self, estimate: EstimatedState) -> tuple[FloatArray, float]:
         """Return roll, pitch (2,) and thrust in N towards its own aim: its own controller, a PD."""
         if self.mode == self.stack.land:
             descent_m_s = DESCENT_M_S
@@ -251,7 +251,7 @@ class SimulatedAutopilot:
         share = min(max(1.0 - down / GRAVITY_M_S2, 0.2), 1.8)
         return tilt_rad, share * self.drone.hover_demand_n
 
-    def _send(self, estimate: Estimate) -> None:
+    def _send(self, estimate: EstimatedState) -> None:
         """Send what is due."""
         if self._is_due("heartbeat", 1.0):
             self._emit(Heartbeat(1, 1, self.stack.ident, 2, self.armed, self.mode))
@@ -279,6 +279,6 @@ class SimulatedAutopilot:
 
     def _emit(self, record: Record, stream: Stream | None = None) -> None:
         mav: Any = self.socket.mav
-        if isinstance(record, Estimate) and self.stack.name != "PX4":
+        if isinstance(record, EstimatedState) and self.stack.name != "PX4":
             record = replace(record, resets=None)
         send_record(mav, record, stream)

@@ -18,7 +18,7 @@ import numpy as np
 
 from mambo_sil.api.frames import wrapped
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.link.records import Estimate
+from mambo_sil.link.records import EstimatedState
 
 JUMP_M, JUMP_RAD = 0.1, 0.1
 """Smallest changes that are taken for a jump where the estimator does not count its resets."""
@@ -40,7 +40,7 @@ class SteadyFrame:
         """Jumps so far."""
         self.heading_change_rad = 0.0
         """What the heading has jumped by so far."""
-        self._last: Estimate | None = None
+        self._last: EstimatedState | None = None
         self._offset_m: FloatArray = np.zeros(3)
         self._offset_m_s: FloatArray = np.zeros(3)
 
@@ -49,12 +49,12 @@ class SteadyFrame:
         """What remains of the jumps of the position (3,)."""
         return self._offset_m
 
-    def begin(self, estimate: Estimate) -> None:
+    def begin(self, estimate: EstimatedState) -> None:
         """Take an estimate as it is, and forget what was before."""
         self._last = estimate
         self._offset_m, self._offset_m_s = np.zeros(3), np.zeros(3)
 
-    def hold(self, estimate: Estimate) -> Estimate:
+    def hold(self, estimate: EstimatedState) -> EstimatedState:
         """Return an estimate less the rest of the jumps; its heading is the new one."""
         last, self._last = self._last, estimate
         if last is None or (passed_s := estimate.time_s - last.time_s) > LONGEST_S:
@@ -82,14 +82,16 @@ class SteadyFrame:
         self._offset_m_s = left * (self._offset_m_s - FADING_1_S * passed_s * pull_m_s)
 
 
-def _changes(last: Estimate, estimate: Estimate, passed_s: float) -> tuple[FloatArray, FloatArray, float]:
+def _changes(
+    last: EstimatedState, estimate: EstimatedState, passed_s: float
+) -> tuple[FloatArray, FloatArray, float]:
     """Return by what position and velocity (3,) and heading differ from the expected ones."""
     expected_m = last.position_m + passed_s * last.velocity_m_s
     turned_rad = float(wrapped(estimate.attitude_rad[2] - last.attitude_rad[2]))
     return estimate.position_m - expected_m, estimate.velocity_m_s - last.velocity_m_s, turned_rad
 
 
-def _has_jumped(last: Estimate, estimate: Estimate, passed_s: float) -> bool:
+def _has_jumped(last: EstimatedState, estimate: EstimatedState, passed_s: float) -> bool:
     """Return whether the frame has moved: by the count of the estimator, else by the size of the change."""
     if last.resets is not None and estimate.resets is not None:
         return last.resets != estimate.resets

@@ -13,7 +13,7 @@ from mambo_sil.api.frames import wrapped
 from mambo_sil.api.outcome import StepOutcome
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.errors import LinkError
-from mambo_sil.link.records import Estimate, SetAttitude
+from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import SteadyFrame
 
 PAUSE_S: Final = 0.1
@@ -30,7 +30,7 @@ LEARNS_S: Final = 3.0
 class Update:
     """One step of the controller: what it got, and what it commanded."""
 
-    estimate: Estimate
+    estimate: EstimatedState
     """As the controller got it."""
     target: TargetState
     command_rad: tuple[float, float]
@@ -67,11 +67,11 @@ class Steering:
         self.frame = SteadyFrame()
         self.take_overs = 0
         self._record = record
-        self._last: Estimate | None = None
+        self._last: EstimatedState | None = None
         self._sent_rad, self._sent_m_s2, self._yaw_rad = np.zeros(2), self.hover_m_s2, 0.0
         self._last_s = self._clock_s = -math.inf
 
-    def begin(self, estimate: Estimate) -> None:
+    def begin(self, estimate: EstimatedState) -> None:
         """Begin anew at an estimate, with the thrust of hover."""
         roll_rad, pitch_rad, yaw_rad = estimate.attitude_rad.tolist()
         most_rad = self.controller.settings.limits.tilt_rad
@@ -84,7 +84,7 @@ class Steering:
         self._yaw_rad = yaw_rad - self.frame.heading_change_rad
         self.take_overs += 1
 
-    def steer(self, estimate: Estimate, targets: Targets) -> SetAttitude | None:
+    def steer(self, estimate: EstimatedState, targets: Targets) -> SetAttitude | None:
         """Return the set-point for an estimate; None if it comes within the period of the last one.
 
         The controller steps once for each of its periods that has passed: where estimates are lost, with
@@ -106,7 +106,7 @@ class Steering:
         outcome = self._step(held, target)
         return self._send(held, target, outcome, steps * period_s)
 
-    def _step(self, held: Estimate, target: TargetState) -> StepOutcome:
+    def _step(self, held: EstimatedState, target: TargetState) -> StepOutcome:
         state = DroneState(held.position_m, held.velocity_m_s, held.attitude_rad)
         return self.controller.step(state, self._turned(target))
 
@@ -116,7 +116,7 @@ class Steering:
         return TargetState(target.position_m, target.velocity_m_s, target.acceleration_m_s2, yaw_rad)
 
     def _send(
-        self, held: Estimate, target: TargetState, outcome: StepOutcome, passed_s: float
+        self, held: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float
     ) -> SetAttitude:
         """Return the set-point of an outcome, and record it; the controller learns of a capped thrust."""
         roll_rad, pitch_rad, heading_rad, thrust_m_s2 = outcome.attitude_thrust("NED").tolist()
@@ -146,10 +146,10 @@ class Steering:
         return self._yaw_rad + self.frame.heading_change_rad
 
 
-def _between(last: Estimate, now: Estimate, share: float) -> Estimate:
+def _between(last: EstimatedState, now: EstimatedState, share: float) -> EstimatedState:
     """Return the estimate on the line from the last one to now, after a share of the way."""
     turned_rad = wrapped(now.attitude_rad - last.attitude_rad)
-    return Estimate(
+    return EstimatedState(
         last.time_s + share * (now.time_s - last.time_s),
         last.position_m + share * (now.position_m - last.position_m),
         last.velocity_m_s + share * (now.velocity_m_s - last.velocity_m_s),

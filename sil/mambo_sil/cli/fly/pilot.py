@@ -20,7 +20,7 @@ from mambo_sil.cli.options import (
 
 if TYPE_CHECKING:
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.link.links import Link
+    from mambo_sil.link.links import AutopilotLink
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.steering import Update
 
@@ -108,7 +108,7 @@ def pilot(
         raise typer.Exit(1)
 
 
-def _opener(link: str | None, simulate: str | None, vehicle: str | None) -> "Callable[[], Link]":
+def _opener(link: str | None, simulate: str | None, vehicle: str | None) -> "Callable[[], AutopilotLink]":
     """Return what opens the link that the options describe; raises LinkError, BadParameter."""
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.link.links import SimulatedLink, UdpLink
