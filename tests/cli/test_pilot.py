@@ -18,6 +18,7 @@ def settings() -> str:
     return "controller.toml"
 
 
+@pytest.mark.long
 def test_a_simulated_flight_writes_a_log_that_replay_and_identify_read(settings: str) -> None:
     """It says how it ended, how near it stayed, and what thrust hover took."""
     line = ("--simulate", "px4", "--vehicle", "drone.toml", "--duration-s", "14", "--rate-rad-s", "1.1")

@@ -31,6 +31,7 @@ def horizontal_rms_m(updates: list[Update], settled_s: float = 2.0) -> float:
     return float(np.sqrt(np.mean(np.sum(error_m[time_s > time_s[0] + settled_s] ** 2, axis=1))))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("stack", BOTH)
 def test_a_curve_is_flown_and_the_log_repeats_it(stack: str, tmp_path: Path) -> None:
     """From the ground to the ground, near the curve; hover is learnt; the log is one of the controller."""
@@ -51,6 +52,7 @@ def test_a_curve_is_flown_and_the_log_repeats_it(stack: str, tmp_path: Path) -> 
     np.testing.assert_array_equal(replay.replayed_rad, replay.logged_rad)
 
 
+@pytest.mark.long
 def test_a_program_flies_to_places_with_headings_and_follows_its_targets() -> None:
     """North of the place of take-off with the nose to the east, then a line; the truth is there."""
     pilot, autopilot, _ = simulated("px4")
@@ -66,6 +68,7 @@ def test_a_program_flies_to_places_with_headings_and_follows_its_targets() -> No
     assert SetMode(PX4.land) in autopilot.orders
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stack", BOTH)
 def test_a_bad_link_costs_little(stack: str) -> None:
     """Of both directions a fifth is lost, a tenth late, a tenth doubled, a tenth followed by garbage."""
@@ -126,6 +129,7 @@ HERE = TargetState([0.0, 0.0, -1.0], np.zeros(3), np.zeros(3))
 LOST = Faults(lost=1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stack", BOTH)
 def test_estimates_lost_for_a_second_are_a_pause(stack: str) -> None:
     """Level set-points while none comes; then the controller begins anew where the drone is."""
@@ -143,6 +147,7 @@ def test_estimates_lost_for_a_second_are_a_pause(stack: str) -> None:
     assert not any(order.attitude_rad[:2].any() for order in level)
 
 
+@pytest.mark.long
 def test_px4_leaves_offboard_when_the_link_is_lost_for_longer() -> None:
     """By its own failsafe; the pilot sees another mode, and sends nothing more."""
     flight = Hovering("px4")
@@ -151,6 +156,7 @@ def test_px4_leaves_offboard_when_the_link_is_lost_for_longer() -> None:
     assert flight.autopilot.armed
 
 
+@pytest.mark.long
 def test_ardupilot_is_flown_on_after_a_link_lost_for_a_second() -> None:
     """It flies level by itself, and stays in GUIDED."""
     flight = Hovering("ardupilot")
@@ -159,6 +165,7 @@ def test_ardupilot_is_flown_on_after_a_link_lost_for_a_second() -> None:
     assert max(flight.away_m) < 0.5
 
 
+@pytest.mark.long
 def test_late_estimates_are_not_flown_by() -> None:
     """From a time on all come 0.3 s late: level, and after two seconds it lands."""
     flight = Hovering("px4")
@@ -184,6 +191,7 @@ def test_the_pilots_switch_takes_the_drone() -> None:
     assert {type(order) for order in flight.autopilot.orders} <= {SetAttitude}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stack", BOTH)
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0])
 def test_a_jump_of_the_estimator_does_not_bump_the_drone(stack: str, heading_rad: float) -> None:
@@ -198,6 +206,7 @@ def test_a_jump_of_the_estimator_does_not_bump_the_drone(stack: str, heading_rad
     np.testing.assert_allclose(glided_m, [-0.16, 0.12], atol=0.02)
 
 
+@pytest.mark.long
 def test_a_counted_jump_may_be_small_and_have_a_velocity() -> None:
     """The estimator was wrong by 0.1 m/s for a second: roll and pitch move by less than 4 degrees."""
     flight = Hovering("px4")
@@ -216,6 +225,7 @@ def test_a_counted_jump_may_be_small_and_have_a_velocity() -> None:
     np.testing.assert_allclose(flight.autopilot.true.position_m[:2, 0], START[:2], atol=0.02)
 
 
+@pytest.mark.long
 def test_ctrl_c_lands_and_raises() -> None:
     """The program is told after the landing."""
     flight = Hovering("px4")
@@ -239,6 +249,7 @@ def interrupt() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.mark.long
 def test_an_error_of_the_program_makes_the_drone_land() -> None:
     """And is not hidden."""
     flight = Hovering("ardupilot")

@@ -1,7 +1,7 @@
 """The life of a flight: connect, check, arm, climb, fly, land; without a socket and without a clock.
 
 Give it what comes (`receive`), and send what it wants (`orders`), both with the present time. Every way in
-which it can end is an `FlightEnd` with a sentence.
+which it can end is a `FlightEnd` with a sentence.
 """
 
 import math
