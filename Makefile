@@ -104,7 +104,7 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o build/generated/mambo-fixed
 	$(BIN)/mambo-nmpc generate table1 -o build/generated/table1
 	for name in mambo-fixed table1; do \
-	    cp build/generated/$$name/nmpc* build/generated/$$name/controller.toml build/generated/$$name/manifest.json generated/$$name; done
+	    cp build/generated/$$name/nmpc.[ch] build/generated/$$name/manifest.json generated/$$name; done
 
 docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

@@ -262,7 +262,7 @@ def _fault(details: ErrorDetails) -> str:
 
 
 def _fields(section: Sequence[int | str]) -> dict[str, Any]:
-    """Return the fields of a section, those of a board if `section` is empty."""
+    """Return the fields of a section, or of a board if `section` is empty."""
     model: Any = Board
     for part in section:
         annotation = model.model_fields[part].annotation

@@ -85,7 +85,7 @@ _remembered: Final[dict[str, str]] = {}
 
 @lru_cache
 def _shipped() -> dict[str, str]:
-    """Return the shipped results as JSON, by key; none if they are those of other source."""
+    """Return the shipped results as JSON, by key; none if they were made from other source."""
     try:
         document = json.loads(resources.files("mambo_codegen").joinpath(SHIPPED).read_text("utf-8"))
     except (OSError, ValueError):

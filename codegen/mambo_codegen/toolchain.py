@@ -58,7 +58,7 @@ class Toolchain:
 def host_toolchain(optimisation: str | None = None) -> Toolchain:
     """Return the compiler in CC, else cc, gcc or clang; raises BuildError if there is none.
 
-    A path in CC is relative to the current folder, not to that of a build.
+    A path in CC is relative to the current folder, not to the folder of a build.
     """
     line = os.environ.get("CC", "")
     try:

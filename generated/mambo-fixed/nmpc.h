@@ -119,7 +119,7 @@ typedef long long nmpc_sum_t;
 #define NMPC_THRUST_ACCELERATION_MIN_M_S2 33554432
 #define NMPC_THRUST_ACCELERATION_MAX_M_S2 1677721600
 
-/* Limits of the settings, which nmpc_init() sets; a fence without walls has those of the range. */
+/* Limits of the settings, which nmpc_init() sets; a fence without walls ends at the range. */
 #define NMPC_SPEED_LIMIT_M_S 41943040
 #define NMPC_BRAKING_LIMIT_M_S2 100663296
 #define NMPC_FENCE_X_MIN_M -262144000
@@ -262,11 +262,11 @@ int nmpc_is_saturated(const nmpc_t *self);
 /* Set `estimate`. Returns NMPC_NULL_POINTER if an argument is null. */
 nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate);
 
-/* Set `limits` to those of the settings; what the settings leave open has the widest value that may be set. A null
+/* Set `limits` to the limits of the settings; what they leave open has the widest value that may be set. A null
  * pointer is ignored. */
 void nmpc_default_limits(nmpc_limits_t *limits);
 
-/* Replace the limits, from the next step on; nmpc_init() sets those of the settings, nmpc_reset() leaves them. Returns
+/* Replace the limits, from the next step on; nmpc_init() sets the settings' limits, nmpc_reset() keeps them. Returns
  * NMPC_BAD_LIMITS, and changes nothing, if a member is NaN or out of range, a minimum of the fence is not less than
  * the maximum, or the braking limit is more than the tilt limit gives. May be called between any two steps: a drone
  * outside a new fence flies back in. */

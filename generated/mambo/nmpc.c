@@ -104,7 +104,7 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
 }
 
 #if defined(__GNUC__)
-/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+/* The bits of a magnitude are ordered as the magnitudes are, and a NaN's exceed them all. One comparison of whole
  * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
 #define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
 
@@ -191,7 +191,7 @@ static int is_good_command(const nmpc_command_t *command)
  *
  *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
- * whose largest error is as small as that of any with so many terms.
+ * whose largest error is the smallest that so many terms allow.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 1.21e-07.
  */
@@ -681,7 +681,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *
  * Limits of speed, braking and place (not in the paper).
  *
- * Near the target the command is that of a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
+ * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
  * desired velocity
  *
  *     v_d = v_T + k (p_T - p),   k = K_e/K_v = 1.606 1/s (the smaller one of both axes).

@@ -97,7 +97,7 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
 }
 
 #if defined(__GNUC__)
-/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+/* The bits of a magnitude are ordered as the magnitudes are, and a NaN's exceed them all. One comparison of whole
  * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
 #define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
 
@@ -257,7 +257,7 @@ static int is_good_command(const nmpc_command_t *command)
  *
  *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
- * whose largest error is as small as that of any with so many terms.
+ * whose largest error is the smallest that so many terms allow.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 1.21e-07.
  */
@@ -524,7 +524,7 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
     distance_m = (nmpc_sum_t)errors_x.distance_m + errors_y.distance_m;
 
     /* Eq 12b: the variation is the sum of |Delta U|; the first moves change from the last command. A move enters
-     * two terms, its own change and that of the next move, so its gradient is complete one pass of the loop later. */
+     * two terms, its own change and the next move's, so its gradient is complete one pass of the loop later. */
     NMPC_UNROLL
     for (angle = 0; angle < NMPC_ANGLES; angle++) {
         const nmpc_real_t gain_x_m_step2_rad = prediction->gain_x_m_step2_rad[angle];
@@ -564,7 +564,7 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
 /* ---- Optimizer ------------------------------------------------------------------------------------------------------
  *
  * RPROP with a fixed number of iterations, variant rprop+ (Riedmiller and Braun 1993; Igel and Huesken 2000). Each
- * move u has a step size Delta. From the sign of the gradient g = dJ/du and that of the iteration before,
+ * move u has a step size Delta. From the signs of the gradient g = dJ/du in this iteration and the one before,
  *
  *     equal:     Delta = min(eta+ Delta, Delta_max),   u -= sign(g) Delta
  *     opposite:  Delta = max(eta- Delta, Delta_min),   u back to what it was before its last update

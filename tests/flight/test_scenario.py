@@ -16,7 +16,8 @@ from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.inner_steps import WatchedController
 from mambo_sil.flight.controllers.pd import PdController
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
 from mambo_sil.flight.traces import SEEN_COLUMNS
 from mambo_sil.flight.trajectories import Bernoulli

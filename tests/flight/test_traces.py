@@ -10,8 +10,9 @@ import pytest
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.errors import TraceError
 from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.traces import (
     CSV_COLUMNS,
     HEIGHT_COLUMNS,

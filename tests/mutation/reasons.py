@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from mambo_codegen.settings.model import Settings
 
@@ -46,3 +47,19 @@ def plain(text: str) -> str:
     """Return `text` on one line, without reals and integers from 100 on: those may come from the settings."""
     without_reals = re.sub(r"-?\b\d+\.\d*(e[-+]?\d+)?f?|-?\b\d+e-?\d+f?", "<real>", text)
     return " ".join(re.sub(r"\b\d{3,}\b", "<number>", without_reals).split())
+
+
+def survivors(name: str) -> dict[Key, str]:
+    """Return why faults change nothing, from a file of this folder.
+
+    Below the name of a source file each row is a line of it, the reason, and the faults, with ` @@ ` between.
+    """
+    found, source = dict[Key, str](), ""
+    for row in Path(__file__).with_name(name).read_text("utf-8").splitlines():
+        line, *reason_and_faults = row.split(" @@ ")
+        if reason_and_faults:
+            reason, *faults = reason_and_faults
+            found |= {(source, line, fault): reason for fault in faults}
+        else:
+            source = row
+    return found

@@ -34,8 +34,8 @@ from mambo_sil.flight.names import PD_NAMES
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.trajectories import Hover
 from mambo_sil.results.shared_library import LIBRARY_FLAGS
-from tests.mutation.engine_reasons import reason
 from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.reasons import Key, survivors
 from tests.mutation.schemata import CHOSEN, ORIGINAL, can_share, refused_numbers, with_mutants
 from tests.support.engines import BLOCKS, TICKS, estimates, injected, tabulate, truths
 from tests.support.evaluations import LIMIT_RAD, bits
@@ -54,6 +54,7 @@ from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
 from tests.support.tools import toolchain
 
+REASONS: Final = survivors("engine_survivors.txt")
 PERIOD_S: Final = 0.01
 STRIDE: Final = 72
 """The test tries one fault in so many; all of them take ten minutes."""
@@ -70,6 +71,18 @@ INCLUDES: Final = f'#include "loop.c"\n#include "blocks.c"\nint {CHOSEN};\n'
 UNITS: Final = (LOOP_AND_BLOCKS, *(name for name in SOURCES if name != "loop.c"))
 LANES_TRIED: Final = (2, 1)
 FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "loop.h", "records.h"})
+
+
+def reason(key: Key) -> str | None:
+    """Return why the fault `key` changes nothing, or None if no reason is known."""
+    name, line, change = key
+    length = re.fullmatch(r"(\d+) -> (\d+)( #\d+)?", change)
+    if length and re.search(rf"\b(?:double|real_t|lanes_t) \w+\[{length[1]}\](;| = )", line):
+        is_longer = int(length[2]) > int(length[1])
+        return "a longer array" if is_longer else "reads or writes beside an array, which no flight shows"
+    if name == "sensors.h" and not line.startswith("for") and re.fullmatch(r"<=? -> <=?( #\d+)?", change):
+        return "two numbers that are equal"
+    return REASONS.get(key)
 
 
 def digests(path: Path) -> Iterator[str]:

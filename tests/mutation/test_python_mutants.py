@@ -13,17 +13,14 @@ from typing import Final
 
 import pytest
 
-from tests.mutation.controller_reasons import CONTROLLER_REASONS
-from tests.mutation.margin_reasons import MARGIN_REASONS
 from tests.mutation.python_bench import ROOMS, ROOT, mutants_of
 from tests.mutation.python_mutants import python_mutants
-from tests.mutation.python_reasons import PYTHON_REASONS
-from tests.mutation.reasons import Key
+from tests.mutation.reasons import Key, survivors
 from tests.support.tools import require
 
 SAMPLES: Final = {"fences": 10, "tracker": 4}
 """Rooms whose tests are quick: CI tries one fault in so many, others when the source changes."""
-REASONS: Final = {**PYTHON_REASONS, **MARGIN_REASONS, **CONTROLLER_REASONS}
+REASONS: Final = survivors("python_survivors.txt")
 
 
 def in_function(line: str) -> set[str]:

@@ -20,7 +20,8 @@ from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
 from mambo_sil.flight.engine import simulate
-from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, Offset, PositionController, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, Offset, PositionController
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Hover
 

@@ -12,7 +12,8 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Circle
 from tests.support.crazyflie import Answer

@@ -13,7 +13,8 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Circle

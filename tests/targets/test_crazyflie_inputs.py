@@ -11,7 +11,8 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
 from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.crazyflie import Answer, Built, Crazyflie, Fleet, build, folder_of

@@ -4,9 +4,10 @@ import re
 import shutil
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes import CDLL
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -25,7 +26,8 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import Flight, PositionController, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.trajectories import CURVES, Bernoulli
 from tests.support.bundles import place
 from tests.support.height_settings import height_settings
@@ -50,20 +52,33 @@ OTHERS = ("float64", "1-norm", "given", "limits", "height")
 """Subjects whose flights are left to the long tests."""
 
 
-def built(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`, and build both units there."""
-    require("cc", "gcc")
-    require_module("fmpy")
-    place(render_target(settings, TARGETS["fmu"], with_digest=False), folder)
-    shell(sys.executable, folder / "build.py")
-    return folder
+@pytest.fixture(scope="module")
+def unit_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Path]:
+    """Return the unit of a subject in a version; both are built at the first call for the subject."""
+
+    @cache
+    def built(name: str) -> Path:
+        require("cc", "gcc")
+        require_module("fmpy")
+        folder = tmp_path_factory.mktemp("units")
+        place(render_target(SUBJECTS[name], TARGETS["fmu"], with_digest=False), folder)
+        shell(sys.executable, folder / "build.py")
+        return folder
+
+    return lambda name, version: built(name) / f"nmpc_fmi{version}.fmu"
 
 
-def unpacked(unit: Path, folder: Path) -> Path:
-    """Unpack a unit into `folder`."""
-    with zipfile.ZipFile(unit) as archive:
-        archive.extractall(folder)
-    return folder
+@pytest.fixture
+def unpacked(unit_file: Callable[[str, str], Path], tmp_path: Path) -> Callable[[str, str], Path]:
+    """Return a folder into which the unit of a subject in a version is unpacked."""
+
+    def unpack(name: str, version: str) -> Path:
+        folder = tmp_path / f"unit{version}"
+        with zipfile.ZipFile(unit_file(name, version)) as archive:
+            archive.extractall(folder)
+        return folder
+
+    return unpack
 
 
 @dataclass(frozen=True)
@@ -160,27 +175,28 @@ def same(left: Sequence[Any], right: Sequence[Any]) -> bool:
 
 
 @pytest.mark.parametrize("name", ["mambo", *(pytest.param(name, marks=pytest.mark.long) for name in OTHERS)])
-def test_both_units_fly_with_the_bits_of_the_controller_alone(name: str, tmp_path: Path) -> None:
+def test_both_units_fly_with_the_bits_of_the_controller_alone(
+    name: str, unit_file: Callable[[str, str], Path], unpacked: Callable[[str, str], Path]
+) -> None:
     """FMPy finds no fault in a unit, and in a flight every bit of the trace is that of `fly`."""
     settings = SUBJECTS[name]
-    folder = built(settings, tmp_path)
     validate = import_module("fmpy.validation").validate_fmu
     alone = flown(settings, CompiledController(settings))
     for version in VERSIONS:
-        file = folder / f"nmpc_fmi{version}.fmu"
-        assert validate(str(file)) == []
-        unit = Unit(unpacked(file, tmp_path / version), version, settings)
+        assert validate(str(unit_file(name, version))) == []
+        unit = Unit(unpacked(name, version), version, settings)
         assert same(flown(settings, unit), alone)
         unit.close()
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
-def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
+def test_an_importer_compiles_the_sources(
+    version: str, tmp_path: Path, unpacked: Callable[[str, str], Path]
+) -> None:
     """FMPy builds them with CMake as the unit describes them, and what it built flies the same bits."""
     require("cmake", "cmake")
-    settings = SUBJECTS["mambo"]
-    folder = unpacked(built(settings, tmp_path / "out") / f"nmpc_fmi{version}.fmu", tmp_path / "unit")
+    settings, folder = SUBJECTS["mambo"], unpacked("mambo", version)
     shutil.rmtree(folder / "binaries")
     objects = tmp_path / "objects"
     objects.mkdir()
@@ -192,10 +208,9 @@ def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) -> None:
+def test_a_unit_answers_as_its_description_says(version: str, unpacked: Callable[[str, str], Path]) -> None:
     """Start values, reset, several periods in a step, bad inputs as a status, and refusals."""
-    settings = SUBJECTS["1-norm"]
-    folder = unpacked(built(settings, tmp_path / "out") / f"nmpc_fmi{version}.fmu", tmp_path / "unit")
+    settings, folder = SUBJECTS["1-norm"], unpacked("1-norm", version)
     period_s = settings.horizon.update_period_s
     starts = [variable.start for variable in fmu_variables(settings)]
     one, other = Unit(folder, version, settings), Unit(folder, version, settings)
@@ -230,10 +245,10 @@ def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_heading_turns_from_the_measured_one(version: str, tmp_path: Path) -> None:
+def test_the_heading_turns_from_the_measured_one(version: str, unpacked: Callable[[str, str], Path]) -> None:
     """By nmpc_slew_heading, from the first one in range on, at the rate of the parameter."""
     settings = SUBJECTS["mambo"]
-    unit = Unit(unpacked(built(settings, tmp_path) / f"nmpc_fmi{version}.fmu", tmp_path), version, settings)
+    unit = Unit(unpacked("mambo", version), version, settings)
     period_s = settings.horizon.update_period_s
     for yaw in (np.nan, 2000.0):
         unit.write(yaw=yaw, target_yaw=1.0)
@@ -253,10 +268,12 @@ def test_the_heading_turns_from_the_measured_one(version: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_delivered_thrust_is_reported_once_in_a_communication_step(version: str, tmp_path: Path) -> None:
+def test_the_delivered_thrust_is_reported_once_in_a_communication_step(
+    version: str, unpacked: Callable[[str, str], Path]
+) -> None:
     """As by nmpc_set_thrust before its first period; 0 means as commanded, out of range changes nothing."""
     settings = SUBJECTS["height"]
-    unit = Unit(unpacked(built(settings, tmp_path) / f"nmpc_fmi{version}.fmu", tmp_path), version, settings)
+    unit = Unit(unpacked("height", version), version, settings)
     alone, untold = CompiledController(settings), CompiledController(settings)
     period_s = settings.horizon.update_period_s
     state, target = np.zeros((1, 10)), np.zeros((1, 9))

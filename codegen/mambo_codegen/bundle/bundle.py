@@ -30,7 +30,7 @@ class Changes:
     """What `write` changes in a folder, as sorted paths.
 
     kept:   files outside the bundle.
-    edited: those of them that an earlier bundle wrote and the user has edited since.
+    edited: files that an earlier bundle wrote and the user has edited since.
     """
 
     created: tuple[str, ...] = ()
@@ -56,7 +56,7 @@ class Drift:
 
 
 def manifest(files: Mapping[str, str], target: str | None = None) -> str:
-    """Return the manifest of `files` as JSON text; `target` is that of `generate --for`."""
+    """Return the manifest of `files` as JSON text; `target` is the one of `generate --for`."""
     head = {"generator": f"{GENERATOR} {__version__}"} | ({"target": target} if target else {})
     sha256s = {path: _sha256(files[path].encode()) for path in sorted(files)}
     return json.dumps({**head, "files": sha256s}, indent=2) + "\n"
@@ -188,7 +188,7 @@ def _apply(contents: Mapping[str, bytes], changes: Changes, target: Path, name: 
 
 
 def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> None:
-    """Refuse what is no file at the path of a file, and no folder at that of a folder, even with force."""
+    """Refuse a folder at the path of a file and a file at the path of a folder, even with force."""
     blocked = {path for path in contents if not (target / path).is_symlink() and find_obstacle(target / path)}
     folders = {folder for path in contents for folder in _folders_of(path)}
     blocked |= {

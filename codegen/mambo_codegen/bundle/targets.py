@@ -11,7 +11,7 @@ from typing import Final
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
 
 TARGETS_FOLDER: Final = "firmware"
-"""The folder of templates that holds those of each target."""
+"""The folder of the templates of each target."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class FirmwareTarget:
     name: as in `--for`, and of the folder of templates.
     preset: the settings if the user names none.
     source_folder: of nmpc.h and nmpc.c, with a slash at its end.
-    opening: text before that of nmpc.c.
+    opening: text before the text of nmpc.c.
     self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
     """

@@ -11,7 +11,7 @@ _FOLDER: Final = "templates"
 
 
 class TemplateCache(jinja2.BytecodeCache):
-    """Compiled templates, each in a file; Jinja compiles again what is missing or that of another text."""
+    """Compiled templates, each in a file; Jinja compiles again what is missing or has another text."""
 
     def load_bytecode(self, bucket: Bucket) -> None:
         """Load a template if the cache has it."""

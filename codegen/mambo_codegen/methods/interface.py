@@ -15,7 +15,7 @@ from mambo_codegen.settings.key import Refusal
 
 
 class Step(Protocol):
-    """The result of one step of n controllers: status (n,), command_rad (n, 2), and those of the method."""
+    """The result of one step of n controllers: status (n,), command_rad (n, 2), and results of the method."""
 
     @property
     def status(self) -> NDArray[np.int64]:

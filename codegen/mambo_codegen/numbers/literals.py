@@ -43,7 +43,7 @@ class Spelling:
         quantity: str | Sequence[str] = "",
         indent: int = _INDENT,
     ) -> str:
-        """Spell a two-dimensional table, each row in braces; `quantity` is that of all, or of each column."""
+        """Spell a two-dimensional table, each row in braces; `quantity` is one for all or for each column."""
 
         def words(row: Sequence[float]) -> list[str]:
             names = [quantity] * len(row) if isinstance(quantity, str) else quantity

@@ -1,4 +1,4 @@
-"""Find and read TOML files, shipped ones and those of the user, with messages that name file and line."""
+"""Find and read TOML files, shipped ones and the user's, with messages that name file and line."""
 
 import difflib
 import re

@@ -189,7 +189,7 @@ static int nmpc_fuzz_are_in_range(const nmpc_limits_t *limits)
     return good;
 }
 
-/* Return the status that nmpc.h promises for limits: that of another controller, where they are in range. */
+/* Return the status that nmpc.h promises for limits: another controller's, where they are in range. */
 static nmpc_status_t nmpc_fuzz_promised_limits(const nmpc_limits_t *limits)
 {
     static nmpc_t other;

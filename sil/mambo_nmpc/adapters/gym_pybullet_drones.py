@@ -22,7 +22,7 @@ def pybullet_control(drone_model: Any, controller: Controller) -> Any:
     """Return a `BaseControl` for one drone: the generated C commands the attitude loop of `DSLPIDControl`.
 
     drone_model: `DroneModel.CF2X` or `DroneModel.CF2P`.
-    controller:  made with `height`; the control frequency of the environment is that of its steps.
+    controller:  made with `height`; its steps have the control frequency of the environment.
     Raises PackageError without gym-pybullet-drones, ArgumentError for a controller of several drones.
     """
     if controller.n != 1:

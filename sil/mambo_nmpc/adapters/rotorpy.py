@@ -17,7 +17,7 @@ from mambo_sil.errors import ArgumentError
 class RotorpyController:
     """What `rotorpy.environments.Environment` and `simulate` call at every step, instead of `SE3Control`.
 
-    The rate of the simulation is that of the controller: `sim_rate=100` for one with steps of 10 ms.
+    The simulation has the rate of the controller: `sim_rate=100` for one with steps of 10 ms.
     With `enable_ground` the vehicle has the ground of that argument of `Multirotor`, at height 0.
     Raises ArgumentError for a controller of several drones, or another mass than a number.
     """

@@ -194,7 +194,7 @@ class Controller:
 
         Call it before the first step after a pause. `which` chooses drones by truth values, of the shape of a
         batch. `thrust_m_s2`, one value for all or (...), is the thrust over mass that the drones have, with
-        `[height]` only; without it that of hover. Returns a status (n,), 0 unless a command is refused.
+        `[height]` only; without it the thrust of hover. Returns a status (n,), 0 unless a command is refused.
         """
         if thrust_m_s2 is None and self._method.has_height:
             thrust_m_s2 = hover_thrust(self.settings)
@@ -275,7 +275,7 @@ class Controller:
         return batch
 
     def _places(self, state: DroneState) -> list[FloatArray]:
-        """Return the columns of states, those of the height upwards."""
+        """Return the columns of states, the height's upwards."""
         columns = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
         if self._method.has_height:
             contact = state.grounded.reshape(-1).astype(np.float64)

@@ -13,7 +13,7 @@ from mambo_sil.flight.names import AltitudeName
 
 
 class HeightHold:
-    """The thrusts of n drones; a state that is no number leaves that of its drone as it is."""
+    """The thrusts of n drones; a state that is no number leaves the thrust of its drone as it is."""
 
     def __init__(self, name: AltitudeName, drone: VehicleFile, settings: Settings, n: int) -> None:
         self.n, self._drone, ranges = n, drone, settings.ranges

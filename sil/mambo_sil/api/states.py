@@ -93,7 +93,7 @@ class TargetState:
     """Along the same axes (..., 2) or (..., 3). Read, and then needed, with `target.acceleration = "given"`
     only, z of it with `[height]`; z is read by the altitude loop too, if there."""
     yaw_rad: FloatArray | None
-    """Heading (...), or None to keep that of the first step."""
+    """Heading (...), or None to keep the one of the first step."""
 
     def __init__(
         self,

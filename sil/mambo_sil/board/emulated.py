@@ -87,7 +87,7 @@ class EmulatedController:
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
     ) -> Any:
-        """Compute the next commands; the inputs are those of `CompiledController.step`.
+        """Compute the next commands; the inputs are as of `CompiledController.step`.
 
         Returns the `step_type` of the method.
         """

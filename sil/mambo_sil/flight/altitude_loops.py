@@ -1,4 +1,4 @@
-"""Altitude loops: that of the vehicle, and two with feed-forward.
+"""Altitude loops: the vehicle's own, and two with feed-forward.
 
     stock        thrust = weight + P height error - D climb
     feedforward  the same with D (climb of the target - climb) and mass x acceleration of the target, all over
@@ -67,13 +67,13 @@ def pid_altitude_gains() -> dict[str, HeightGains]:
 
 @dataclass(frozen=True)
 class AltitudeLaw:
-    """An altitude loop by name, and its gains if they are not those of the drone."""
+    """An altitude loop by name, and its gains if they are not the drone's."""
 
     name: AltitudeName = "stock"
     gains: HeightGains | None = None
 
     def gains_for(self, drone: VehicleFile) -> HeightGains:
-        """Return the gains for a drone; `pid` has those of `mambo` if there are none for it."""
+        """Return the gains for a drone; `pid` has the gains of `mambo` if there are none for it."""
         if self.gains is not None:
             return self.gains
         if self.name == "pid":

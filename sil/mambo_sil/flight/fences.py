@@ -22,7 +22,7 @@ Walls = tuple[float, float, float, float, float, float]
 
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
 HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
-"""The numbers of nmpc_limits_t, in their order; the last are those of a controller of the height."""
+"""The numbers of nmpc_limits_t, in their order; the last are for a controller of the height."""
 
 FAST: Final = 0.5
 """Share of the speed limit beyond which a flight shows its speed."""

@@ -68,7 +68,7 @@ class FlightSummary(ReportedSummary):
     def _section(
         self, folder: Path, names: tuple[str, str], facts: dict[str, str], bad: list[str]
     ) -> Section:
-        """Return the section of the report; `names` has those of drone and section, `bad` what is wrong."""
+        """Return the section of the report; `names` has drone and section, `bad` what is wrong."""
         from mambo_sil.flight.flight_plots import page_pictures  # noqa: PLC0415 - loaded when drawing
 
         flights, missing = read_existing(folder, {names[0]: "trace.npz"})

@@ -59,7 +59,7 @@ HEIGHT_METRICS: Final = ("rms_height_error_m", "max_height_error_m", "rms_error_
 
 
 def height_error_m(trace: Trace) -> FloatArray:
-    """Return h (k, n), the height of the drone less that of its target in m."""
+    """Return h (k, n), the height of the drone less its target's in m."""
     return -trace.position_m[..., 2] - trace.target_height_m
 
 

@@ -74,18 +74,18 @@ OF_THE_VEHICLE: Final = (
     *("mass_kg", "inertia_kg_m2", "thrust_factor_n_s2", "torque_factor_n_m_s2"),
     *("motor_lag_s", "drag_1_s"),
 )
-"""Keys of a scenario whose defaults are those of its vehicle."""
+"""Keys of a scenario whose defaults are its vehicle's."""
 _AS_THE_VEHICLE: Final[Any] = None
 
 
 class Scenario(_Record):
     """Parameters of one flight; default: Table II's, with a nominal, undisturbed Mambo without sensors.
 
-    Mass, inertia, rotors and drag are those of `vehicle` unless they are given.
+    Mass, inertia, rotors and drag are the vehicle's unless they are given.
     """
 
     vehicle: VehicleFile = NOMINAL
-    """The drone: its inner loops and mixer are always those of its file."""
+    """The drone: its inner loops and mixer are always as in its file."""
 
     seed: int = Field(0, ge=0, le=LARGEST_SEED)
     """Seed of sensor noise, gusts and dropped updates."""
@@ -220,7 +220,7 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
 def choose_sensors(
     name: SensorsName, drone: VehicleFile, **parameters: Any
 ) -> Sensors | MotionCapture | None:
-    """Return the sensors called `name` of a drone; `parameters` are those of `Sensors`.
+    """Return the sensors called `name` of a drone; `parameters` as of `Sensors`.
 
     Raises FlightError if it has others.
     """

@@ -39,7 +39,7 @@ AXES: Final[dict[str, tuple[int, ...]]] = {
     "command_rad": (2,),
     "thrust_acceleration_m_s2": (),
 }
-"""Axes of each array after sample and flight; `seen_position_m` has those of `position_m`, and so on.
+"""Axes of each array after sample and flight; `seen_position_m` has the axes of `position_m`, and so on.
 
 A course with a height has a target of `SPATIAL_TARGET_COLUMNS`.
 """
@@ -70,7 +70,7 @@ class Trace:
     """Status of the position controller (k, n)."""
 
     def same_bits(self, other: "Trace") -> bool:
-        """Return whether every array equals that of another trace, bit for bit."""
+        """Return whether every array equals another trace's, bit for bit."""
         return type(self) is type(other) and all(
             getattr(self, f.name).tobytes() == getattr(other, f.name).tobytes() for f in fields(self)
         )

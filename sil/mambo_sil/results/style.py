@@ -107,7 +107,7 @@ PD_LOOKS: Final = {
 
 
 def looks(names: Sequence[str]) -> dict[str, Look]:
-    """Return the look of each controller; those of the laws without a model are theirs alone."""
+    """Return the look of each controller; the laws without a model have looks of their own."""
     others = [name for name in names if name not in PD_LOOKS]
     return {
         name: PD_LOOKS[name] if name in PD_LOOKS else LOOKS[others.index(name) % len(LOOKS)] for name in names

@@ -266,7 +266,7 @@ def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
 
 
 def _headings(settings: Settings) -> Iterator[Tape]:
-    """Turn to the ends of the range and beside them, with every most change around 0 and that of the turn."""
+    """Turn to the ends of the range and beside them, with every most change around 0 and around the turn."""
     ends, changes = (
         _around(settings, "yaw", -YAW_LIMIT_RAD, YAW_LIMIT_RAD),
         _around(settings, "yaw", 0.0, 0.25),
@@ -287,7 +287,7 @@ def _convergence(settings: Settings) -> list[Tape]:
     Close to the target the first iteration overshoots, and the cost changes by about the tracking weight
     times a constant. Bisection finds the largest weight with which the search converges; that weight and its
     neighbours are the cases. In fixed point one unit of that weight changes the cost by many units, so
-    bisection also finds the effort weight, whose unit is finer than that of the cost.
+    bisection also finds the effort weight, whose unit is finer than the cost's.
     """
     n, scalar, numbers = 16, _floating(settings), method_of(settings).numbers
     most_tracking, most_effort = method_of(settings).weight_limits

@@ -126,7 +126,7 @@ def unproven(properties: Sequence[Property]) -> list[Property]:
 
 
 def read_properties(report: Path) -> list[Property]:
-    """Read Frama-C's table of properties, without those of its own library."""
+    """Read Frama-C's table of properties, without its own library's."""
     with report.open(encoding="utf-8", newline="") as file:
         return [
             Property(

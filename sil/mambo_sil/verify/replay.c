@@ -199,7 +199,7 @@ static float largest_float(nmpc_real_t number, int bits)
     return (((double)found / (double)unit) > (double)number) ? (found * 0.99999994f) : found;
 }
 
-/* A level command, with a height that of hover. */
+/* A level command, with a height the command of hover. */
 static nmpc_float_command_t level_command(void)
 {
     nmpc_float_command_t command;
@@ -302,7 +302,7 @@ static int takes_the_ends(nmpc_t *self)
 }
 
 #ifdef NMPC_STORED_NUMBERS
-/* Set the last command of `self` with floats and that of `other` with numbers. */
+/* Set the last command of `self` with floats and of `other` with numbers. */
 static int sets_alike(nmpc_t *self, nmpc_t *other)
 {
     nmpc_float_command_t flown = level_command();
@@ -343,7 +343,7 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
     return is_good;
 }
 #else
-/* Set the weights of `self` with floats and those of `other` with numbers: a float holds 24 bits of a weight. */
+/* Set the weights of `self` with floats and of `other` with numbers: a float holds 24 bits of a weight. */
 static int sets_alike(nmpc_t *self, nmpc_t *other)
 {
     const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),

@@ -60,7 +60,7 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
 
 
 def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Draw height, climb and contact with the floor (n, 3), and those of targets (n, 2); some are special."""
+    """Draw height, climb and contact with the floor (n, 3), and targets (n, 2); some are special."""
     n, limits = len(scale), [settings.ranges.position_m, settings.ranges.velocity_m_s]
     goal = np.clip(rng.normal(0, 1, (n, 2)) * [2, 1], np.negative(limits), limits)
     own = np.clip(goal + (rng.normal(0, 1, (n, 2)) * scale), np.negative(limits), limits)

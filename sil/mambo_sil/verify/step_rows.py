@@ -16,7 +16,7 @@ POSITION = slice(0, 2)
 VELOCITY = slice(2, 4)
 TILT = slice(4, 6)
 YAW = 6
-"""Columns of the state; those of the target come after it and begin with position and velocity too."""
+"""Columns of the state; the target's come after it and begin with position and velocity too."""
 
 
 class StepRows:

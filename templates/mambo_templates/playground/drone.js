@@ -43,7 +43,7 @@ class Drone {
     return this.entry.metre !== null;
   }
 
-  /* Replaces the fence, in m, null by that of the settings; returns whether the controller takes it. */
+  /* Replaces the fence, in m, null by the settings' fence; returns whether the controller takes it. */
   enclose(fence) {
     const { calls, self } = this.module, numbers = this.module.at(this.limits, LIMITS, this.real);
     calls.nmpc_default_limits(this.limits);

@@ -7,7 +7,7 @@ function windWay(world) {
   return [Math.cos(angle), Math.sin(angle)];
 }
 
-/* Mean speed at the height of a level course, in m/s; that of the slider is 20 ft above the ground. */
+/* Mean speed at the height of a level course, in m/s; the slider's is 20 ft above the ground. */
 function windSpeed(world) {
   const index = world.data.dials.findIndex((dial) => dial.key === "wind");
   return world.data.dials[index].members.gust_mean_m_s[world.dials[index]][0];

@@ -28,7 +28,8 @@ from mambo_sil.board.footprint.counts import (
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import batch_source
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 

@@ -13,7 +13,8 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.board.pil.timed import TimedController
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import CURVES
 from tests.support.command import run
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line

@@ -15,7 +15,8 @@ from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians, repeat
 from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, BY_PUSH, PLACE, SENT
 from mambo_sil.experiment.margins.hover_margins import hover_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover

@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import Link
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -22,13 +24,14 @@ from mambo_sil.flight.controllers.pd import AnyPd, PdController, pd_controller
 from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
 from mambo_sil.flight.engine.evaluate import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
-from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.loop import Flight, Outcome, PositionController
 from mambo_sil.flight.names import PD_NAMES, SENSORS_OF, AltitudeName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.trajectories import Bernoulli
 from mambo_sil.results.shared_library import LIBRARY_FLAGS
 from tests.support.engines import lanes_here
 from tests.support.evaluations import LIMIT_RAD, bits, traces
+from tests.support.height_settings import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES, TRUTH, drones, scenarios
 from tests.support.tools import require, toolchain
@@ -166,11 +169,56 @@ def test_the_engine_compiles_without_a_warning(compiler: str, lanes: int, tmp_pa
     subprocess.run(command, cwd=tmp_path, check=True)
 
 
-def test_what_is_no_c_flies_in_numpy() -> None:
-    """A controller in Python, and a delay longer than the engine holds."""
+class InPython:
+    """A controller whose step is no C function for the engine, and fails in a call if that is given."""
+
+    def __init__(self, controller: PositionController, fails_at: int | None = None) -> None:
+        self._controller, self._fails_at, self.calls = controller, fails_at, 0
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
+        """Count the call, and step."""
+        self.calls += 1
+        if self.calls == self._fails_at:
+            raise ZeroDivisionError("in the controller")
+        return self._controller.step(state, target, thrust_acceleration_m_s2)
+
+
+@pytest.mark.sampled(6)
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
+def test_a_controller_in_python_flies_in_the_engine(batch: tuple[Scenario, ...]) -> None:
+    """A single flight has the bits of NumPy, and reports each update."""
+    flight, shares = flight_of(batch[:1], PERIOD_S), list[float]()
+    ours, theirs = (InPython(pd_controller("pid-feedforward", flight)) for _ in range(2))
+    trace = fly(flight, ours, shares.append)
+    assert trace.same_bits(loop.fly(flight, theirs))
+    assert (ours.calls, len(shares)) == (theirs.calls, theirs.calls + 1)
+    assert shares == sorted(shares)
+    assert shares[-2:] == [1.0, 1.0]
+
+
+def test_a_reference_of_the_height_flies_in_the_engine() -> None:
+    """Its states, targets and commands have more numbers."""
+    flight, settings = flight_of(BATCHES["space"][:1], PERIOD_S), height_settings()
+    trace = fly(flight, method_of(settings).reference_controller())
+    assert trace.same_bits(fly(flight, CompiledController(settings)))
+
+
+def test_what_a_controller_in_python_raises_ends_the_flight() -> None:
+    """With its own traceback; it is not called again."""
     flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
-    reference = fly(flight, OneNormController(OneNorm(MAMBO)))
-    assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
+    failing = InPython(PdController(), fails_at=7)
+    with pytest.raises(ZeroDivisionError, match="in the controller") as caught:
+        fly(flight, failing)
+    assert caught.traceback[-1].name == "step"
+    assert failing.calls == 7
+
+
+def test_what_the_engine_cannot_fly_flies_in_numpy() -> None:
+    """Several flights of a controller in Python, and a delay longer than the engine holds."""
+    two = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, flights=2)
+    reference = fly(two, OneNormController(OneNorm(MAMBO), 2))
+    assert reference.same_bits(fly(two, CompiledController(MAMBO, 2)))
     late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
     assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))
 

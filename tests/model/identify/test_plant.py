@@ -15,7 +15,8 @@ from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.flight.controllers.pd import PdController
-from mambo_sil.flight.loop import Flight, Outcome, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, Outcome
 from mambo_sil.flight.traces import write_csv
 from mambo_sil.flight.trajectories import Waypoints
 from mambo_sil.model.identify.columns import KNOWN, Column

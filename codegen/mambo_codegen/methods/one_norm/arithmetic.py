@@ -80,7 +80,7 @@ class OneNormArithmetic(Arithmetic):
 
 
 def _shifts(constants: OneNormConstants, bits: OneNormFormats) -> dict[str, int]:
-    """Return the shifts of the products in fixed point: the bits of both factors less those of the result."""
+    """Return the shifts of the products in fixed point: the bits of both factors less the result's."""
     is_given = constants.tracker is not None and constants.tracker.is_given
     return {
         "thrust_product": bits.thrust + bits.step_squared - bits.gain,

@@ -60,7 +60,7 @@ class OneNormStep:
     missed:      (n,) control steps since the last good state.
     active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
 
-    With fixed point the numbers are those of the C, converted exactly to SI units in float64.
+    With fixed point the numbers are the integers of the C, converted exactly to SI units in float64.
     """
 
     status: NDArray[np.int64]

@@ -38,7 +38,7 @@ UPPER_BITS: Final = 32
 """Right shift of products with shares and eta; one factor is shifted left first to keep the format."""
 
 SUM_BITS: Final = 53
-"""Most bits of cost and gradient without the sign: those of a double, so that logs and tests are exact."""
+"""Most bits of cost and gradient without the sign: as a double has, so that logs and tests are exact."""
 
 _WEIGHT_HEADROOM: Final = 4.0
 """At run time weights may be up to this factor larger than in the settings. An effort weight of 0 counts as

@@ -50,7 +50,7 @@ class Rprop:
         )
         self.tolerance = constant(optimizer.tolerance, "cost")
         self.limit: Any = constant(settings.limits.tilt_rad, "angle")
-        """The tilt limit, or those of controllers (n, 1, 1)."""
+        """The tilt limit, or the limits of controllers (n, 1, 1)."""
 
     def next_step(self, step: Real, agreement: Real) -> Real:
         """Return the next step sizes: grown where the gradient keeps its sign, shrunk where the sign changes.

@@ -90,7 +90,7 @@ class Constants(ABC):
 
     @property
     def level_target(self) -> tuple[str, ...]:
-        """The quantity of each number in nmpc_target_t but those of the height, in their order."""
+        """The quantity of each number in nmpc_target_t but the height's, in their order."""
         return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
 
     @property

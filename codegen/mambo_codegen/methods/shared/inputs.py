@@ -117,7 +117,7 @@ def within(values: Real, limit: Any) -> Rows:
 
 
 def choose(chosen: Rows, new: Record, old: Record) -> Record:
-    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else those of `old`.
+    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else of `old`.
 
     What one of them does not have, which is None, neither has.
     """

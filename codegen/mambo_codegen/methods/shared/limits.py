@@ -157,7 +157,7 @@ class LimitsLaw:
         return _memory(self.bounds(limits))
 
     def read(self, limits: ArrayLike) -> tuple[Real, Rows]:
-        """Return limits (n, k) as numbers, and whether they may be set (n,), but for those of the height."""
+        """Return limits (n, k) as numbers, and whether they may be set (n,), but for the height's."""
         given = self.quantize(limits)
         return given, self.check(given)
 
@@ -166,7 +166,7 @@ class LimitsLaw:
         return self._numbers.quantize(limits, self._quantities).astype(self._numbers.computed)
 
     def check(self, limits: Real) -> Rows:
-        """Return whether limits (n, k) may be set (n,), but for those of the height; not if one is NaN."""
+        """Return whether limits (n, k) may be set (n,), but for the height's; not if one is NaN."""
         speed, braking, tilt = limits[:, 0], limits[:, 1], limits[:, 6]
         low, high, reach = limits[:, 2:4], limits[:, 4:6], self._ranges.position
         most = self._products.tilt_product(self._slope, tilt) - self._trim
@@ -182,7 +182,7 @@ class LimitsLaw:
         return good
 
     def bounds(self, limits: Real) -> Bounds:
-        """Derive what the steps need from good limits (n, k), but for those of the height."""
+        """Derive what the steps need from good limits (n, k), but for the height's."""
         products, speed = self._products, limits[:, 0]
         low, high = limits[:, 2:4], limits[:, 4:6]
         braking = products.least_braking(limits[:, 1] + limits[:, 1], speed)
@@ -302,7 +302,7 @@ class LimitsLaw:
     ) -> tuple[LimitsMemory, TargetMotion, Real]:
         """Return memory, motions of targets, and targets (n, k) within the limits, where they are followed.
 
-        position (n, 2) is that of the drone, follows (n,) whether a controller follows its target.
+        position (n, 2) is the drone's, follows (n,) whether a controller follows its target.
         """
         after, within = self.limit(memory, position, target)
         motion = choose(follows, self.forget_braking(motion, memory, after, target), motion)

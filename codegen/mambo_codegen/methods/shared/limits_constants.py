@@ -192,7 +192,7 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
 
 
 def stored_quantities(*command: str) -> tuple[str, ...]:
-    """Return the quantity of each number in nmpc_bounds_t; `command` are those of the command limits."""
+    """Return the quantity of each number in nmpc_bounds_t; `command` are the command limits'."""
     return (*["position"] * 7, "velocity", "braking", "angle", *command)
 
 
@@ -211,7 +211,7 @@ ONE_NORM_TILT: Final = TiltAcceleration(GRAVITY_M_S2, 0.0)
 
 
 def _walls(settings: Sections, axis: str) -> tuple[float, float]:
-    """Return the walls along an axis; without any those of the range."""
+    """Return the walls along an axis; without any the ends of the range."""
     low, high = (getattr(settings.limits.fence, f"{axis}_{end}_m") for end in ("min", "max"))
     reach_m = settings.ranges.position_m
     return (low, high) if low < high else (-reach_m, reach_m)

@@ -15,7 +15,7 @@ def feedback_steps(settings: Sections) -> tuple[float, float] | None:
 
 
 def feedback_bits(feedback: tuple[float, float] | None) -> int:
-    """Return the fractional bits of rate feedback in steps: at most those of a sine, a resolution of 1e-9."""
+    """Return the fractional bits of rate feedback in steps: at most a sine's, a resolution of 1e-9."""
     return min(fractional_bits(*feedback), SINE_BITS) if feedback else 0
 
 

@@ -97,7 +97,7 @@ def _variants(source: str, settings: Settings) -> Iterator[tuple[str, Settings]]
 
 
 def _memories(content: bytes, name: str) -> list[bytes]:
-    """Return the contiguous pieces of memory in a file; that of an ELF or a plain binary is the file."""
+    """Return the contiguous pieces of memory in a file; an ELF or a plain binary is one piece."""
     if content.startswith(_UF2_MAGIC[0]) and content[4:8] == _UF2_MAGIC[1]:
         return _join(_uf2_pieces(content))
     lines = content.splitlines()

@@ -51,7 +51,7 @@ def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -
 def run_on_board(
     settings: Settings, board: Connection, episodes: int, progress: Callable[[float], None]
 ) -> Iterator[BuildDigest]:
-    """Yield the digest of the reference, then that of a real board; call `progress` with the share done."""
+    """Yield the digest of the reference, then of a real board; call `progress` with the share done."""
     yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(method_of(settings), episodes)))
     digest = board.digest(episodes, progress)
     yield BuildDigest("board", echo(board.greeting.board), "", _format(digest))

@@ -20,7 +20,8 @@ from mambo_sil.board.footprint.cycles import CycleModel, ModelledCycles
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import STEP_S
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Bernoulli
 
 HARNESS: Final = (
@@ -65,7 +66,7 @@ class CycleCounts:
     """Modelled cycles of the same ticks without wait states, and the most of those and of the search's steps.
 
     `fewest` and `most_with_wait` are the bounds of the most expensive step: the least that the manual allows
-    without wait states, and the most with those of a flash whose caches are empty when the step begins.
+    without wait states, and the most with a flash whose caches are empty when the step begins.
     """
 
     least: int

@@ -14,7 +14,7 @@ from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.pil_report import Spread
 from mambo_sil.errors import BoardError, FlightError
-from mambo_sil.flight.loop import fly
+from mambo_sil.flight.engine.simulate import fly
 
 
 @dataclass(frozen=True)

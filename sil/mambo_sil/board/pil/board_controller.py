@@ -91,7 +91,7 @@ class ReportedThrust:
 class BoardController(ReportedThrust):
     """One controller on a board, called as soon as the desk has the next inputs.
 
-    `replies` holds those of all steps, `different` the numbers of the steps whose bits are not the desk's.
+    `replies` holds one for each step, `different` the numbers of the steps whose bits are not the desk's.
     """
 
     def __init__(self, settings: Settings, board: Connection) -> None:
@@ -104,7 +104,7 @@ class BoardController(ReportedThrust):
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
     ) -> BoardStep:
-        """Compute the next command; the inputs are those of `CompiledController.step`, of one drone.
+        """Compute the next command; the inputs are as of `CompiledController.step`, of one drone.
 
         Raises BoardError if the board is lost.
         """

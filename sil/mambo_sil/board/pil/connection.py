@@ -52,7 +52,7 @@ class Patience:
     silence_s: float = 8.0
     """For a reply to any repetition; a board with a boot loader takes 2 s until it answers."""
     return_s: float = 30.0
-    """For a port that was closed, such as that of an unplugged board."""
+    """For a port that was closed, such as the port of an unplugged board."""
 
 
 class _RestartedError(BoardError):
@@ -60,7 +60,7 @@ class _RestartedError(BoardError):
 
 
 class Connection:
-    """A board behind a port, whose firmware must be that of `settings`.
+    """A board behind a port, whose firmware must be made from `settings`.
 
     `faults` counts what went wrong on the link and was made good. `say` tells the user of it.
     """
@@ -301,6 +301,6 @@ def command_bytes(method: Method) -> int:
 def _reason(error: OSError) -> str:
     """Return why a port failed; pyserial's own words repeat the name of the port."""
     cause = error.__context__ if isinstance(error.__context__, OSError) else error
-    if isinstance(cause, socket.gaierror):  # its numbers are not those of the system
+    if isinstance(cause, socket.gaierror):  # its numbers are not the system's
         return str(cause.strerror)
     return os.strerror(cause.errno) if cause.errno else echo(str(cause))

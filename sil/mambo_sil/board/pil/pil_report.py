@@ -78,7 +78,7 @@ class BoardFlightSummary(FlySummary):
     self_test_difference: int
     """The first step of the self-test with other bits, counted from 1; 0 if there is none."""
     same_digest: bool
-    """Whether the self-test digest over `digest_steps` is that of this machine."""
+    """Whether the self-test digest over `digest_steps` is the one of this machine."""
     digest_steps: int
     steps: int
     different_steps: int
@@ -166,7 +166,7 @@ def wall_clock(arrivals: Sequence[Arrival], board_period_s: float) -> tuple[floa
 
 
 def difference(summary: BoardFlightSummary) -> str | None:
-    """Say where the bits of the board are not those of this machine; None if all are."""
+    """Say where the bits of the board differ from this machine's; None if they do not."""
     if summary.self_test_difference:
         return f"step {summary.self_test_difference} of the self-test has other bits than the reference"
     if not summary.same_digest:

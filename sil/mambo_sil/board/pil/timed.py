@@ -1,4 +1,4 @@
-"""The controller on a board whose own clock calls the step: the clock of the flight is that of the board.
+"""The controller on a board whose own clock calls the step: the flight goes by the clock of the board.
 
     end of period   board: step with inputs of   desk, upon the reply: sends inputs of  flies the drone
     k               update k - 1                 update k                               from k to k + 1
@@ -85,7 +85,7 @@ class TimedController(ReportedThrust):
     ) -> BoardStep:
         """Wait for the end of the board's period; return its command, or the last one if the period has none.
 
-        The next step gets the inputs, which are those of `CompiledController.step`, of one drone. The first
+        The next step gets the inputs, as of `CompiledController.step`, of one drone. The first
         call starts the clock, and returns level attitude, with a height at the thrust of hover.
         Raises BoardError if the board is lost, or if its steps can no longer be followed.
         """

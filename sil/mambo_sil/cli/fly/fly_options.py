@@ -147,7 +147,7 @@ class Output:
 
 @dataclass(frozen=True)
 class OtherFlight:
-    """A recorded flight again, or that of an app on the desk; `context` knows which options were given."""
+    """A recorded flight again, or an app's on the desk; `context` knows which options were given."""
 
     context: typer.Context
     repeat: Annotated[

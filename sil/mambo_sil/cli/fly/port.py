@@ -33,8 +33,8 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
+from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.flight_report import judge
-from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.results.folders import new_results
 

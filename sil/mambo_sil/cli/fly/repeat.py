@@ -10,10 +10,10 @@ from mambo_sil.cli.progress import progress_bar
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import fenced, walls_m
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results

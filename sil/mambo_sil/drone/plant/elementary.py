@@ -15,7 +15,7 @@ NaN. Largest errors, in units in the last place (ulp) of the result:
 | `arc_sine` | -1 to 1 | 2.5 |
 | `arc_cosine` | -1 to 1 | 2.5 ulp of 1 |
 | `exponential` | all; 0 and infinity beyond the range of float64 | 1 |
-| `logarithm` | 0 and above; that of 0 is minus infinity | 1.5 |
+| `logarithm` | 0 and above; of 0 it is minus infinity | 1.5 |
 
 The polynomials are Taylor series. All constants are derived here and rounded once.
 """
@@ -102,7 +102,7 @@ def sine_cosine(angle_rad: ArrayLike) -> tuple[FloatArray, FloatArray]:
         r = ((angle - (n * h)) - (n * m)) - (n * l),    z = r * r
         sin r = r + (r * (z * (s0 + (z * (s1 + ...))))),    cos r = 1 + (z * (c0 + (z * (c1 + ...))))
 
-    An odd n exchanges sine and cosine; bit 1 of n negates the sine, that of n + 1 the cosine. The sine of -0
+    An odd n exchanges sine and cosine; bit 1 of n negates the sine, bit 1 of n + 1 the cosine. The sine of -0
     is +0. Sums of products with 0 and +/- 1 select here: NumPy is faster with them than with `where`.
     """
     angle = np.asarray(angle_rad, np.float64)

@@ -54,7 +54,7 @@ class Surroundings:
     demand_n: FloatArray
     """Demanded thrust (n,), not negative: rotors do not pull down."""
     thrust_share: PerFlight
-    """Thrust over that of a nominal drone with a fresh battery."""
+    """Thrust over the thrust of a nominal drone with a fresh battery."""
     mass_kg: PerFlight
     drag_1_s: PerFlight
     push_m_s2: tuple[PerFlight, PerFlight]

@@ -19,7 +19,7 @@ def ground_effect(height_m: FloatArray, radius_m: PerFlight) -> FloatArray:
 
     1 / (1 - (R / 4 z)^2), z the height of the rotors: Cheeseman and Bennett, The Effect of the Ground on a
     Helicopter Rotor in Forward Flight, ARC R&M 3021 (1955). Below z = R / 2, where the formula ends, it stays
-    the same. It is that of one rotor; for four, R lies between the radius of one and twice that.
+    the same. R is the radius of one rotor; for four it lies between that radius and its double.
     """
     rotor_height_m = np.maximum(height_m + ROTOR_HEIGHT_M, radius_m / 2.0)
     ratio = radius_m / (4.0 * rotor_height_m)

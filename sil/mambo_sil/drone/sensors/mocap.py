@@ -1,7 +1,7 @@
 """Motion capture of n flights: late, noisy positions at a fixed rate, and the drone's own attitude.
 
 The velocity is the difference quotient of successive positions behind a first-order low-pass. Position and
-velocity are held between positions; attitude, with noise, and body rates are those of every tick.
+velocity are held between positions; attitude, with noise, and body rates are new at every tick.
 """
 
 from collections.abc import Sequence

@@ -215,7 +215,7 @@ def form(attitude: str, sensors: str) -> Form:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models in an annotation: one, or those of a union."""
+    """Return the models in an annotation: one, or the members of a union."""
     members = get_args(annotation) or (annotation,)
     return [one for one in members if isinstance(one, type) and issubclass(one, BaseModel)]
 

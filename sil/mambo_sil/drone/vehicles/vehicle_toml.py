@@ -29,7 +29,7 @@ def preset(name: str) -> VehicleFile:
 
 
 def load(name_or_path: str) -> VehicleFile:
-    """Return a shipped drone or that of a file; `mambo` is the shipped one, `./mambo` a file.
+    """Return a shipped drone or the drone of a file; `mambo` is the shipped one, `./mambo` a file.
 
     Raises SourceNotFoundError if there is neither, UnreadableFileError if the file is not TOML,
     InvalidSettingsError with all broken rules.

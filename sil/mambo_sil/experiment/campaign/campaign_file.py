@@ -203,7 +203,7 @@ def read(path: Path, vehicle: str | None = None) -> Campaign:
 
 
 def read_as(model: type[File], path: Path) -> File:
-    """Read the file at `path` as a `model` with sections like those of campaign.toml.
+    """Read the file at `path` as a `model` with sections like campaign.toml.
 
     Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors.
     """
@@ -319,7 +319,7 @@ def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
 
 
 def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
-    """Return the drone that `vehicle` names, or else that of the section [flight] of a file in `folder`."""
+    """Return the drone that `vehicle` names, or else the one of [flight] in a file in `folder`."""
     if vehicle is not None:
         return vehicle_toml.load(vehicle)
     return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
@@ -375,7 +375,7 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
 def _section(names: Sequence[str], model: type[FileSection]) -> Any:
     """Return the model of the section to which the key at the path `names` belongs.
 
-    The names of sections of one kind, as in dict[str, Section], are free; those of a list are its indices.
+    The names of sections of one kind, as in dict[str, Section], are free; in a list they are its indices.
     """
     section: Any = model
     for name in names[:-1]:

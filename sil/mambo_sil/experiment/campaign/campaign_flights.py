@@ -77,7 +77,7 @@ def fly_batch(
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
-    `flight` is that of the campaign, `version` that of the calling program. Raises WorkerError if the worker
+    `flight` is the campaign's, `version` the calling program's. Raises WorkerError if the worker
     has another version, BuildError if it has no compiler.
     """
     if version != __version__:

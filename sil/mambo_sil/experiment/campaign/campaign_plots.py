@@ -33,8 +33,8 @@ _MOST_POINTS: Final = 20_000
 def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path, Path]:
     """Draw cumulative distributions of each index and of its ratio to the first controller's.
 
-    Writes stem.png and stem.svg. Because of crashed flights a curve ends below 1; that of a controller with
-    few but very large values leaves the panel.
+    Writes stem.png and stem.svg. Because of crashed flights a curve ends below 1; with few but very
+    large values it leaves the panel.
     """
     rows = 1 if len(names) == 1 else 2
     with style():

@@ -1,6 +1,6 @@
 """Records of the flights of a campaign, for `fly --repeat`.
 
-Those of the worst flights are files. `campaign_record` makes that of any other flight from the database: a
+The records of the worst flights are files. `campaign_record` makes any other from the database: a
 campaign of a million flights would have millions of files.
 """
 
@@ -79,7 +79,7 @@ def _record(section: dict[str, Any], entrant: Entrant, row: dict[str, Value]) ->
 
 
 def _is_written(path: Path, digest: str) -> bool:
-    """Return whether the record at `path` is whole and that of the trace with this digest."""
+    """Return whether the record at `path` is whole and of the trace with this digest."""
     with contextlib.suppress(FileNotFoundError):
         return path.read_bytes().endswith(f'"trace_sha256": "{digest}"\n}}\n'.encode())
     return False

@@ -3,8 +3,8 @@
 A quantile function maps one uniform random number to one draw. Every parameter uses exactly one number of its
 flight's stream, so changing the distribution of one parameter does not change the draws of the others.
 
-Exponential, logarithm and the normal distribution come from `decimal` and are rounded once: those of the C
-library differ between processors.
+Exponential, logarithm and the normal distribution come from `decimal` and are rounded once: a C
+library's differ between processors.
 """
 
 import math

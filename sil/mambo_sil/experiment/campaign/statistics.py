@@ -83,7 +83,7 @@ class Distributions:
 
 @dataclass(frozen=True)
 class Improvement:
-    """Ratio of an index of the first controller to that of another, flight by flight.
+    """Ratio of an index of the first controller to another controller's, flight by flight.
 
     `median` is the median of the ratios, `low` and `high` its bootstrap interval, `better` the share of
     flights with a ratio above 1. Flights in which both crash have no ratio; `flights` counts the others.

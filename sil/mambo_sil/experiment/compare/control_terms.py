@@ -38,7 +38,7 @@ class AxisLaw(BaseModel):
 
 
 class ObserverGains(BaseModel):
-    """Corrections by the innovation of the position and by that of the velocity, in a control step."""
+    """Corrections by the innovations of position and velocity, in a control step."""
 
     model_config = ConfigDict(frozen=True)
 

@@ -62,7 +62,7 @@ _DEGREES_PER_RAD: Final = 180.0 / math.pi
 def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """Return the faults; their magnitudes depend on the input ranges of `settings`.
 
-    Faults of the weights are there with a 1-norm only, those of the limits with limits only. With a height
+    Faults of the weights are there with a 1-norm only, faults of the limits with limits only. With a height
     a state that is missing to the end, or wrong for 5 s, is so for the thrust too, which a stock loop takes
     from the truth.
     """

@@ -35,7 +35,7 @@ PLACES: Final[dict[PlaceName, str]] = {"command": "the command", "motors": "the 
 SLOWEST_RAD_S: Final = 0.02
 """Least frequency at which a loop is looked at."""
 GROWTH_1_S: Final = 1e-3
-"""A pole that grows more slowly counts as one of a drift, as that of an estimated position."""
+"""A pole that grows more slowly counts as a drift, such as an estimated position has."""
 _LEAST_SHARE: Final = 1e-3
 """A pole with a smaller share of the largest residue is left out."""
 _DEAD: Final = 1e-9
@@ -136,7 +136,7 @@ class _Figures:
 
 
 def frequencies(loop: PeriodicLoop, update_period_s: float, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies up to those of half an update's rate, and of half a tick's."""
+    """Return frequencies up to half the rate of updates, and of ticks."""
     limits = math.pi / update_period_s, math.pi / loop.step_s
     updates, ticks = (np.geomspace(SLOWEST_RAD_S, limit, count) for limit in limits)
     return updates, ticks

@@ -24,14 +24,14 @@ _KEYS: Final = {
 }
 """Keys of a vehicle.toml on which margins depend, by the property of the loop that they set.
 
-Keys of one property go to the same end: those of one axis multiply, and the axes do not act on each other.
+Keys of one property go to the same end: the keys of one axis multiply, and the axes do not act on each other.
 """
 _RANGES: Final = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}
 _RANGE: Final = (0.1, 3.0)
 
 
 def uncertain(drone: VehicleFile, *, height: bool) -> VehicleFile:
-    """Return a drone with the intervals on which margins depend: those of the thrust only with a height."""
+    """Return a drone with the intervals on which margins depend: the thrust's only with a height."""
     if drone.uncertainty is None or height:
         return drone
     known = drone.uncertainty.model_copy(update={"thrust_gain": None, "thrust_lag_s": None})

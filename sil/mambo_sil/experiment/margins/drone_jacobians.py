@@ -1,6 +1,6 @@
 """Simulated drones as linear systems: every number of their state changed, one tick simulated.
 
-A drone is that of a flight: stock loops, motors and, if the flight has sensors, instruments and estimators.
+A drone is what a flight has: stock loops, motors and, if the flight has sensors, instruments and estimators.
 """
 
 import math
@@ -43,12 +43,12 @@ class Signals:
 
     @property
     def command(self) -> slice:
-        """Inputs: command of roll and pitch, and the thrust over the nominal mass beyond that of hover."""
+        """Inputs: command of roll and pitch, and the thrust over the nominal mass beyond hover."""
         return slice(0, self.axes)
 
     @property
     def motor(self) -> slice:
-        """Inputs: additions to the motor commands that turn about x and y and lift, per that of hover."""
+        """Inputs: additions to the motor commands that turn about x and y and lift, per command of hover."""
         return slice(self.axes, 2 * self.axes)
 
     @property
@@ -68,7 +68,7 @@ class Signals:
 
     @property
     def demand(self) -> slice:
-        """Outputs: shares of the motor commands that turn about x and y and lift, per that of hover."""
+        """Outputs: shares of the motor commands that turn about x and y and lift, per command of hover."""
         return slice(self.seen.stop, self.seen.stop + self.axes)
 
     @property
@@ -159,7 +159,7 @@ def _hovering(vehicle: Vehicle, n: int, signals: Signals) -> VehicleState:
 def _still_sensors(flight: Flight, state: VehicleState) -> Any:
     """Return the sensors of a flight without noise, or None.
 
-    The accelerometer does not correct the tilt: in flight noise does not let it. Smoothed, that of the Mambo
+    The accelerometer does not correct the tilt: in flight noise does not let it. Smoothed, the Mambo's
     has 18 times the width of the gate.
     """
     given = flight.sensors
@@ -264,7 +264,7 @@ def _numbers(moving: _Moving) -> FloatArray:
 
 
 def _with_numbers(moving: _Moving, numbers: FloatArray) -> _Moving:
-    """Return a simulation of m drones with numbers (rows, m), which lie as those of `_numbers`."""
+    """Return a simulation of m drones with numbers (rows, m), in the order of `_numbers`."""
     first, n = 0, moving.state.body.shape[1]
 
     def take(array: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ ComplexArray = NDArray[np.complex128]
 
 AT_COMMAND, AT_MOTORS, BY_PUSH, BY_SEEN = 0, 1, 2, 3
 """Inputs of a loop: addition to the command; to its share of the motor commands; acceleration of the drone;
-errors of what is seen of the axis from column 3 on, those of `SEEN_OF`; then the noise of the sensors."""
+errors of what is seen of the axis from column 3 on, as in `SEEN_OF`; then the noise of the sensors."""
 SENT, TURNING, PLACE = 0, 1, 2
 """Outputs of a loop: command of the controller; share of the motor commands; true position."""
 

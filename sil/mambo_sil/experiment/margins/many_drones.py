@@ -1,4 +1,4 @@
-"""The margins of a controller on many drones: those of a campaign, or of the intervals of a log."""
+"""The margins of a controller on many drones, of a campaign or of the intervals of a log."""
 
 import csv
 import math

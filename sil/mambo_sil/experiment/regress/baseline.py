@@ -89,7 +89,7 @@ def _first_fault(error: ValidationError) -> str:
 
 
 def _changes(suite: FlightSuite, found: Baseline) -> str:
-    """Return a phrase on how the flights of a suite differ from those of a baseline, empty if they do not."""
+    """Return a phrase on how the flights of a suite differ from a baseline's, empty if they do not."""
     needed = {SCENARIO, *suite.tolerances, *([DIGEST] if suite.same_bits else [])}
     ours = {flight.name: flight.scenario for flight in suite.flights}
     kinds = {
@@ -148,7 +148,7 @@ def _record(scenario: Scenario, row: Row, *, same_bits: bool) -> Recorded:
 
 
 def _scenario_digest(scenario: Scenario) -> str:
-    """Return a digest of the keys of a flight that differ from the defaults, which are those of its drone."""
+    """Return a digest of the keys of a flight that differ from the defaults, which its drone has."""
     defaults = Scenario(vehicle=scenario.vehicle)
     same = {key for key in Scenario.model_fields if getattr(scenario, key) == getattr(defaults, key)}
     if scenario.vehicle != NOMINAL:

@@ -69,7 +69,7 @@ class SensedSummary(ReportedSummary):
     command = "table2 --sensors"
 
     scalar: str | None
-    """Scalar type that replaces that of the presets, if any."""
+    """Scalar type in place of the presets', if any."""
     rows: list[SensedRow]
 
     def section(self, _folder: Path) -> Section:

@@ -71,7 +71,7 @@ class Table2Summary(ReportedSummary):
     command = "table2"
 
     scalar: str | None
-    """Scalar type that replaces that of the presets, if any."""
+    """Scalar type in place of the presets', if any."""
     cases: list[str]
     rows: list[Table2Row]
     claims: list[Claim]
@@ -104,7 +104,7 @@ class Table2Summary(ReportedSummary):
 
 
 def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:
-    """Return a function that turns the share done of one of `parts` parts into that of the whole."""
+    """Return a function that turns the share done of one of `parts` parts into the share of the whole."""
     return lambda share: progress((part + share) / parts)
 
 

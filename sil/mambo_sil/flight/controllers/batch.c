@@ -5,7 +5,7 @@
 #include "nmpc.h"
 
 #ifdef NMPC_HAS_HEIGHT
-/* Numbers of a state: those of nmpc_state_t, and 1 or 0 for the contact with the floor. */
+/* Numbers of a state: as in nmpc_state_t, and 1 or 0 for the contact with the floor. */
 #define STATE_NUMBERS 10
 
 static nmpc_state_t state_of(const nmpc_real_t *numbers)

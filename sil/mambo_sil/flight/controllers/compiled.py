@@ -195,7 +195,7 @@ class CompiledController:
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
     ) -> Any:
-        """Compute the next commands; the inputs are those of `ReferenceController.step`.
+        """Compute the next commands; the inputs are as of `ReferenceController.step`.
 
         Only a controller that is given the acceleration of its target reads ax and ay, and needs them.
 

@@ -37,7 +37,7 @@ DECLARATIONS: Final = """
                            double thrust_acceleration_m_s2, double *command);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);
 """
-"""The functions that Python calls in a library: those of the glue, and one step of the self-test.
+"""The functions that Python calls in a library: the glue, and one step of the self-test.
 
 nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost,
 nmpc_host_set_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits and

@@ -75,7 +75,7 @@ class PdGains:
 
     position_rad_m:        tilt per position error.
     velocity_rad_s_m:      tilt per velocity error.
-    acceleration_rad_s2_m: tilt per acceleration of the target; 1/g would be that of a drone without lag.
+    acceleration_rad_s2_m: tilt per acceleration of the target; 1/g for a drone without lag.
     """
 
     position_rad_m: float
@@ -120,7 +120,7 @@ class PdFeedForwardController:
 
 @dataclass(frozen=True)
 class PidGains(PdGains):
-    """Gains of the PID with feed-forward: those of the PD, and these.
+    """Gains of the PID with feed-forward: the gains of the PD, and these.
 
     jerk_rad_s3_m:    tilt per jerk of the target.
     integral_rad_m_s: tilt per integral of the position error.
@@ -235,7 +235,7 @@ AnyPd = PdController | PdFeedForwardController | PidFeedForwardController
 def pd_controller(name: PdName, flight: Flight) -> AnyPd:
     """Return the controllers called `name` for a flight.
 
-    The PID has the gains of the flight's drone, or those of `mambo` if there are none for it.
+    The PID has the gains of the flight's drone, or of `mambo` if there are none for it.
     """
     match name:
         case "pd":

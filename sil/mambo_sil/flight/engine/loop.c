@@ -39,7 +39,7 @@ static inline void mark_lost(const engine_simulation_t *simulation, vehicle_stat
 }
 
 /* Call the controllers, except of dropped updates, and record the update. The thrust comes from the altitude
- * loop, or is reported to controllers that command it; the trace has that of the loop, of the controllers or of a
+ * loop, or is reported to controllers that command it; the trace has the thrust of the loop, of the controllers or of a
  * take-off. */
 static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                         int64_t update, const double *targets, const engine_draws_t *draws,

@@ -2,7 +2,7 @@
  *
  * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
  * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and
- * signs are those of the Python modules that the names of the headers repeat.
+ * signs are as in the Python modules that the names of the headers repeat.
  */
 
 /* What the flights of a simulation have in common. Pairs are in the order roll, pitch. */
@@ -310,7 +310,7 @@ typedef struct {
     void *self;
     engine_setter_t reset;
     void *memory;             /* of the generated controller */
-    const void *level;        /* zero tilt, and with a thrust that of hover, in its numbers */
+    const void *level;        /* zero tilt, and the thrust of hover if it has one, in its numbers */
     double hover_m_s2;
     int64_t commands_thrust;
     int64_t patience;

@@ -174,7 +174,7 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
 
 
 def in_lanes(records: Record, lanes: int) -> NDArray[np.int64]:
-    """Return n records of `flight_records` as those of groups: (groups, members, lanes), each member 8 bytes.
+    """Return n records of `flight_records` in groups: (groups, members, lanes), each member 8 bytes.
 
     The last flight fills the lanes that the last group has left.
     """
@@ -185,7 +185,7 @@ def in_lanes(records: Record, lanes: int) -> NDArray[np.int64]:
 
 
 def _attitude(drone: VehicleFile) -> dict[str, Any]:
-    """Return the members of the attitude loops; those of other kinds than the drone's are 0."""
+    """Return the members of the attitude loops; of other kinds than the drone's they are 0."""
     values: dict[str, Any] = dict.fromkeys((*_STOCK, *_CASCADE, *_FIRST_ORDER), 0)
     match drone.attitude:
         case MamboAttitude() as stock:

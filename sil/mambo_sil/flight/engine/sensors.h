@@ -100,7 +100,7 @@ static inline void suite_start(const engine_simulation_t *simulation, const seen
     }
 }
 
-/* The readings that reach the estimators at this tick: those of the tick before, at the first its own. */
+/* The readings that reach the estimators at this tick: from the tick before, at the first its own. */
 static inline readings_t read_instruments(const engine_simulation_t *simulation, const engine_flight_t *flight,
                                           const seen_t *truth_now, const rotation_t *r, const real_t *draws,
                                           suite_t *suite)

@@ -15,6 +15,7 @@ from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.thrust_controller import adapted
+from mambo_sil.flight.engine.callback import called_back
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.native import Native, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
@@ -48,12 +49,12 @@ def fly(
 ) -> Trace:
     """Simulate the flights and return their trace; call `progress` with the share done.
 
-    Uses the engine unless `chosen_engine` is numpy, or the step of the controller is not a C function. On a
-    machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
-    UnwritableError if the engine cannot be built for want of a folder or space.
+    Uses the engine unless `chosen_engine` is numpy, or several flights have a controller in Python. On a
+    machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, what the controller
+    raises, and CacheError and UnwritableError if the engine cannot be built for want of a folder or space.
     """
     controller = adapted(controller)
-    engine = _engine(flight, [controller])
+    engine = _engine(flight, [controller] if flight.flights > 1 else [])
     if engine is None:
         return loop.fly(flight, controller, progress)
     return fly_compiled(engine, flight, controller, progress)
@@ -81,13 +82,23 @@ def fly_groups(
 def fly_compiled(
     engine: Any, flight: Flight, controller: PositionController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate flights in a library of `engine_library.load`, group after group, with a controller in C."""
+    """Simulate flights in a library of `engine_library.load`, group after group.
+
+    A controller whose step is no C function has one flight; what it raises ends that.
+    """
     simulation = _Simulation(engine, flight)
-    trace = simulation.allocate(flight.flights)
-    called, record = native(engine, adapted(controller)), trace_record(trace)
+    trace, controller = simulation.allocate(flight.flights), adapted(controller)
+    called, errors = (
+        (native(engine, controller), [])
+        if is_native(controller)
+        else called_back(flight, controller, progress)
+    )
+    record = trace_record(trace)
     for first in simulation.firsts:
         simulation.draw(first)
         simulation.fly(first, called, record, first)
+        if errors:
+            raise errors[0]
         if progress is not None:
             progress(min(first + simulation.lanes, flight.flights) / flight.flights)
     return trace
@@ -114,7 +125,10 @@ def _fly_groups(
 
 
 def _engine(flight: Flight, controllers: Sequence[PositionController]) -> Any:
-    """Return the engine's library with the lanes that are fastest; None if NumPy must simulate."""
+    """Return the engine's library with the lanes that are fastest; None if NumPy must simulate.
+
+    `controllers` are those that must be C functions.
+    """
     delay_ticks = int(np.max(flight.link.delay_ticks))
     if chosen_engine() != "c" or delay_ticks > DELAY_TICKS_MAX or not all(map(is_native, controllers)):
         return None

@@ -42,7 +42,7 @@ class JudgedMargins:
 def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
     """Return the margins of derived settings on their drone, through its own sensors.
 
-    Of a drone with intervals, which `identify` writes, each axis is that of the worst of their ends.
+    Of a drone with intervals, which `identify` writes, each axis has the margins of the worst of their ends.
     Raises BuildError, CacheError.
     """
     sensors = SENSORS_OF[drone.sensors.kind][-1]
@@ -99,7 +99,7 @@ def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: Se
 
 
 def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, VehicleFile]]:
-    """Yield properties in words, and the drone without each; those of the thrust only with a height."""
+    """Yield properties in words, and the drone without each; the thrust's only with a height."""
     document: dict[str, Any] = drone.model_dump(exclude_none=True)
     if isinstance(drone.attitude, FirstOrderAttitude):
         attitude = document["attitude"]

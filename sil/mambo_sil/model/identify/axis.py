@@ -57,7 +57,7 @@ class AxisFit:
     first_order: AxisParameters
     """Without an integrator, whether or not `whole` has one."""
     slow: bool
-    """Whether that is fitted to slow motion; a lag at the bound of its search is then that of a delay."""
+    """Whether that is fitted to slow motion; a lag at the bound of its search is then a delay's."""
     half: FittedResponse
     r2: float
     error_rad: float
@@ -68,7 +68,7 @@ class AxisFit:
 def fit_axis(segments: Sequence[Segment], axis: int) -> AxisFit | None:
     """Fit one axis and choose its order; None without a command.
 
-    The integrator is taken if it lowers the held-out error, also that of a response of second order, which it
+    The integrator is taken if it lowers the held-out error, also of a response of second order, which it
     can imitate with a wrong gain, and its interval does not hold 0. Without one the response is that in slow
     motion, which the controller predicts, if it lowers the held-out error there by a fifth: the sines would
     else decide on the lag of a drone of higher order. The interval of the gain without it holds

@@ -69,8 +69,8 @@ KNOWN: Final[dict[str, tuple[Column, ...]]] = {
         Column("stabilizer.thrust"),
     ),
 }
-"""Known columns of each signal, the first one that a file has is read: those of trace.csv, where the estimate
-(seen_) is what a real drone would log, and those of the Crazyflie, whose y, z and yaw have the other sign."""
+"""Known columns of each signal, the first one that a file has is read: of trace.csv, where the estimate
+(seen_) is what a real drone would log, and of the Crazyflie, whose y, z and yaw have the other sign."""
 
 
 def parse_columns(text: str, signals: Mapping[str, object] = KNOWN) -> dict[str, Column]:

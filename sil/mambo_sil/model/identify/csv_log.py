@@ -29,7 +29,7 @@ would be read as a late one."""
 
 
 COUNTER_BITS: Final = (24, 32)
-"""Counters of ms: that of the Crazyflie's log packets, which ends after 4.7 hours, and that of its clock."""
+"""Counters of ms: in the Crazyflie's log packets, which ends after 4.7 hours, and of its clock."""
 WRAP_SHARE: Final = 64.0
 """A fall from the last to the first of this many parts of a counter's range is an end of the counter."""
 

@@ -27,7 +27,7 @@ SHARES: Final = (0.4, 1.5)
 """Bounds on a plausible acceleration per tilt."""
 
 LARGEST_TRIM_RAD: Final = 0.2
-"""Bound on a plausible trim: that of the settings."""
+"""Bound on a plausible trim: the bound of the settings."""
 
 LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
 """Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
@@ -65,7 +65,7 @@ def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> tuple[lis
 
 
 def identify(logs: Sequence[FlightLog], left_out: Sequence[str] = ()) -> tuple[IdentifySummary, Curves]:
-    """Fit both axes and the motion on all logs without a fault; `left_out` has those of other files.
+    """Fit both axes and the motion on all logs without a fault; `left_out` has the faults of other files.
 
     Raises LogError with all faults of units, signs and clocks if every log has one.
     """

@@ -38,7 +38,7 @@ class AxisResult:
     """The same with an integrator if `fitted` has none, and without if it has one."""
     fitted: AxisParameters | None
     first_order: AxisParameters | None
-    """The model without an integrator, whether or not `fitted` has one: that of `vehicle.toml`."""
+    """The model without an integrator, whether or not `fitted` has one: the model in `vehicle.toml`."""
     offset_rad: Number
     """Mean measured tilt at no command."""
     tilt_noise_rad: Number

@@ -7,7 +7,7 @@ A response of second order without an integrator is k / (lag s^2 + s + k).
 
 Output error: the model is driven by the commands alone. Gain and offsets are solved linearly inside the
 search for the other parameters, of which it takes the logarithms. Model and tilt may be smoothed alike: then
-the model is that of slow motion, in which a drone of higher order has another lag than in quick motion.
+the model describes slow motion, in which a drone of higher order has another lag than in quick motion.
 """
 
 import cmath
@@ -41,7 +41,7 @@ NORMAL_95: Final = 1.96
 WIDENING: Final = 2.0
 DEAD_TIME_WIDENING: Final = 3.0
 SURPLUS_S: Final = 0.005
-"""Factors on the 95 % intervals, and what is added to those of times. Residuals of real logs are correlated
+"""Factors on the 95 % intervals, and what is added to times. Residuals of real logs are correlated
 for longer than the window; with these factors the intervals hold from flight to flight."""
 
 _LEAST_VARIANCE: Final = 1e-12

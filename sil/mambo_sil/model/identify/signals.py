@@ -50,7 +50,7 @@ class Signal:
 
 @dataclass(frozen=True, eq=False)
 class FlightLog:
-    """One log: signals by name, at least those of `REQUIRED`."""
+    """One log: signals by name, at least the `REQUIRED` ones."""
 
     name: str
     """Name of the file, fit for a message."""

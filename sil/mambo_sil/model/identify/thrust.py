@@ -53,7 +53,7 @@ LEAST_R2, GOOD_R2 = 0.5, 0.8
 SURPLUS_GAIN: Final = 0.01
 """Added to the half-width of the gain, over it: a steady vertical wind of 0.1 m/s^2 looks like it."""
 SURPLUS_LAG_S: Final = 0.01
-"""Added to that of the lag: the noise of the height comes back through the altitude loop."""
+"""Added to the interval of the lag: the noise of the height comes back through the altitude loop."""
 SAG_WIDENING: Final = 2.5
 """Factor on the interval of the sag besides: slow gusts look like it."""
 VAGUE_LAG_S, UNKNOWN_LAG_S = 0.05, 0.1
@@ -64,7 +64,7 @@ STEP_M: Final = 0.12
 """Range of the height from which on it has been flown up and down."""
 STEPS: Final = "fly steps of height, as 0.25 m up and down every 1.5 s, for 20 s"
 WEIGHTS_G, GOOD_WEIGHTS_G = (0.5, 2.0), (0.85, 1.15)
-"""Bounds on slope times hover command over g, and on that of a thrust in proportion to its command."""
+"""Bounds on slope times hover command over g, and on the same for a thrust in proportion to its command."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +229,7 @@ def _modelled(rates: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
-    """Return the sum of lag and dead time, with an interval as those of the angles."""
+    """Return the sum of lag and dead time, with an interval like the angles'."""
     windows = cut_windows(segments, fit.logs)
     columns = [[each.rates[0], each.rates[1]] for each in windows]
     for index in range(2):

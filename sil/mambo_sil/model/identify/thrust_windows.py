@@ -55,7 +55,7 @@ def _vertical(segment: Segment, lag_s: float, delay_s: float) -> FloatArray:
 def _cut(segment: Segment, command: FloatArray) -> Windows:
     """Return the windows of a stretch with a vertical command (k,).
 
-    Integrals from the beginning of the stretch on differ from those of a window by a line, which is removed.
+    Integrals from the beginning of the stretch on differ from a window's by a line, which is removed.
     """
     assert segment.height_m is not None
     height_m = segment.height_m - segment.height_m[0]

@@ -103,7 +103,7 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
 
 
 def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the commanded roll and pitch: roll_body and pitch_body, or those of the quaternion q_d."""
+    """Return the commanded roll and pitch: roll_body and pitch_body, or the angles of the quaternion q_d."""
     direct = [setpoint.get(f"{angle}_body") for angle in _ANGLES[:2]]
     if all(each is not None and np.isfinite(each).any() for each in direct):
         return {angle: each for angle, each in zip(_ANGLES, direct, strict=False) if each is not None}

@@ -23,7 +23,7 @@ AXES: Final = ("roll", "pitch")
 CURVE_COLUMNS: Final = ("time_s", *(f"{axis}_{kind}_rad" for kind in ("logged", "replayed") for axis in AXES))
 
 SETTLING_S: Final = 2.0
-"""Time from a beginning of the controller in which its estimates approach those of the flight."""
+"""Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
 
 
 @dataclass(frozen=True, eq=False)

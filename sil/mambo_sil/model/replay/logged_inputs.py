@@ -93,8 +93,8 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     )
     for name, columns in _OTHER.items()
 }
-"""Known columns of each signal, the first one that a file has is read: those of trace.csv, of the app's
-steps, and of the Crazyflie, whose y has the other sign. The commands are those of the controller itself."""
+"""Known columns of each signal, the first one that a file has is read: of trace.csv, of the app's
+steps, and of the Crazyflie, whose y has the other sign. The commands are the controller's own."""
 
 LONGEST_FILLED_S: Final = 0.25
 """Longest gap of a log that is filled; behind a longer one the controller begins anew."""

@@ -1,4 +1,4 @@
-"""How the replayed commands differ from those of the log: record, text, section of the report."""
+"""How the replayed commands differ from the log's: record, text, section of the report."""
 
 from pathlib import Path
 from typing import Final
@@ -37,7 +37,7 @@ class LogReplaySummary(ReportedSummary):
     judged: int
     """Steps `SETTLING_S` or more after a beginning of the controller; what follows is of these."""
     miss: tuple[Number, Number]
-    """Change of the error over that of the logged command: half of the motion has less."""
+    """Change of the error over the change of the logged command: half of the motion has less."""
     error_rad: tuple[Number, Number]
     """Error: half of the motion has less."""
     rms_rad: tuple[Number, Number]
@@ -129,7 +129,7 @@ def finding(summary: LogReplaySummary) -> str:
         case ReplayVerdict.CANNOT_TELL:
             return f"CANNOT TELL whether it was this controller: {summary.missing}"
         case ReplayVerdict.NO:
-            limit = f"and should {100.0 * SAME:g} % at most"
+            limit = f"more than the {100.0 * SAME:g} % allowed"
             return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
     if summary.equal_steps == summary.steps:
         return f"all {summary.steps} commands of the log are those of this controller, bit for bit"

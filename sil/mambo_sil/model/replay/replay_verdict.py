@@ -54,7 +54,7 @@ class AxisErrors:
 
     @property
     def is_same(self) -> bool:
-        """Whether the errors are those of the controller that flew."""
+        """Whether the errors are as small as with the controller that flew."""
         return self.error_rad <= SMALL_RAD or self.miss <= SAME
 
     def is_other(self, *, exact: bool) -> bool:

@@ -48,7 +48,7 @@ class ProofInputs:
 
 
 def motion_capture(drone: VehicleFile) -> MotionCapture:
-    """Return the motion capture of a drone; one without has that of the vehicle crazyflie."""
+    """Return the motion capture of a drone; one without has the crazyflie's."""
     sensors = drone.sensors
     if not isinstance(sensors, MocapSensors):
         sensors = vehicle_toml.preset("crazyflie").sensors

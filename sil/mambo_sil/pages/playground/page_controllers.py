@@ -66,7 +66,7 @@ def page_controllers(sources: Sequence[str]) -> tuple[PageController, ...]:
 
 
 def period_s(found: Sequence[PageController]) -> float:
-    """Return the update period of controllers that have the same one; that of a PD is 0.01 s."""
+    """Return the update period of controllers that have the same one; a PD has 0.01 s."""
     periods = (one.kind.horizon.update_period_s for one in found if isinstance(one.kind, Settings))
     return next(periods, 0.01)
 

@@ -96,7 +96,7 @@ def playground_page(
 
 
 def _hues(found: Sequence[PageController]) -> list[int]:
-    """Return the number of each controller's colour; that of a PD is the same on every page."""
+    """Return the number of each controller's colour; a PD has the same on every page."""
     taken = {_PD_HUES[one.source] for one in found if one.source in _PD_HUES}
     others = (hue for hue in (0, 3, 1, 2) if hue not in taken)
     return [_PD_HUES[one.source] if one.source in _PD_HUES else next(others) for one in found]
