@@ -150,7 +150,9 @@ class LifeCycle:
         """Stop the motors at once, wherever the drone is."""
         if self.phase in _IN_FLIGHT:
             self._stops = STOPS
-        self._finish(f"{why}: the motors are stopped" if self._stops else f"no flight: {why}", good=False)
+            self._finish(f"{why}: the motors are stopped", good=False)
+        elif self.phase is not Phase.ENDED:
+            self._finish(f"no flight: {why}", good=False)
 
     # What comes.
 
