@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.flights.wire import Faults, WiredLink
 from mambo_sil.api.states import TargetState
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
 from mambo_sil.flight.trajectories import Circle, Gerono
 from mambo_sil.link.flight_log import write_log
@@ -269,3 +270,32 @@ def test_an_autopilot_that_refuses_to_arm_says_why() -> None:
     with pytest.raises(PilotError, match="PX4 did not arm within 15 s, and says: Preflight Fail: compass"):
         flight.fly(1.0)
     assert not flight.updates
+
+
+def fly_by_an_estimator(vehicle: VehicleFile) -> tuple[float, float]:
+    """Fly settings for `vehicle` by an estimator that errs; return rms of command changes and of true errors."""
+    link, updates, away_m = WiredLink("px4", SEEN, Condition(seed=5)), list[Update](), list[float]()
+
+    def watch(pilot: Pilot) -> None:
+        if pilot.life.phase is Phase.FLYING and len(updates) > 200:
+            place_m = link.autopilot.true.position_m[:, 0] - STARTS_M
+            away_m.append(float(np.linalg.norm((place_m - updates[-1].target.position_m)[:2])))
+
+    with Pilot(controller(vehicle), lambda: link, updates.append, watch) as pilot:
+        pilot.take_off(1.0)
+        pilot.fly(Gerono(1.5, 0.6), 12.0)
+        pilot.land()
+    command_rad = np.array([one.command_rad for one in updates])[200:]
+    changes = float(np.sqrt(np.mean(np.diff(command_rad, axis=0) ** 2)))
+    return changes, float(np.sqrt(np.mean(np.square(away_m))))
+
+
+SEEN = drone().with_sensors("autopilot")
+
+
+@pytest.mark.long
+def test_settings_for_the_estimator_of_an_autopilot_are_calm() -> None:
+    """The command moves half as fast as without them, and the curve is no farther off."""
+    (unknown, unknown_m), (known, known_m) = map(fly_by_an_estimator, (drone(), SEEN))
+    assert known < 0.5 * unknown
+    assert known_m < 1.1 * unknown_m

@@ -44,14 +44,14 @@ def write_drone(folder: Path) -> None:
     (folder / "controller.toml").write_text(controller_text(drone(), "drone.toml"), "utf-8")
 
 
-def controller() -> Controller:
-    """Return a new controller with the settings that `design` derives."""
-    return Controller(_settings(), 1)
+def controller(vehicle: VehicleFile | None = None) -> Controller:
+    """Return a new controller with the settings that `design` derives for a drone, or that of these tests."""
+    return Controller(_settings(vehicle or drone()))
 
 
 @lru_cache
-def _settings() -> Settings:
-    return controller_toml.parse(controller_text(drone(), "drone"), "controller.toml")
+def _settings(vehicle: VehicleFile) -> Settings:
+    return controller_toml.parse(controller_text(vehicle, "drone"), "controller.toml")
 
 
 def simulated(

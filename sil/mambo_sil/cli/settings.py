@@ -185,7 +185,8 @@ def design(
     sensors: Annotated[
         SensorsKind | None,
         sensors_option(
-            SENSORS_KINDS, "What measures, in place of the file's sensors: true, mocap, flow-deck or mambo."
+            SENSORS_KINDS,
+            "What measures, in place of the file's sensors: true, mocap, flow-deck, autopilot, mambo.",
         ),
     ] = None,
 ) -> None:

@@ -15,7 +15,9 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.ground import carry_on_ground
 from mambo_sil.drone.plant.vehicle import Seen, Vehicle, truth
+from mambo_sil.drone.sensors.autopilot import EstimatorErrors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.flight.loop import Flight, suite_of
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import choose_sensors
@@ -99,6 +101,11 @@ class SimulatedAutopilot:
         flight = Flight(Hover(), vehicle=vehicle, update_period_s=drone.step_s, seeds=seeds, sensors=sensors)
         self._vehicle, self._there = vehicle, np.ones(1, np.bool_)
         self._state = vehicle.at_rest(np.array(STARTS_M)[:, np.newaxis], self.condition.yaw_rad, 0.0)
+        self._errors = (
+            EstimatorErrors(drone.sensors, self.condition.seed, drone.step_s)
+            if isinstance(drone.sensors, AutopilotSensors)
+            else None
+        )
         self._suite = suite_of(flight, seeds, truth(self._state))
         self._world = World(wind, vehicle, seeds, 1.0)
         self._rates: dict[Stream, float] = dict(ALWAYS)
@@ -150,10 +157,16 @@ class SimulatedAutopilot:
         """Return the estimate, with the jumps of its frame; its origin is where the drone starts."""
         attitude_rad = seen.euler_rad[:, 0] + np.array([0.0, 0.0, self._error_rad])
         attitude_rad[2] = float(wrapped(attitude_rad[2]))
+        position_m = seen.position_m[:, 0] - np.array(STARTS_M) + self._error_m
+        velocity_m_s = seen.velocity_m_s[:, 0] + self.drift_m_s
+        if self._errors is not None:
+            self._errors.advance()
+            position_m = position_m + self._errors.position_m
+            velocity_m_s = velocity_m_s + self._errors.velocity_m_s
         return EstimatedState(
             self.time_s,
-            seen.position_m[:, 0] - np.array(STARTS_M) + self._error_m,
-            seen.velocity_m_s[:, 0] + self.drift_m_s,
+            position_m,
+            velocity_m_s,
             attitude_rad,
             self._resets,
         )
