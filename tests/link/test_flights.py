@@ -273,7 +273,7 @@ def test_an_autopilot_that_refuses_to_arm_says_why() -> None:
 
 
 def fly_by_an_estimator(vehicle: VehicleFile) -> tuple[float, float]:
-    """Fly settings for `vehicle` by an estimator that errs; return rms of command changes and of true errors."""
+    """Fly settings for `vehicle` by an estimator that errs; return rms of command changes and errors."""
     link, updates, away_m = WiredLink("px4", SEEN, Condition(seed=5)), list[Update](), list[float]()
 
     def watch(pilot: Pilot) -> None:
