@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from benchmarks.flights.without_height import without_height
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
@@ -103,7 +104,7 @@ class AppTakeOff:
 def settings_of(*, height: bool) -> Settings:
     """Return the settings of `SETTINGS`, or the same without a height."""
     settings = controller_toml.read(SETTINGS)
-    return settings if height else settings.model_copy(update={"height": None})
+    return settings if height else without_height(settings)
 
 
 def flown(

@@ -5,6 +5,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from benchmarks.flights.without_height import without_height
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
@@ -93,7 +94,7 @@ class OurSettings:
     def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return the C for new drones; it knows how old its states are."""
         options: ControllerOptions = {"age_s": AGE_S if noisy else 0.0}
-        settings = with_options(self.settings.model_copy(update={"height": None}), options)
+        settings = with_options(without_height(self.settings), options)
         controller = Controller(settings, drones, HeightHold(self.height, self.drone, settings, drones))
         return _OurPilot(controller, mass_kg)
 

@@ -69,6 +69,12 @@ def departures(settings: Settings) -> dict[str, Any]:
                 "limits.tilt_rad": 0.5,
                 "limits.speed_m_s": 5.0,
                 "limits.braking_m_s2": 3.0,
+                "guard.tilt_rad": 1.5,
+                "guard.tilt_rad_s": 3.0,
+                "guard.thrust_m_s2": 12.0,
+                "guard.thrust_m_s3": 50.0,
+                "guard.target_noise_m_s2": 0.3,
+                "guard.position_noise": 0.03,
             },
         ),
         (

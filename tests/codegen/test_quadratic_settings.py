@@ -21,6 +21,8 @@ HEIGHT = {path for path in KEYS if path.startswith("height.")} | {
     "limits.fence.ceiling_m",
 }
 """The keys that only a controller with a height uses."""
+GUARD = {path for path in KEYS if path.startswith("guard.")}
+"""The keys that only a controller with a guard uses; two of them need a height too."""
 
 
 def faults_of(values: Values) -> list[str]:
@@ -41,8 +43,10 @@ def other_value(key: Key) -> str | float:
 def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
     """Every key is used by one norm at least; some by both."""
     paths = {norm: {key.path for key in keys} for norm, keys in USED.items()}
-    assert paths["1-norm"] | paths["quadratic"] == set(KEYS) - HEIGHT
+    assert paths["1-norm"] | paths["quadratic"] == set(KEYS) - HEIGHT - GUARD
     assert {key for key in KEYS if settings_with_height().uses(key)} == paths["quadratic"] | HEIGHT
+    guarded = controller_toml.parse(f"{toml(QUADRATIC)}[height]\n[guard]\n", "slow.toml")
+    assert {key for key in KEYS if guarded.uses(key)} == paths["quadratic"] | HEIGHT | GUARD
     assert {"horizon.update_period_s", "model.roll_lag_s", "damping.roll_rate_feedback_s", "cost.norm"} <= (
         paths["1-norm"] & paths["quadratic"]
     )
@@ -55,7 +59,9 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
     """Each key of the other norm alone, with its value and what to do; its default may stand there."""
     base = {"1-norm": LAGS, "quadratic": QUADRATIC}[norm]
     printed = "model.position_update"  # which admits no lag, as a quadratic cost wants one
-    others = [key for key in KEYS.values() if key not in USED[norm] and key.path not in {printed, *HEIGHT}]
+    others = [
+        key for key in KEYS.values() if key not in USED[norm] and key.path not in {printed, *HEIGHT, *GUARD}
+    ]
     for key in others:
         value = other_value(key)
         spelling = spell(value) if key.low is None else value

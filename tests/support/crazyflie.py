@@ -1,6 +1,8 @@
 """The Crazyflie's app, compiled with stubs of the firmware, and called as the firmware calls it."""
 
 import math
+import shutil
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -207,15 +209,20 @@ def app_sources(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class Built:
-    """A folder of the target, its objects by the name of their source, and the app that they make."""
+    """A folder of the target, its objects by the name of their source, and the library that they make."""
 
     folder: Path
     objects: dict[str, Path]
-    host: Any
+    library: Path
+
+    def host(self) -> Any:
+        """Load a copy of the library: no two drones share the app's variables."""
+        with tempfile.TemporaryDirectory(prefix="app-") as folder:
+            return _INTERFACE.dlopen(shutil.copy(self.library, folder))
 
     def app(self) -> Crazyflie:
         """Return a drone with the app as it is."""
-        return Crazyflie(self.host)
+        return Crazyflie(self.host())
 
     def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
         """Return a drone with an app in which `right`, found once in one of its files, reads `wrong`."""
@@ -236,7 +243,8 @@ def build(folder: Path) -> Built:
         source.stem: compile_host(source, folder / f"{source.stem}.o", "-ffp-contract=off")
         for source in sources
     } | {"host": compile_host(HOST, folder / "host.o")}
-    return Built(folder, objects, link([*objects.values()], folder / "app.so"))
+    link([*objects.values()], folder / "app.so")
+    return Built(folder, objects, folder / "app.so")
 
 
 def folder_of(settings: Settings, folder: Path) -> Path:

@@ -317,7 +317,7 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
 
 def test_missing_variances_are_said_once(tmp_path: Path) -> None:
     """In the worker's task, when the app starts: a lost position goes unnoticed then."""
-    quiet = build(folder_of(SETTINGS, tmp_path)).host
+    quiet = build(folder_of(SETTINGS, tmp_path)).host()
     quiet.host_has_variances = False
     app = Crazyflie(quiet)
     scheduled = app.host.host_scheduled

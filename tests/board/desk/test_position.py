@@ -29,7 +29,7 @@ def lost_ms(desk: Desk, milliseconds: int) -> int:
 def test_a_flow_deck_is_no_lost_position_whenever_it_measures(phase_ms: int, flow_app: Path) -> None:
     """In any of the ten milliseconds from prediction to prediction; its end is noticed in 0.3 s."""
     flow = DeskConditions(seed=phase_ms, sensors=DeskSensors.FLOW_DECK, camera_offset_ms=phase_ms)
-    desk = started(flow_app, 2.5, 1.3, flow)
+    desk = started(flow_app, 2.5, 2.0, flow)
     assert lost_ms(desk, 5000) == 0
     desk.measure(on=False)
     assert lost_ms(desk, 280) == 0

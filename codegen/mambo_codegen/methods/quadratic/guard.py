@@ -8,7 +8,7 @@ from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.shared.math import Real, clamp
 
 
-class Budget:
+class VariationBudget:
     """How much a command may vary at once, and how much more with each control step."""
 
     def __init__(self, arithmetic: QuadraticArithmetic, full: float, growth: float, quantity: str) -> None:

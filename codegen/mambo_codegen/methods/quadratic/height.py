@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.guard import Budget
+from mambo_codegen.methods.quadratic.guard import VariationBudget
 from mambo_codegen.methods.quadratic.height_constants import (
     COSINE_TERMS,
     FLOOR_MARGIN_M,
@@ -119,9 +119,9 @@ class HeightAxis:
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._tracker = Tracker(found.tracker, products) if found.tracker else None
-        self._budget: Budget | None = None
+        self._budget: VariationBudget | None = None
         if guard := constants.guard:
-            self._budget = Budget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
+            self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
         age_steps = constants.observer.age_steps
         self._age = constant(age_steps, "age") if age_steps else None
         self._height_limit = constant(settings.ranges.position_m, "position")

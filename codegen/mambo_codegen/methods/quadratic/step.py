@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.guard import Budget
+from mambo_codegen.methods.quadratic.guard import VariationBudget
 from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, HeightState, Lift
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
@@ -93,9 +93,9 @@ class ControlStep:
         self.height: HeightAxis | NoHeight = NoHeight(constants)
         if constants.height:
             self.height = HeightAxis(constants, constants.height, products)
-        self.tilt_budget: Budget | None = None
+        self.tilt_budget: VariationBudget | None = None
         if guard := constants.guard:
-            self.tilt_budget = Budget(products, guard.tilt_rad, guard.tilt_growth_rad, "angle")
+            self.tilt_budget = VariationBudget(products, guard.tilt_rad, guard.tilt_growth_rad, "angle")
         self._feedback = constants.feedback_steps and np.array(
             [constant(steps, "feedback") for steps in constants.feedback_steps]
         )
