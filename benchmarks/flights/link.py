@@ -106,7 +106,7 @@ def fly(
     frame: SteadyFrame | None = None,
 ) -> WiredFlight:
     """Fly a course from the ground to the ground; `happens` is called with the time since the take-over."""
-    settings = controller_toml.parse(controller_text(drone, DRONE.name), DRONE.name)
+    settings = controller_toml.parse(controller_text(vehicle_toml.read(DRONE), DRONE.name), DRONE.name)
     settings = controller_toml.with_option(settings, "target.acceleration", "given", "acceleration")
     flown, begun_s = WiredFlight(), math.inf
     link = WiredLink(stack, drone, Condition(yaw_rad=heading_rad))
@@ -173,7 +173,7 @@ def pause(stack: str, drone: VehicleFile) -> dict[str, float]:
     for heading_rad in HEADINGS_RAD:
 
         def happens(link: WiredLink, time_s: float) -> None:
-            lost = Faults(lost=1.0 if 1.0 < time_s < 1.95 else 0.0)
+            lost = Faults(lost=1.0 if 10.0 < time_s < 10.95 else 0.0)
             link.wire.to_pilot = link.wire.to_autopilot = lost
 
         flown = fly(stack, drone, heading_rad, along(CURVES["eight 2 m, 0.5 rad/s"]), happens=happens)

@@ -63,9 +63,8 @@ class MavlinkSocket:
     def __init__(
         self, listen: Address, peer: tuple[str, int] | None, source: tuple[int, int] = PILOT
     ) -> None:
-        mavlink = dialect()
-        self.mav: Any = mavlink.MAVLink(self, *source)
-        self.mav.robust_parsing = True
+        self._dialect = dialect()
+        self.mav: Any = self._dialect.MAVLink(self, *source)
         self._peer, self._newest = peer, dict[tuple[int, int], tuple[int, int]]()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -101,11 +100,16 @@ class MavlinkSocket:
                 return found
             except OSError:  # an answer of the network to what was sent
                 continue
-            for message in self.mav.parse_buffer(data) or ():
-                if message.get_type() != "BAD_DATA":
-                    self._peer = self._peer or sender
-                    if self._is_next(message):
-                        found.append(message)
+            for message in self._parse(data):
+                self._peer = self._peer or sender
+                if self._is_next(message):
+                    found.append(message)
+
+    def _parse(self, data: bytes) -> list[Any]:
+        """Return the messages of a datagram; what is garbage in it costs none of the next one."""
+        parser = self._dialect.MAVLink(None)
+        parser.robust_parsing = True
+        return [one for one in parser.parse_buffer(data) or () if one.get_type() != "BAD_DATA"]
 
     def _is_next(self, message: Any) -> bool:
         """Return whether a message is newer than all of its sender by its sequence number."""
