@@ -68,9 +68,9 @@ test: tools $(SETUP_TEST)
 # Packages of that age use what newer ones deprecate.
 lowest:
 	$(PYTHON) -m venv --clear $(LOWEST)
-	sed -n 's/^ *"\([a-z0-9]*\)>=\([0-9.]*\)",$$/\1==\2/p' pyproject.toml > $(LOWEST)/least.txt
+	sed -nE 's/^(emulation = \[| *)"([a-z0-9]*)>=([0-9.]*)"[],]$$/\2==\3/p' pyproject.toml > $(LOWEST)/least.txt
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --constraint $(LOWEST)/least.txt \
-	    --editable . hypothesis jsonschema pytest pytest-xdist
+	    --editable ".[emulation]" hypothesis jsonschema pytest pytest-xdist
 	@CI= PATH="$(CURDIR)/$(LOWEST)/bin:$$PATH" $(LOWEST)/bin/python -m pytest -q -n auto -W ignore::DeprecationWarning \
 	    $(LOWEST_TESTED)
 
@@ -110,7 +110,7 @@ docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "the manual: build/docs/index.html; its search wants a server: python3 -m http.server -d build/docs"
 
-evidence: $(SETUP)
+evidence: $(SETUP_TEST)
 	$(BIN)/python -m benchmarks.evidence
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from benchmarks.evidence.item import Figures
-from mambo_sil.results.style import BLUE, BROAD, BROWN, DOT, INK, ORANGE, QUIET, TARGET, style
+from mambo_sil.results.style import ARM, BLUE, BROAD, BROWN, DOT, INK, ORANGE, QUIET, TARGET, style
 
 FLOWN: Final = {
     "pd": "the paper's PD",
@@ -195,12 +195,12 @@ def _draw_quadrotor(axes: Any, place: Points, angles_rad: Points, colour: str) -
 
     corners = [_ARM_M * np.array(corner) for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1))]
     for forward, right in corners:
-        axes.plot(*at(np.array([0.0, forward]), np.array([0.0, right])).T, color=colour, linewidth=1.5)
+        axes.plot(*at(np.array([0.0, forward]), np.array([0.0, right])).T, color=colour, linewidth=ARM)
     for forward, right in corners:
         ring = at(forward + (_ROTOR_M * np.cos(_AROUND)), right + (_ROTOR_M * np.sin(_AROUND)))
         inside = (*to_rgb(colour), 0.45) if forward > 0 else "white"
         axes.fill(*ring.T, facecolor="white", zorder=2)
-        axes.fill(*ring.T, facecolor=inside, edgecolor=colour, linewidth=1.0, zorder=2)
+        axes.fill(*ring.T, facecolor=inside, edgecolor=colour, linewidth=ARM, zorder=2)
     axes.fill(*at(_BODY_M * np.cos(_AROUND), _BODY_M * np.sin(_AROUND)).T, facecolor=colour, zorder=2)
 
 

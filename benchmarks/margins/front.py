@@ -23,8 +23,9 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import preset
 from mambo_sil.experiment.campaign import campaign_file
-from mambo_sil.experiment.campaign.campaign_file import Campaign, Entrant, scenario
+from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.scenario import flight_of

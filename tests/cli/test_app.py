@@ -14,7 +14,7 @@ from tests.support.command import run, unwrapped
 def test_an_app_flies_an_events_file() -> None:
     """It prints measures beside bounds, and writes trace, picture and summary."""
     text, files = run("fly", "crazyflie", "--app", "crazyflie", "--events", "camera-lost")
-    assert unwrapped(text).startswith("app of crazyflie on the desk, camera-lost: 3 bounds kept")
+    assert unwrapped(text).startswith("app of crazyflie on the desk's Crazyflie, camera-lost: 3 bounds kept")
     assert files == "flight: trace.csv, flight.png, flight.svg\n"
     summary = json.loads(Path("flight/summary.json").read_text("utf-8"))
     assert summary["measures"]["told_s"] <= 0.5

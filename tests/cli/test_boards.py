@@ -10,7 +10,7 @@ from mambo_codegen import boards
 from mambo_codegen.settings import presets
 from mambo_sil.board.footprint.footprint_plots import draw_footprints
 from mambo_sil.board.footprint.measure import measure_footprint
-from tests.support.command import run, unwrapped
+from tests.support.command import command, run, unwrapped
 from tests.support.tools import board_builder, only, require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -210,3 +210,39 @@ def test_the_doctor_answers() -> None:
     findings = json.loads(run("doctor", "--json")[0])
     tools = {tool for finding in findings for tool in finding["tool"].split(" or ")}
     assert {"arm-none-eabi-gcc", "qemu-system-avr", "unicorn"} <= tools
+
+
+WITHOUT_UNICORN = "import sys; sys.modules['unicorn'] = None; from mambo_sil.cli.app import main; main()"
+NAMES_THE_EXTRA = (
+    "unicorn, the optional package that emulates cortex-m4, is missing: pip install unicorn "
+    '(the extra "emulation")'
+)
+
+
+@pytest.mark.usefixtures("_crazyflie")
+def test_without_the_emulator_a_footprint_has_flash_ram_and_stack() -> None:
+    """It needs no package of another licence; the note says what instructions and cycles want."""
+    done = command("footprint", "--board", "crazyflie", "--json", "-o", "out", script=WITHOUT_UNICORN)
+    assert done.returncode == 0, done.stderr
+    (board,) = json.loads(done.stdout)["boards"]
+    assert [limit["name"] for limit in board["limits"]] == ["flash", "RAM", "stack"]
+    assert board["notes"] == [f"crazyflie: instructions, cycles and time are not measured: {NAMES_THE_EXTRA}"]
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("_crazyflie")
+@pytest.mark.parametrize(
+    "words", ["fly --on crazyflie --duration-s 1", "sweep --vary cost.response_time_s=0.1:0.2:2"]
+)
+def test_without_the_emulator_what_needs_it_names_the_extra(words: str) -> None:
+    """In one sentence."""
+    done = command(*words.split(), script=WITHOUT_UNICORN)
+    assert done.returncode == 2
+    assert done.stderr == f"{NAMES_THE_EXTRA}\n"
+
+
+def test_the_doctor_names_the_extra() -> None:
+    """In the row of its package."""
+    said = run("doctor")[0]
+    (row,) = (line for line in said.splitlines() if line.startswith("emulator  unicorn"))
+    assert "the extra emulation" in row

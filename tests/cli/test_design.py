@@ -30,12 +30,12 @@ def test_it_writes_a_file_that_flies() -> None:
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
     wrote, flown, roll, pitch = said.splitlines()
-    assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml"
+    assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml"
     assert flown == "flown for 10 s: stays at its target (true state)"
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")
     assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
-    run("fly", "controller.toml", "--vehicle", "mine.toml", "--no-pictures", "--duration-s", "20")
+    run("fly", "controller.toml", "--no-pictures", "--duration-s", "20")
     assert json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["max_error_m"] < 0.2
 
 

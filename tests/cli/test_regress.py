@@ -68,7 +68,7 @@ def test_a_broken_bound_fails_and_its_flight_repeats_bit_for_bit() -> None:
     """Exit 1 names flight, metric, value and bound; the record is that of the flight."""
     break_suite()
     said, _ = run("regress", "mine.toml", "-o", "out", code=1)
-    assert "mine with mambo: 1 of 5 flights passed, 4 failed" in said
+    assert "mine with mambo on mambo: 1 of 5 flights passed, 4 failed" in said
     line = next(line for line in said.splitlines() if line.startswith("eight/yaw_rad=0.8,sensors=mambo: "))
     assert ": IAE " in line
     assert "(bound 1e-06)" in line
@@ -102,7 +102,7 @@ def test_recorded_flights_are_the_same_again_and_others_fail() -> None:
 def test_the_stock_pd_can_be_tested() -> None:
     """As in a campaign."""
     said, _ = run("regress", "mine.toml", "--controller", "pd", "-o", "out")
-    assert "mine with pd: 5 of 5 flights passed" in said
+    assert "mine with pd on mambo: 5 of 5 flights passed" in said
 
 
 @pytest.mark.parametrize(

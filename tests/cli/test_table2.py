@@ -52,7 +52,7 @@ def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
     text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
     lines = text.splitlines()
-    assert lines[0] == "mambo: 1 cm in the mean on Bernoulli 0.5 rad/s"
+    assert lines[0] == "mambo on mambo: 1 cm in the mean on Bernoulli 0.5 rad/s"
     assert "improvement: IAE of the flown PD" in text
     flown = next(line for line in lines if line.startswith("flown mambo"))
     assert flown.split() == ["flown", "mambo", "1", "2", "3", "4", "5", "0.0123"]

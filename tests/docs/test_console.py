@@ -38,6 +38,7 @@ NOT_RUN = {
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
     "how-to/crazyflow.md": ("it installs", "needs crazyflow and JAX"),
     "how-to/espidf.md": ("needs ESP-IDF",),
+    "how-to/from-0.1-to-0.2.md": ("needs files of 0.1",),
     "how-to/gym-pybullet-drones.md": (
         "it installs",
         "needs gym-pybullet-drones, which is not on PyPI",
@@ -52,6 +53,12 @@ NOT_RUN = {
         "needs a board; tests of their own fly it in QEMU",
     ),
     "how-to/platformio.md": ("needs PlatformIO",),
+    "how-to/release.md": (
+        "takes hours where evidence is old",
+        "it changes the version",
+        "needs the packages build and twine",
+        "it changes the version",
+    ),
     "how-to/rotorpy.md": ("it installs",),
     "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),

@@ -11,6 +11,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.experiment.table2.table2 import PRINTED_IMPROVEMENT, PRINTED_PD
+from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.flight.engine.simulate import fly
@@ -76,7 +77,7 @@ def test_a_flight_in_numpy_with_the_reference_is_the_flight_with_the_c(condition
     """Nothing of C in one of them: all arrays of both traces are equal bit for bit."""
     settings = presets.load("mambo")
     flight = replace(CONDITIONS[condition], duration_s=2.0)
-    ours = fly(flight, method_of(settings).reference_controller())
+    ours = loop.fly(flight, method_of(settings).reference_controller())
     assert fly(flight, CompiledController(settings)).same_bits(ours)
 
 

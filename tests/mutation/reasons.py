@@ -1,46 +1,24 @@
-"""Exceptions of the coverage and mutation tests: why a line cannot run, or why a fault changes no bit."""
+"""Exceptions of the coverage and mutation tests: why a line cannot run, or why a fault changes no bit.
+
+A table has, below the name of each source file, a row for a line of it: the line, the reason, and the faults
+or branches, with ` @@ ` between. A reason that begins with `if NAME: ` holds under that condition only.
+"""
 
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 from mambo_codegen.settings.model import Settings
+from tests.mutation.conditions import CONDITIONS
 
 Key = tuple[str, str, str]
 """File, line, and what happens there, spelled by `plain`, so that the key stays valid when the line moves."""
 
 
-def _always(_: Settings) -> bool:
-    return True
-
-
-@dataclass(frozen=True)
-class Reason:
-    """One exception: where, what, why, and for which settings."""
-
-    file: str
-    line: str
-    what: str
-    reason: str
-    holds: Callable[[Settings], bool] = _always
-
-    @property
-    def key(self) -> Key:
-        """The key of the exception."""
-        return self.file, self.line, self.what
-
-
-def reasons(
-    file: str, line: str, reason: str, *faults: str, holds: Callable[[Settings], bool] = _always
-) -> tuple[Reason, ...]:
-    """Make an exception for each of the faults of a line."""
-    return tuple(Reason(file, line, what, reason, holds) for what in faults)
-
-
-def is_explained(key: Key, reasons: Iterable[Reason], settings: Settings) -> bool:
+def is_explained(key: Key, reasons: Mapping[Key, str], settings: Settings) -> bool:
     """Whether a reason for `key` holds for these settings."""
-    return any(reason.key == key and reason.holds(settings) for reason in reasons)
+    condition = re.match(r"if (\w+): ", reasons.get(key, ""))
+    return key in reasons and (condition is None or CONDITIONS[condition[1]](settings))
 
 
 def plain(text: str) -> str:
@@ -50,10 +28,7 @@ def plain(text: str) -> str:
 
 
 def survivors(name: str) -> dict[Key, str]:
-    """Return why faults change nothing, from a file of this folder.
-
-    Below the name of a source file each row is a line of it, the reason, and the faults, with ` @@ ` between.
-    """
+    """Return the reasons of a table in this folder."""
     found, source = dict[Key, str](), ""
     for row in Path(__file__).with_name(name).read_text("utf-8").splitlines():
         line, *reason_and_faults = row.split(" @@ ")

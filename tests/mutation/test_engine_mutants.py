@@ -230,6 +230,12 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return Bench(tmp_path_factory.mktemp("engine"))
 
 
+def test_every_reason_is_of_a_fault_that_there_is() -> None:
+    """A row whose line is gone is removed."""
+    files = texts()
+    assert REASONS.keys() <= {mutant.key for name in FILES for mutant in mutants(name, files[name])}
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", FILES)
 def test_a_fault_changes_a_flight(name: str, bench: Bench) -> None:

@@ -16,13 +16,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_sil.experiment.campaign.campaign_report import UnfinishedCampaign
 from mambo_sil.experiment.campaign.store import DATABASE
+from mambo_sil.experiment.faults.faults_report import FaultsSummary, faults_text
 from mambo_sil.flight.animation import LONGEST_S, animate
 from mambo_sil.flight.traces import Trace
-from mambo_sil.pages.report_page import read_summary
+from mambo_sil.pages.playground.playground_page import PlaygroundSummary
+from mambo_sil.pages.report_page import RESULTS, ReportSummary, read_summary
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.html_page import render_page
+from mambo_sil.results.summary import Summary
 from tests.support import command
+from tests.support.command import unwrapped
 from tests.support.results import FOLDERS, HOSTILE, campaign_folder, fly_folder, trace
 from tests.support.tools import board_builder
 
@@ -69,6 +74,9 @@ SEEN = {
         ">125<",
         "<svg role",
     ),
+    "diff": ("limits.tilt_rad", "vehicle mambo", "B: ", "105", "Tilt limit"),
+    "fly --app": ("✗", "1 of 2 bounds BROKEN", "1.05", "&lt;= 0.25", "console: NMPC: &lt;img", "<svg role"),
+    "tune": ("trial 3 of 4: 2.5 cm in the mean, the base 5 cm", "cost.response_time_s 0.1", "1 of 8"),
     "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --repeat", "IAE, m s"),
 }
 
@@ -139,6 +147,33 @@ def demand_sound(page: str) -> None:
         if tag == "svg":
             assert attributes["role"] == "img"
             assert attributes["aria-label"]
+
+
+def test_every_result_folder_can_be_reported() -> None:
+    """Whatever a command writes into a folder; a page is no folder."""
+
+    def kinds(base: type[Summary]) -> set[type[Summary]]:
+        return {base}.union(*map(kinds, base.__subclasses__()))
+
+    written = {one for one in kinds(Summary) if "command" in vars(one)}
+    assert written - {ReportSummary, PlaygroundSummary, UnfinishedCampaign} == set(RESULTS)
+
+
+def test_a_flight_far_from_its_target_has_no_tick() -> None:
+    """Nobody has said how close is good, so there is no verdict unless it crashed."""
+    page = page_of(made("fly"))
+    assert "✓" not in page
+    (flown,) = json.loads(command.run("report", "fly", "--json")[0])["results"]
+    assert flown["good"] is None
+
+
+def test_faults_are_counted_as_on_the_console() -> None:
+    """A fault counts once, by the worse of its flights."""
+    made("faults")
+    (found,) = json.loads(command.run("report", "faults", "--json")[0])["results"]
+    assert found["finding"] == "2 faults, 1 recovered, 1 crashed"
+    summary = FaultsSummary.model_validate_json(Path("faults", SUMMARY).read_bytes())
+    assert found["finding"] in unwrapped(faults_text(summary))
 
 
 @pytest.mark.first_is_quick

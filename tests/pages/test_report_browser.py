@@ -27,7 +27,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, make in FOLDERS.items():
         (base / name).mkdir()
         make(base / name)
-    (base / "report.html").write_text(report_page([base / name for name in FOLDERS])[0], "utf-8")
+    page, _ = report_page([base / name for name in FOLDERS], lambda _: None)
+    (base / "report.html").write_text(page, "utf-8")
     return base / "report.html"
 
 

@@ -19,7 +19,6 @@ from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, SENT, PeriodicLo
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
-from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, Offset, PositionController
 from mambo_sil.flight.traces import Trace
@@ -82,25 +81,25 @@ class Scaled:
 def grows(settings: Settings, vehicle: Vehicle, axis: int, *, delay_ticks: int = 0) -> bool:
     """Return whether a displacement of 1 mm along an axis grows in a flight with the true state."""
     flight = _hover(settings, vehicle, axis, delay_ticks=delay_ticks)
-    (grown,) = _grown(simulate.fly(flight, CompiledController(settings)), settings, axis)
+    (grown,) = _grown(fly(flight, CompiledController(settings)), settings, axis)
     return grown
 
 
 def grows_with_gains(settings: Settings, vehicle: Vehicle, axis: int, gains: Sequence[float]) -> list[bool]:
-    """Return the same of flights side by side, whose commands of that axis are multiplied by gains."""
-    flight = _hover(settings, vehicle, axis, flights=len(gains))
-    factors = np.ones((len(gains), 3))
-    factors[:, axis] = gains
-    trace = fly(flight, Scaled(adapted(CompiledController(settings, len(gains))), factors))
-    return _grown(trace, settings, axis)
+    """Return the same of flights whose commands of that axis are multiplied by gains."""
+    flight, found = _hover(settings, vehicle, axis), []
+    for gain in gains:
+        factors = np.ones((1, 3))
+        factors[:, axis] = gain
+        trace = fly(flight, Scaled(adapted(CompiledController(settings)), factors))
+        found += _grown(trace, settings, axis)
+    return found
 
 
 _OFFSETS_M: Final = ((0.0, 1e-3, 0.0), (1e-3, 0.0, 0.0), (0.0, 0.0, -1e-3))
 
 
-def _hover(
-    settings: Settings, vehicle: Vehicle, axis: int, *, delay_ticks: int = 0, flights: int = 1
-) -> Flight:
+def _hover(settings: Settings, vehicle: Vehicle, axis: int, *, delay_ticks: int = 0) -> Flight:
     return Flight(
         Hover(),
         duration_s=30.0,
@@ -108,7 +107,6 @@ def _hover(
         update_period_s=settings.horizon.update_period_s,
         offset=Offset(_OFFSETS_M[axis]),
         link=Link(delay_ticks),
-        flights=flights,
     )
 
 

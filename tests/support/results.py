@@ -12,6 +12,9 @@ import numpy as np
 
 from mambo_codegen import __version__, boards
 from mambo_codegen.settings.model import Settings
+from mambo_sil.board.desk import desk_report
+from mambo_sil.board.desk.desk_events import DeskTrace
+from mambo_sil.board.desk.events_file import BoundSection, EventsFile
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint
@@ -21,6 +24,9 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn, WorstFlight
 from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_sil.experiment.campaign.store import FlightStore
+from mambo_sil.experiment.compare.compared_flights import EightAnswer, StepAnswer
+from mambo_sil.experiment.compare.diff_record import ControllerFigures, SettingDifference
+from mambo_sil.experiment.compare.diff_report import DiffSummary
 from mambo_sil.experiment.faults.fault_flights import End, Verdict
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
 from mambo_sil.experiment.margins.axis_margins import AXES, AxisMargins, AxisName, NoiseGain, Poles
@@ -48,6 +54,8 @@ from mambo_sil.model.identify.curves import Curves, curves_csv
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, Interval
+from mambo_sil.model.tune.study import FinishedTrial
+from mambo_sil.model.tune.tuning_report import TuneSummary
 from mambo_sil.verify import verify_report
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
@@ -341,6 +349,71 @@ def margins_folder(folder: Path) -> None:
     ).write(folder)
 
 
+def diff_folder(folder: Path) -> None:
+    """Write two controllers that differ in one setting."""
+    step = StepAnswer(settling_s=1.125, overshoot=0.02, iae_m_s=0.5)
+
+    def figures(iae_m_s: float) -> ControllerFigures:
+        return ControllerFigures(
+            instance_bytes=156,
+            law=None,
+            observer=None,
+            margins=None,
+            step=(step, step),
+            eight=EightAnswer(iae_m_s=iae_m_s, max_error_m=0.1, command_variation_rad=0.002, crashed=False),
+        )
+
+    DiffSummary(
+        a="mambo",
+        b=HOSTILE,
+        settings_a=Settings().digest,
+        settings_b="0" * 64,
+        vehicle=NOMINAL,
+        differences=[SettingDifference(key="limits.tilt_rad", a=0.35, b=0.4, meaning="Tilt limit")],
+        figures_a=figures(1.0),
+        figures_b=figures(105.0),
+    ).write(folder)
+
+
+def app_folder(folder: Path) -> None:
+    """Write a flight of an app that breaks one of two bounds."""
+    events = EventsFile(bounds={"lowest_m": BoundSection(least=0.5), "off_m": BoundSection(most=0.25)})
+    time_s = np.arange(0.0, 4.0, 0.01)
+    zeros = np.zeros((len(time_s), 3))
+    flown = DeskTrace(time_s, zeros, zeros, zeros[:, :2], zeros[:, 0], 0.0, f"NMPC: {HOSTILE}\n")
+    desk_report.write_trace(flown, folder / "trace.csv")
+    desk_report.DeskSummary(
+        app="crazyflie",
+        source=HOSTILE,
+        settings=Settings().digest,
+        events="camera-lost",
+        flight=events,
+        seed=0,
+        measures={"lowest_m": 0.75, "off_m": 1.05},
+        broken=["off_m"],
+        console=flown.console,
+    ).write(folder)
+
+
+def tune_folder(folder: Path) -> None:
+    """Write a study whose chosen trial is closer than its base."""
+    base, chosen = (
+        FinishedTrial(number, {"cost.response_time_s": 0.1}, iae_m_s, 0.002, 1)
+        for number, iae_m_s in ((0, 1.0), (3, 0.5))
+    )
+    TuneSummary(
+        study="mambo-nmpc-0",
+        seed=0,
+        flights=8,
+        duration_s=20.0,
+        trials=4,
+        base=base,
+        chosen=chosen,
+        rule=HOSTILE,
+        front=[chosen],
+    ).write(folder)
+
+
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "repeat": repeat_folder,
@@ -354,5 +427,8 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "regress": regress_folder,
     "identify": identify_folder,
     "margins": margins_folder,
+    "diff": diff_folder,
+    "fly --app": app_folder,
+    "tune": tune_folder,
 }
 """A folder of every command."""

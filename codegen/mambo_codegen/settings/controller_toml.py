@@ -3,17 +3,20 @@
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pydantic import ValidationError
 
-from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.messages import faults
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
 
 COLUMNS = 88
+
+VEHICLE: Final = "vehicle"
+"""The key of the drone that the settings are for: commands fly it, and the C does not depend on it."""
 
 _TITLE = "Settings of a mambo-nmpc controller."
 
@@ -31,7 +34,25 @@ def parse(text: str, source: str) -> Settings:
 
     Raises UnreadableFileError for bad syntax, InvalidSettingsError with all faults for bad settings.
     """
-    return validate(parse_document(text, source), source)
+    return validate(_split(parse_document(text, source), source)[0], source)
+
+
+def named_vehicle(path: Path) -> str | None:
+    """Return the drone that the settings file at `path` is for, as it is written there; None without one.
+
+    Raises UnreadableFileError if it is not TOML, InvalidSettingsError if the key is no text.
+    """
+    source = echo(str(path))
+    return _split(parse_document(read_text(path), source), source)[1]
+
+
+def _split(document: dict[str, Any], source: str) -> tuple[dict[str, Any], str | None]:
+    """Return the settings in a document, and the drone that it names; raises InvalidSettingsError."""
+    vehicle = document.pop(VEHICLE, None)
+    if vehicle is not None and not (isinstance(vehicle, str) and vehicle):
+        rule = "must be the name of a shipped drone, or the path of a vehicle.toml in quotes"
+        raise InvalidSettingsError((f"{source}: {VEHICLE} = {echo_value(vehicle)} {rule}",))
+    return document, vehicle
 
 
 def validate(document: Mapping[str, object], source: str) -> Settings:

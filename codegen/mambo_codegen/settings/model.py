@@ -81,4 +81,7 @@ class Settings(Sections):
     @classmethod
     def json_schema(cls) -> dict[str, Any]:
         """Return the JSON schema (draft 2020-12) of controller.toml, for editors."""
-        return {"$schema": "https://json-schema.org/draft/2020-12/schema", **cls.model_json_schema()}
+        schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **cls.model_json_schema()}
+        described = "The drone that the settings are for, which commands fly; the C does not depend on it."
+        schema["properties"]["vehicle"] = {"type": "string", "minLength": 1, "description": described}
+        return schema

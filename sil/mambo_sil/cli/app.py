@@ -57,7 +57,7 @@ mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
 mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
 mambo-nmpc pilot controller.toml --link udp:127.0.0.1:14540 --trajectory circle --size-m 1
-mambo-nmpc pilot controller.toml --simulate px4 --vehicle my-drone.toml -o piloted
+mambo-nmpc pilot controller.toml --simulate px4 -o piloted
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen

@@ -26,6 +26,7 @@ from mambo_sil.cli.options import (
     demand_port,
     load,
     load_boards,
+    load_drone,
     show,
 )
 
@@ -116,7 +117,7 @@ def sweep(
         bool,
         typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
     ] = False,
-    vehicle: Drone = "mambo",
+    vehicle: Drone = None,
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
@@ -125,15 +126,16 @@ def sweep(
     When a controller does not fit its board, or to see what a setting costs.
     """
     from mambo_codegen import boards
+    from mambo_sil.board.emulation.machine import demand_emulator
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, points_text, write_points
     from mambo_sil.cli.progress import counting_bar
-    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
-    chosen, drone = boards.load(board), vehicle_toml.load(vehicle)
+    chosen, drone = boards.load(board), load_drone(vehicle, source)
+    demand_emulator(chosen.emulated_core.value)
     axes = _axes(vary, settings)
     budget = budgets(chosen, settings, axes)
     with (

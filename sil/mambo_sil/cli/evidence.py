@@ -8,7 +8,7 @@ import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.cli.command import output_option
-from mambo_sil.cli.options import AsJson, OtherDrone, Results, Scalar, Source, load, show
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show
 from mambo_sil.verify.check_list import CHECKS
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from mambo_codegen.settings.model import Settings
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.experiment.campaign.campaign_file import Entrant
     from mambo_sil.experiment.campaign.campaign_flights import Row
+    from mambo_sil.experiment.inputs import Entrant
     from mambo_sil.experiment.regress.suite_file import FlightSuite
     from mambo_sil.verify.check_list import Entry
     from mambo_sil.verify.verify_report import Verified
@@ -120,7 +120,7 @@ def regress(
             help="A preset, a controller.toml, pd, pd-feedforward, or pid-feedforward.", metavar="SOURCE"
         ),
     ] = "mambo",
-    vehicle: OtherDrone = None,
+    vehicle: Drone = None,
     output: Results = Path("regress"),
     update: Annotated[
         bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
@@ -131,7 +131,8 @@ def regress(
 
     After every change of settings, and in a CI: whether everything flies that flew before.
     """
-    from mambo_sil.experiment.campaign.campaign_file import load_entrant
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.experiment.inputs import load_entrant
     from mambo_sil.experiment.regress.baseline import (
         baseline_path,
         demand_replaceable,
@@ -151,10 +152,13 @@ def regress(
     )
     from mambo_sil.experiment.regress.suite_file import load_suite
     from mambo_sil.experiment.regress.suite_flights import demand_flyable
+    from mambo_sil.flight.names import PD_NAMES
     from mambo_sil.results.folders import SUMMARY, digests, new_results
 
-    chosen, place = load_suite(suite, vehicle), f"--controller {echo(controller)}"
+    place = f"--controller {echo(controller)}"
     entrant = load_entrant(controller, Path(), place)
+    of_settings = None if entrant.kind in PD_NAMES else vehicle_toml.of_settings(controller)
+    chosen = load_suite(suite, vehicle, of_settings)
     demand_flyable(chosen, entrant, place)
     path = baseline_path(chosen, entrant.name)
     if update:
@@ -281,11 +285,12 @@ def report(
 
     To show results to somebody, or to keep them.
     """
+    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 
-    with new_page(output, "report") as write:
-        text, results = report_page(folders)
+    with new_page(output, "report") as write, counting_bar("drawing", "folders", len(folders)) as bar:
+        text, results = report_page(folders, bar)
         size = write(text)
     summary = ReportSummary(page=str(output), bytes=size, results=results)
     show(summary, f"{echo(str(output))}: {size / 1000:.0f} kB", as_json=as_json)

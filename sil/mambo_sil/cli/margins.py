@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
-from mambo_sil.cli.options import AsJson, OptionalResults, OtherDrone, Source, load, sensors_option, show
+from mambo_sil.cli.options import (
+    AsJson,
+    Drone,
+    OptionalResults,
+    Source,
+    load,
+    load_drone,
+    sensors_option,
+    show,
+)
 from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
 
 if TYPE_CHECKING:
@@ -22,7 +31,7 @@ _DEFAULT: Final = "default"
 def margins(
     source: Source = "mambo",
     *,
-    vehicle: OtherDrone = None,
+    vehicle: Drone = None,
     sensors: Annotated[
         SensorsName | None,
         sensors_option(
@@ -63,11 +72,11 @@ def margins(
         raise typer.BadParameter("leave out one of the two", param_hint="--campaign, --uncertainty")
     settings = load(source, None)
     if campaign is None:
-        drone = vehicle_toml.load(vehicle or vehicle_toml.DEFAULT)
+        drone = load_drone(vehicle, source)
         subject = MarginSubject(source, settings, drone, sensors or "true")
         summary = measure(subject, _corners(subject) if uncertainty else None, output)
     else:
-        drawing = _campaign(campaign, vehicle, sensors)
+        drawing = _campaign(campaign, vehicle, vehicle_toml.of_settings(source), sensors)
         subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "true")
         summary = _measure_drawn(subject, campaign, drawing, drones, output)
     show(summary, margins_text(summary), as_json=as_json)
@@ -108,14 +117,21 @@ def _measure_drawn(
         return measure(subject, many, output)
 
 
-def _campaign(named: str, vehicle: str | None, sensors: SensorsName | None) -> "Campaign":
-    """Load a campaign, and replace its sensors if others are given; raises InvalidSettingsError."""
+def _campaign(
+    named: str, vehicle: str | None, of_settings: str | None, sensors: SensorsName | None
+) -> "Campaign":
+    """Load a campaign, and replace its sensors if others are given; raises InvalidSettingsError.
+
+    Its drone is `vehicle`, else the one that its file names, else `of_settings`, the one of the settings.
+    """
     from mambo_sil.errors import FlightError
     from mambo_sil.experiment.campaign import campaign_file
     from mambo_sil.flight.scenario import choose_sensors
 
     default = named == _DEFAULT
-    drawing = campaign_file.default(vehicle) if default else campaign_file.read(Path(named), vehicle)
+    own = default or not campaign_file.names_drone(Path(named))
+    chosen = vehicle or (of_settings if own else None)
+    drawing = campaign_file.default(chosen) if default else campaign_file.read(Path(named), chosen)
     if sensors is None:
         return drawing
     try:

@@ -13,6 +13,7 @@ from mambo_sil.flight.names import present_sensors
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
+    from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
     from mambo_sil.results.summary import Summary
 
 __all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
@@ -75,8 +76,7 @@ def _vehicle_option(about: str) -> Any:
     )
 
 
-Drone = Annotated[str, _vehicle_option("")]
-OtherDrone = Annotated[str | None, _vehicle_option("; by default that of the file, or mambo")]
+Drone = Annotated[str | None, _vehicle_option("; by default that of the file, or mambo")]
 
 PortName = Annotated[
     str | None,
@@ -93,6 +93,23 @@ Baud = Annotated[
     int | None,
     typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1, metavar="N"),
 ]
+
+
+def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
+    """Load the drone of --vehicle, else that which the settings of `sources` are for, else the Mambo.
+
+    Raises InvalidSettingsError for settings of several drones, and what `vehicle_toml` raises.
+    """
+    from mambo_codegen.errors import InvalidSettingsError, echo
+    from mambo_sil.drone.vehicles import vehicle_toml
+
+    if vehicle is not None:
+        return vehicle_toml.load(vehicle)
+    named = list(dict.fromkeys(filter(None, map(vehicle_toml.of_settings, sources))))
+    if len(named) > 1:
+        several = " and ".join(map(echo, named))
+        raise InvalidSettingsError((f"the settings are for {several}; choose one with --vehicle",))
+    return vehicle_toml.load(named[0] if named else vehicle_toml.DEFAULT)
 
 
 def load_boards(names: "Sequence[str] | None") -> "Sequence[Board]":

@@ -15,10 +15,10 @@ from mambo_sil.cli.options import (
     AsJson,
     Drone,
     OptionalResults,
-    OtherDrone,
     Results,
     Workers,
     complete_vehicles,
+    load_drone,
     output_option,
     sensors_option,
     show,
@@ -201,13 +201,21 @@ def design(
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
         drone = drone.with_sensors(sensors)
-    text = controller_text(drone, source)
+    text = controller_text(drone, source, _relative(vehicle, output))
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
         name = echo(str(output))
-        typer.echo(f"wrote {name}; next: mambo-nmpc fly {name} --vehicle {source}", err=True)
+        typer.echo(f"wrote {name}; next: mambo-nmpc fly {name}", err=True)
     if not _print_judgement(settings, drone):
         raise typer.Exit(1)
+
+
+def _relative(vehicle: str, output: Path) -> str:
+    """Return a drone as a settings file in the folder of `output` names it."""
+    if vehicle in VEHICLE_NAMES or Path(vehicle).is_absolute():
+        return vehicle
+    found = os.path.relpath(vehicle, output.parent)
+    return f"./{found}" if found in VEHICLE_NAMES else found
 
 
 def _print_judgement(settings: "Settings", drone: "VehicleFile") -> bool:
@@ -245,7 +253,7 @@ def tune(
         Path,
         output_option("Folder for the results; a study started there is continued."),
     ] = Path("tune"),
-    vehicle: OtherDrone = None,
+    vehicle: Drone = None,
     trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
     workers: Workers = None,
     storage: Annotated[
@@ -353,7 +361,7 @@ def diff(
     ],
     *,
     output: OptionalResults = None,
-    vehicle: Drone = "mambo",
+    vehicle: Drone = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not.
@@ -362,7 +370,6 @@ def diff(
     """
     from mambo_codegen.settings import presets
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.compare.compare import compare
     from mambo_sil.experiment.compare.diff_record import PICTURES
     from mambo_sil.experiment.compare.diff_report import diff_text
@@ -370,7 +377,7 @@ def diff(
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:
-        summary = compare(sides[0], sides[1], vehicle_toml.load(vehicle), output, bar)
+        summary = compare(sides[0], sides[1], load_drone(vehicle, a, b), output, bar)
     show(summary, diff_text(summary), as_json=as_json)
     if output is not None:
         pictures = () if summary.same else PICTURES

@@ -9,7 +9,7 @@ import typer
 
 from mambo_codegen.errors import echo
 from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, output_option, write_file
-from mambo_sil.cli.options import AsJson, Drone, show
+from mambo_sil.cli.options import AsJson, Drone, load_drone, show
 from mambo_sil.results.terminal import sentence
 
 
@@ -61,7 +61,7 @@ def playground(
     output: Annotated[Path, output_option("HTML file; an earlier page there is overwritten.")] = Path(
         "play.html"
     ),
-    vehicle: Drone = "mambo",
+    vehicle: Drone = None,
     as_json: AsJson = False,
 ) -> None:
     """Write an HTML page, without network, in which the generated C flies a simulated drone in real time.
@@ -69,12 +69,12 @@ def playground(
     To see how controllers fly before you read a figure.
     """
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
     from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.results.html_page import new_page
 
-    found, drone = page_controllers(sources or DEFAULTS), vehicle_toml.load(vehicle)
+    chosen = sources or DEFAULTS
+    found, drone = page_controllers(chosen), load_drone(vehicle, *chosen)
     with new_page(output, "page") as write:
         with progress_bar("compiling") as bar:
             text, flown = playground_page(found, drone, bar)

@@ -93,7 +93,9 @@ class FlightSummary(ReportedSummary):
         finding = "; ".join(bad) or ", ".join(
             f"{words} {value:.3g} m" for words, value in tracked.items() if value
         )
-        return Section("fly", names[1], not bad, finding, content, missing, moves=bool(flights))
+        return Section(
+            "fly", names[1], False if bad else None, finding, content, missing, moves=bool(flights)
+        )
 
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:

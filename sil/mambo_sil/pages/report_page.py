@@ -1,7 +1,7 @@
 """Render result folders as one HTML page, which depends on nothing but the folders."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,11 +9,13 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from mambo_codegen.errors import echo
+from mambo_sil.board.desk.desk_report import DeskSummary
 from mambo_sil.board.footprint.footprint_report import FootprintSummary
 from mambo_sil.board.footprint.sweep_report import SweepSummary
 from mambo_sil.board.pil.pil_report import BoardFlightSummary
 from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, UnfinishedCampaign
+from mambo_sil.experiment.compare.diff_report import DiffSummary
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
 from mambo_sil.experiment.margins.margins_record import MarginsSummary
 from mambo_sil.experiment.regress.regress_report import RegressSummary
@@ -22,9 +24,10 @@ from mambo_sil.experiment.table2.table2 import Table2Summary
 from mambo_sil.flight.flight_report import FlySummary, RepeatSummary
 from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.replay.replay_report import LogReplaySummary
+from mambo_sil.model.tune.tuning_report import TuneSummary
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import ReportedSummary, Summary
+from mambo_sil.results.summary import ReportedSummary, Section, Summary
 from mambo_sil.verify.verify_report import VerifySummary
 
 RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
@@ -42,6 +45,9 @@ RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     IdentifySummary,
     LogReplaySummary,
     MarginsSummary,
+    DiffSummary,
+    DeskSummary,
+    TuneSummary,
 )
 """The summaries that a result folder may have; its key "command" says which."""
 
@@ -72,13 +78,16 @@ class ReportSummary(Summary):
     results: list[ReportedFolder]
 
 
-def report_page(folders: Sequence[Path]) -> tuple[str, list[ReportedFolder]]:
+def report_page(folders: Sequence[Path], progress: Callable[[int], None]) -> tuple[str, list[ReportedFolder]]:
     """Return the HTML page of `folders`, in their order, and its overview.
 
-    Raises ResultsError and TraceError.
+    Calls `progress` with the number of folders that are done. Raises ResultsError and TraceError.
     """
     summaries = [read_summary(folder) for folder in folders]
-    sections = [summary.section(folder) for folder, summary in zip(folders, summaries, strict=True)]
+    sections: list[Section] = []
+    for folder, summary in zip(folders, summaries, strict=True):
+        progress(len(sections))
+        sections.append(summary.section(folder))
     context = {
         "shown": [(str(folder), one) for folder, one in zip(folders, sections, strict=True)],
         "generators": sorted({summary.generator for summary in summaries}),

@@ -30,6 +30,8 @@ GRID: Final = "#e6e6e6"
 
 BROAD: Final = 2.5
 """Width in points of a line that another one covers."""
+ARM: Final = 1.5
+"""Of the arms and rotors of a drone."""
 THIN: Final = 0.7
 DOT: Final = 3.5
 """Size of a marker in points."""

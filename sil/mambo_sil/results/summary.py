@@ -3,10 +3,12 @@
 import json
 import math
 from abc import abstractmethod
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from markupsafe import Markup
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from mambo_codegen import __version__
@@ -35,11 +37,21 @@ class Summary(BaseModel):
 
 
 @dataclass(frozen=True)
+class PageTable:
+    """A table on a page: heads, rows that begin with what they are about, and which columns are text."""
+
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: Collection[int] = ()
+
+
+@dataclass(frozen=True)
 class Section:
     """The part of a page of the report on one result folder.
 
     template: name of a template in the folder report, without `_` and `.html.j2`; `content` is its context.
-    good:     whether the result is good; None if there is no verdict.
+    good:     whether the result is good; None if there is no verdict, as for a flight that nobody has set a
+              bound.
     finding:  the result in one line.
     missing:  files missing in the folder, whose content the section would show.
     moves:    whether the section has an animation, which needs the page's script.
@@ -52,6 +64,21 @@ class Section:
     content: Any
     missing: list[str] = field(default_factory=list)
     moves: bool = False
+
+
+def plain_section(
+    title: str,
+    good: bool | None,
+    finding: str,
+    tables: Sequence[PageTable],
+    *,
+    sentences: Sequence[str] = (),
+    pictures: Sequence[Markup] = (),
+    missing: Sequence[str] = (),
+) -> Section:
+    """Return a section of sentences, pictures and tables."""
+    content = {"sentences": sentences, "pictures": pictures, "tables": tables}
+    return Section("plain", title, good, finding, content, list(missing))
 
 
 class ReportedSummary(Summary):

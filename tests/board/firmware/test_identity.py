@@ -91,12 +91,12 @@ def test_an_image_without_the_settings_given_fails() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        f"mambo-nmpc 0.2.0.dev0 settings {MAMBO.digest}",
-        f"mambo-nmpc 0.2.0.dev0 settings {MAMBO.short_digest[:15]}",
-        f"mambo-nmpc 0.2.0.dev0 settings {MAMBO.short_digest} of the manual",
+        f"mambo-nmpc {__version__} settings {MAMBO.digest}",
+        f"mambo-nmpc {__version__} settings {MAMBO.short_digest[:15]}",
+        f"mambo-nmpc {__version__} settings {MAMBO.short_digest} of the manual",
         f"mambo-nmpc VERSION settings {MAMBO.short_digest}",
         f"mambo-nmpc 1 settings {MAMBO.short_digest}",
-        f"mambo-nmpc 0.2.0.dev0\n{MAMBO.short_digest}x\n",
+        f"mambo-nmpc {__version__}\n{MAMBO.short_digest}x\n",
     ],
 )
 def test_a_text_that_looks_like_a_version_is_no_controller(text: str) -> None:

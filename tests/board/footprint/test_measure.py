@@ -145,7 +145,7 @@ def test_a_missing_measurement_is_reported(
     assert (footprint.counts, footprint.time_s) == (None, None)
     assert [limit.name for limit in footprint.limits] == ["flash", "RAM", "stack"]
     text = footprint_report.text([footprint])
-    assert re.search(f" mega: instructions and time are not measured: .*{missing}", unwrapped(text))
+    assert re.search(f" mega: instructions, cycles and time are not measured: .*{missing}", unwrapped(text))
     assert "incomplete" in text
 
 

@@ -36,7 +36,7 @@ def test_the_crazyflie_answers_a_step_as_its_firmware(axis: int, size_rad: float
     for _ in range(1000):
         seen = truth(state)
         thrust_n = loops.altitude_thrust(CRAZYFLIE, -1.1, seen.position_m[2], seen.velocity_m_s[2])
-        state = vehicle.step(state, command_rad, thrust_n, 0.0, seen=seen)
+        state, _ = vehicle.advance(state, command_rad, thrust_n, 0.0, seen=seen)
         answer.append(float(state.body[6 + axis, 0]) / size_rad)
 
     def reached_s(share: float) -> float:

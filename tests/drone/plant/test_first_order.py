@@ -31,16 +31,15 @@ def fly(
     vehicle = vehicle or Vehicle.of(drone)
     states = [vehicle.at_rest(np.zeros((3, 1)), yaw_rad, 0.0)]
     for _ in range(ticks):
-        states.append(
-            vehicle.step(
-                states[-1],
-                np.array([[command_rad[0]], [command_rad[1]]]),
-                np.array([thrust * drone.weight_n]),
-                yaw_rad if reference_rad is None else reference_rad,
-                seen=UNSEEN,
-                moment=moment,
-            )
+        state, _ = vehicle.advance(
+            states[-1],
+            np.array([[command_rad[0]], [command_rad[1]]]),
+            np.array([thrust * drone.weight_n]),
+            yaw_rad if reference_rad is None else reference_rad,
+            seen=UNSEEN,
+            moment=moment,
         )
+        states.append(state)
     return states
 
 
@@ -74,7 +73,7 @@ def test_a_tilt_accelerates_by_its_share_of_g_against_drag() -> None:
     thrust_n = np.array([FLOWN.weight_n / np.cos(tilt_rad)])
     start = truth(state).velocity_m_s[:, 0]
     for _ in range(200):
-        state = vehicle.step(state, np.array([[0.1], [0.0]]), thrust_n, 0.7, seen=UNSEEN)
+        state, _ = vehicle.advance(state, np.array([[0.1], [0.0]]), thrust_n, 0.7, seen=UNSEEN)
     limit = 0.87 * 9.81 * np.tan(tilt_rad) / 0.15 * np.array([-np.sin(0.7), np.cos(0.7), 0.0])
     expected = limit + (start - limit) * np.exp([-0.15, -0.15, 0.0])
     expected[2] = start[2]
@@ -122,7 +121,9 @@ def test_the_thrust_has_its_gain_lag_and_dead_time(dead_time_s: float) -> None:
     state = vehicle.at_rest(np.zeros((3, 1)), 0.0, airframe_of(drone).hover_command)
     down_m_s = []
     for _ in range(100):
-        state = vehicle.step(state, np.zeros((2, 1)), np.array([2.0 * drone.weight_n]), 0.0, seen=UNSEEN)
+        state, _ = vehicle.advance(
+            state, np.zeros((2, 1)), np.array([2.0 * drone.weight_n]), 0.0, seen=UNSEEN
+        )
         down_m_s.append(truth(state).velocity_m_s[2, 0])
     time_s = drone.step_s * np.arange(1, 101)
     acting_s = np.maximum(time_s - dead_time_s, 0.0)

@@ -68,7 +68,7 @@ def lost_height_m(mixer: MixerName, step_rad: float) -> float:
         seen = truth(state)
         z_m, vz_m_s = seen.position_m[2], seen.velocity_m_s[2]
         thrust_n = loops.altitude_thrust(drone, -HOVER_HEIGHT_M, z_m, vz_m_s)
-        state = vehicle.step(state, command_rad, thrust_n, step_rad, seen=seen)
+        state, _ = vehicle.advance(state, command_rad, thrust_n, step_rad, seen=seen)
         lowest_m = max(lowest_m, float(z_m[0]) + HOVER_HEIGHT_M)
     assert float(state.body[8, 0]) == pytest.approx(step_rad, abs=0.25)
     return lowest_m

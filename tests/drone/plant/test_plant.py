@@ -113,7 +113,7 @@ def fly_attitude(
     for _ in range(ticks):
         seen = truth(state)
         thrust_n = loops.altitude_thrust(NOMINAL, -1.1, seen.position_m[2], seen.velocity_m_s[2])
-        state = vehicle.step(state, command_rad[:, np.newaxis], thrust_n, yaw_reference_rad, seen=seen)
+        state, _ = vehicle.advance(state, command_rad[:, np.newaxis], thrust_n, yaw_reference_rad, seen=seen)
         states.append(state)
     return states
 

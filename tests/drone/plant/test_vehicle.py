@@ -131,7 +131,7 @@ def test_every_loop_turns_its_own_axis(name: str) -> None:
     angles = np.array([[values[what]] for what in ("roll", "pitch", "yaw")])
     rates = np.array([[values[f"{what} rate"]] for what in ("roll", "pitch", "yaw")])
     integral = np.array([[values["roll integral"]], [values["pitch integral"]]])
-    after = Vehicle().step(
+    after, _ = Vehicle().advance(
         replace(hovering(), memory=integral),
         np.array([[values["roll command"]], [values["pitch command"]]]),
         np.array([MAMBO.mass_kg * 9.81]),

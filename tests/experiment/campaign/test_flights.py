@@ -13,7 +13,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.experiment.campaign.campaign_file import Entrant, default, read, scenario
+from mambo_sil.experiment.campaign.campaign_file import default, read, scenario
 from mambo_sil.experiment.campaign.campaign_flights import (
     MOST_TOGETHER,
     _evaluate,
@@ -24,6 +24,7 @@ from mambo_sil.experiment.campaign.campaign_flights import (
     unpack_rows,
 )
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.pd import PdController, pd_controller
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly

@@ -51,7 +51,7 @@ def simulated(vehicle: Vehicle, axes: int, given: FloatArray) -> Any:
         moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if axes == 3 else 0.0)
         loop = vehicle.loop
         if isinstance(loop, FirstOrderDrone):
-            after = vehicle.step(state, command[:2], thrust_n, 0.0, seen=true, moment=moment)
+            after, _ = vehicle.advance(state, command[:2], thrust_n, 0.0, seen=true, moment=moment)
         else:
             asked = Demand(command[:2], 0.0, thrust_n, true.euler_rad, true.rates_rad_s)
             commanded, memory = loop.command_motors(asked, state.memory)
@@ -112,7 +112,7 @@ def test_a_loaded_drone_rests_where_its_loop_carries_it() -> None:
     for _ in range(round(0.5 / drone.step_s)):
         true = truth(state)
         thrust_n = altitude_thrust(drone, HEIGHT_REFERENCE_M, true.position_m[2], true.velocity_m_s[2])
-        state = vehicle.step(state, np.zeros((2, 1)), thrust_n, 0.0, seen=true)
+        state, _ = vehicle.advance(state, np.zeros((2, 1)), thrust_n, 0.0, seen=true)
     assert state.body == pytest.approx(start, abs=1e-9)
 
 

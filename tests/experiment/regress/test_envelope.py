@@ -10,8 +10,8 @@ import pytest
 
 from mambo_codegen.settings import presets
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.experiment.campaign.campaign_file import load_entrant
 from mambo_sil.experiment.campaign.executors import processes
+from mambo_sil.experiment.inputs import load_entrant
 from mambo_sil.experiment.regress.regress_report import judge
 from mambo_sil.experiment.regress.suite_file import load_suite
 from mambo_sil.experiment.regress.suite_flights import fly_suite

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_sil.experiment.campaign.campaign_file import load_entrant
 from mambo_sil.experiment.campaign.executors import processes
+from mambo_sil.experiment.inputs import load_entrant
 from mambo_sil.experiment.regress.regress_report import judge
 from mambo_sil.experiment.regress.suite_file import load_suite
 from mambo_sil.experiment.regress.suite_flights import demand_flyable, fly_suite

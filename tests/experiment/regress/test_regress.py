@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import pytest
 
 from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError
-from mambo_sil.experiment.campaign.campaign_file import Entrant, load_entrant
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, Row
+from mambo_sil.experiment.inputs import Entrant, load_entrant
 from mambo_sil.experiment.regress.baseline import (
     _scenario_digest,
     baseline_path,
@@ -167,7 +167,7 @@ bounds = { ise_m2_s = 2.0, refused_updates = 4 }
 """Groups that may crash, have other bounds, or none."""
 
 TEXT = """\
-mine with mambo: 4 of 8 flights passed, 4 failed
+mine with mambo on mambo: 4 of 8 flights passed, 4 failed
 compared with the bounds and with here.json
 
 group  metric           bound  median  worst  over recorded  at limit  failed
@@ -204,7 +204,7 @@ def test_the_text_of_a_suite_that_passed_is_its_table_and_one_line(tmp_path: Pat
     """Without what failed or was recorded."""
     text = regress_text(judged(suite(tmp_path), [row(1.0)] * 3), "out")
     assert text.splitlines() == [
-        "mine with mambo: 3 of 3 flights passed",
+        "mine with mambo on mambo: 3 of 3 flights passed",
         "compared with the bounds only; --update records this run for later ones",
         "",
         "group  metric    bound  median  worst  at limit  failed",
@@ -416,7 +416,7 @@ def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) 
     text = regress_text(judge(found, mambo(), [row(2.0)] * 30, None, path), "out")
     assert text.count("fly --repeat out/flights/") == MOST_SHOWN
     assert "and 20 more failed flights, all in junit.xml" in text
-    assert "many with mambo: 0 of 30 flights passed, 30 failed" in text
+    assert "many with mambo on mambo: 0 of 30 flights passed, 30 failed" in text
 
 
 @pytest.mark.long

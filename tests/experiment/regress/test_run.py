@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_sil.experiment.campaign.campaign_file import Entrant, load_entrant
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
 from mambo_sil.experiment.campaign.executors import Pool
+from mambo_sil.experiment.inputs import Entrant, load_entrant
 from mambo_sil.experiment.regress.suite_file import FlightSuite, load_suite
 from mambo_sil.experiment.regress.suite_flights import _batches, demand_flyable, fly_suite
 

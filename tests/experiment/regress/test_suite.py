@@ -6,8 +6,8 @@ import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.experiment.campaign.campaign_file import load_entrant
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, fly_scenarios
+from mambo_sil.experiment.inputs import load_entrant
 from mambo_sil.experiment.regress.suite_file import MOST_FLIGHTS, FlightSuite, load_suite
 from mambo_sil.flight.names import IN_SPACE
 from mambo_sil.flight.scenario import Scenario

@@ -12,8 +12,8 @@ from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
-from mambo_sil.board.emulation.machine import CORES as EMULATED_CORES
-from mambo_sil.board.emulation.machine import Machine, start
+from mambo_sil.board.emulation.machine import AVR, Machine, start
+from mambo_sil.board.emulation.unicorn_machine import MODELS
 from mambo_sil.errors import EmulationError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import batch_source
@@ -89,7 +89,7 @@ def bad_guest(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
 def test_every_board_has_a_core() -> None:
     """CORES has the core of every board, and every core that can be emulated."""
     assert {name: boards.load(name).emulated_core.value for name in boards.names()} == CORES
-    assert set(EMULATED_CORES) == set(CORES.values())
+    assert {*MODELS, AVR} == set(CORES.values())
 
 
 @cache

@@ -115,7 +115,7 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile, law: AltitudeNa
     with np.errstate(all="ignore"):
         seen = truth(before)
         moment = Moment(share[0], payload[0], (air[0], air[1]), push_m_s2, lift_m_s2)
-        after = vehicle.step(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
+        after, _ = vehicle.advance(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
         altitude = AltitudeLoop(AltitudeLaw(law), drone, TICKS)
         altitude.integral_n = payload[0]
         demanded_n = altitude.thrust_n(Vertical(HEIGHT_REFERENCE_M, command[1], heading[0]), seen)

@@ -1,7 +1,7 @@
 """Logs of the simulated Mambo: what is identified is what its stock loops are."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -187,17 +187,14 @@ def capture(flown: Captured, seeds: int, folder: Path) -> list[Path]:
     flight = Flight(
         Waypoints(tuple(map(tuple, points.tolist()))),
         duration_s=DURATION_S,
-        flights=seeds,
         yaw_rad=flown.yaw_rad,
         yaw_rate_rad_s=flown.yaw_rate_rad_s,
         vehicle=Vehicle.of(drone),
-        seeds=tuple(range(seeds)),
         sensors=MotionCapture(drone.sensors),
     )
-    trace = fly(flight, WithSines())
     paths = [folder / f"trace{number}.csv" for number in range(seeds)]
     for number, path in enumerate(paths):
-        write_csv(trace, path, number)
+        write_csv(fly(replace(flight, seeds=(number,)), WithSines()), path)
     return paths
 
 

@@ -366,7 +366,7 @@ def test_a_study_killed_again_and_again_equals_an_undisturbed_one(source: Path, 
     search_on_threads(source, whole, trials)
     random, kills = Random(0), 0
     arguments = ("tune", source, "--trials", trials, "--workers", 1, "-o", folder)
-    while (done := command(random.randint(30, 120), *arguments, script=KILLED)).returncode != 0:
+    while (done := command(random.randint(50, 130), *arguments, script=KILLED)).returncode != 0:
         assert done.returncode == -signal.SIGKILL, done.stderr
         kills += 1
     assert kills >= 3

@@ -10,10 +10,12 @@ from matplotlib.figure import Figure
 from mambo_codegen.errors import echo
 from mambo_sil.board.desk.desk_events import DeskTrace
 from mambo_sil.board.desk.events_file import BoundSection, EventsFile, MeasureName
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import ResultsError
 from mambo_sil.results.number_format import digits
-from mambo_sil.results.pictures import save
+from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number, PageTable, ReportedSummary, Section, plain_section
 from mambo_sil.results.terminal import sentence, table
 
 DESK_FILES: Final = ("trace.csv", "flight.png", "flight.svg")
@@ -35,7 +37,7 @@ WORDS: Final[dict[MeasureName, tuple[str, str]]] = {
 }
 
 
-class DeskSummary(Summary):
+class DeskSummary(ReportedSummary):
     """The results of `fly --app`."""
 
     command = "fly --app"
@@ -55,21 +57,57 @@ class DeskSummary(Summary):
         """Whether every measure is within the bounds of the events file."""
         return not self.broken
 
+    def section(self, folder: Path, /) -> Section:
+        """Return the section of the report on this flight; raises ResultsError."""
+        path = folder / DESK_FILES[0]
+        pictures = []
+        if path.is_file():
+            with style():
+                figure = _figure(read_trace(path), self.flight, "")
+                words = "Height, distance to the target and command over time"
+                pictures = [inline(figure, words)]
+        return plain_section(
+            f"App of {self.source} on the desk's Crazyflie, {_flown(self)}",
+            self.good if self.flight.bounds else None,
+            _verdict(self),
+            [PageTable(("measure", "value", "unit", "bound", ""), _rows(self), {2, 3, 4})],
+            sentences=[f"console: {line}" for line in _console(self)],
+            pictures=pictures,
+            missing=[] if pictures else [path.name],
+        )
+
 
 def desk_text(summary: DeskSummary) -> str:
     """Format a summary: the answer, a measure per line with its bound, and what the app printed."""
-    rows = []
+    answer = f"app of {echo(summary.source)} on the desk's Crazyflie, {_flown(summary)}: {_verdict(summary)}"
+    lines = [sentence(answer), *table(("", "", "", "bound", ""), _rows(summary), (0, 2, 3, 4))]
+    return "\n".join([*lines, *(f"console: {line}" for line in _console(summary))])
+
+
+def _flown(summary: DeskSummary) -> str:
+    return summary.flight.trajectory if summary.events is None else echo(summary.events)
+
+
+def _verdict(summary: DeskSummary) -> str:
+    count = len(summary.flight.bounds)
+    if not count:
+        return "flown"
+    return f"{len(summary.broken)} of {count} bounds BROKEN" if summary.broken else f"{count} bounds kept"
+
+
+def _rows(summary: DeskSummary) -> list[tuple[str, ...]]:
+    """Return a row for each measure that has a value or a bound."""
+    rows: list[tuple[str, ...]] = []
     for key, value in summary.measures.items():
         bound = summary.flight.bounds.get(key)
         if np.isfinite(value) or bound is not None:
             name, unit = WORDS[key]
             rows.append((name, digits(value), unit, _bound(bound), "BROKEN" if key in summary.broken else ""))
-    flown = summary.flight.trajectory if summary.events is None else echo(summary.events)
-    count = len(summary.flight.bounds)
-    verdict = f"{len(summary.broken)} of {count} bounds BROKEN" if summary.broken else f"{count} bounds kept"
-    answer = f"app of {echo(summary.source)} on the desk, {flown}: " + (verdict if count else "flown")
-    lines = [sentence(answer), *table(("", "", "", "bound", ""), rows, (0, 2, 3, 4))]
-    return "\n".join([*lines, *(f"console: {line}" for line in summary.console.splitlines() if line)])
+    return rows
+
+
+def _console(summary: DeskSummary) -> list[str]:
+    return [line for line in summary.console.splitlines() if line]
 
 
 def _bound(bound: BoundSection | None) -> str:
@@ -88,24 +126,42 @@ def write_trace(trace: DeskTrace, path: Path) -> None:
         writer.writerows(np.column_stack(parts).tolist())
 
 
-def draw_flight(trace: DeskTrace, file: EventsFile, title: str, stem: Path) -> tuple[Path, Path]:
-    """Draw height, distance to the target, and the command over time; lines mark events."""
+def read_trace(path: Path) -> FloatArray:
+    """Return the columns (11, n) of a trace.csv, in the order of `COLUMNS`; raises ResultsError."""
+    wrong = f"{path}: is not what {DeskSummary.command} writes; run it again"
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file)
+        values = np.array(rows, np.float64).reshape(-1, len(COLUMNS))
+    except (OSError, ValueError, csv.Error) as error:
+        raise ResultsError(wrong) from error
+    if tuple(header) != COLUMNS or not len(values):
+        raise ResultsError(wrong)
+    return values.T
+
+
+def draw_flight(path: Path, events: EventsFile, title: str) -> tuple[Path, Path]:
+    """Draw height, distance to the target, and the command of a trace.csv; lines mark events."""
     with style():
-        figure = Figure(figsize=(PAGE_INCHES, 5.0), layout="constrained")
-        height, distance, command = figure.subplots(3, 1, sharex=True)
-        flown, target = LOOKS[0].line, LOOKS[1].line
-        height.plot(trace.time_s, trace.position_m[:, 2], label="flown", **flown)
-        height.plot(trace.time_s, trace.target_m[:, 2], label="target", **target)
-        off = trace.position_m - trace.target_m
-        distance.plot(trace.time_s, np.hypot(off[:, 0], off[:, 1]), **flown)
-        for index, (name, look) in enumerate(zip(("roll", "pitch"), LOOKS, strict=False)):
-            command.plot(trace.time_s, trace.command_rad[:, index], label=name, **look.line)
-        for axes in (height, distance, command):
-            for event in file.event:
-                axes.axvline(event.at_s, color=QUIET, linewidth=THIN)
-        height.set(title=title, ylabel="height, m")
-        distance.set(ylabel="distance, m", ylim=(0.0, None))
-        command.set(ylabel="command, rad", xlabel="time, s")
-        height.legend()
-        command.legend()
-        return save(figure, stem)
+        return save(_figure(read_trace(path), events, title), path.with_name("flight"))
+
+
+def _figure(values: FloatArray, events: EventsFile, title: str) -> Figure:
+    time_s, x_m, y_m, z_m, target_x_m, target_y_m, target_z_m, *commands_rad, _lost = values
+    figure = Figure(figsize=(PAGE_INCHES, 5.0), layout="constrained")
+    height, distance, command = figure.subplots(3, 1, sharex=True)
+    flown, target = LOOKS[0].line, LOOKS[1].line
+    height.plot(time_s, z_m, label="flown", **flown)
+    height.plot(time_s, target_z_m, label="target", **target)
+    distance.plot(time_s, np.hypot(x_m - target_x_m, y_m - target_y_m), **flown)
+    for name, command_rad, look in zip(("roll", "pitch"), commands_rad, LOOKS, strict=False):
+        command.plot(time_s, command_rad, label=name, **look.line)
+    for axes in (height, distance, command):
+        for event in events.event:
+            axes.axvline(event.at_s, color=QUIET, linewidth=THIN)
+    height.set(title=title, ylabel="height, m")
+    distance.set(ylabel="distance, m", ylim=(0.0, None))
+    command.set(ylabel="command, rad", xlabel="time, s")
+    height.legend()
+    command.legend()
+    return figure

@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.board.desk.desk_flight import DeskConditions, DeskSensors
-from mambo_sil.experiment.campaign.campaign_file import FileSection, read_as
+from mambo_sil.experiment.inputs import FileSection, read_as
 from mambo_sil.flight.names import CurveName
 from mambo_sil.flight.scenario import LONGEST_S
 

@@ -81,7 +81,7 @@ def _needs() -> list[Finding]:
             _need("compiler", tool, f"builds for {', '.join(names)}", *packages)
             for (tool, packages), names in builder_of.items()
         ),
-        _need("emulator", "unicorn", f"emulates {', '.join(on_others)}"),
+        _need("emulator", "unicorn", f"the extra emulation: runs the C for {', '.join(on_others)}"),
         _need("emulator", "qemu-system-avr", f"emulates {', '.join(on_avr)}", "qemu-system-misc"),
         _need("emulator", "simavr", "make test: a second AVR", "simavr"),
         _need("analyser", "pyelftools", "footprint: flash and RAM"),

@@ -269,7 +269,7 @@ def _notes(footprint: Footprint) -> list[str]:
         core = footprint.board.core.value
         notes.append(f"{name}: stack is not measured: {core} cannot be disassembled")
     if footprint.counts is None:
-        notes.append(f"{name}: instructions and time are not measured: {footprint.uncounted}")
+        notes.append(f"{name}: instructions, cycles and time are not measured: {footprint.uncounted}")
     return notes
 
 

@@ -42,7 +42,7 @@ def open_port(name: str, baud: int) -> Port:
         import serial  # noqa: PLC0415 - an optional package
     except ImportError:
         raise BoardError(
-            "--port needs pyserial, which is missing: pip install 'mambo-nmpc[serial]', or pyserial itself"
+            '--port needs pyserial, which is missing: pip install pyserial (the extra "serial")'
         ) from None
     _refuse_other_urls(name)
     port = serial.serial_for_url(name, baudrate=baud, timeout=READ_S)

@@ -49,7 +49,7 @@ def fly_app(
         measures = measure(trace, file)
         write_trace(trace, folder / "trace.csv")
         if not output.no_pictures:
-            draw_flight(trace, file, events or course.trajectory, folder / "flight")
+            draw_flight(folder / "trace.csv", file, events or course.trajectory)
         summary = DeskSummary(
             app=name,
             source=source,

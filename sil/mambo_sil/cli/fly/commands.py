@@ -12,13 +12,13 @@ from mambo_sil.cli.fly.fly_options import Conditions, Course, OtherFlight, Outpu
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
-    OtherDrone,
     Results,
     Scalar,
     Source,
     Workers,
     demand_port,
     load,
+    load_drone,
     output_option,
     show,
 )
@@ -68,7 +68,7 @@ def campaign(
         Path,
         output_option("Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
-    vehicle: OtherDrone = None,
+    vehicle: Drone = None,
     flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=1_000_000)] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
@@ -141,7 +141,7 @@ def faults(
     source: Source = "mambo",
     *,
     output: Results = Path("faults"),
-    vehicle: Drone = "mambo",
+    vehicle: Drone = None,
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
@@ -150,14 +150,13 @@ def faults(
     Before a first flight: what becomes of it if the state is lost, late, frozen or in other units.
     """
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.errors import FlightError
-    from mambo_sil.experiment.faults.fault_flights import End, fly_faults
+    from mambo_sil.experiment.faults.fault_flights import fly_faults
     from mambo_sil.experiment.faults.faults_report import FaultsSummary, faults_text, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
 
-    settings, drone = load(source, scalar), vehicle_toml.load(vehicle)
+    settings, drone = load(source, scalar), load_drone(vehicle, source)
     with new_results(output, FaultsSummary.command, FAULTS_FILES) as folder:
         with progress_bar("flying with faults") as bar:
             try:
@@ -174,7 +173,7 @@ def faults(
         )
         summary.write(folder)
     show(summary, faults_text(summary), as_json=as_json)
-    if any(verdict.end is End.CRASHED for verdict in verdicts):
+    if summary.crashed:
         raise typer.Exit(1)
 
 

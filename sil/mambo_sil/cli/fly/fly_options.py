@@ -61,7 +61,7 @@ class Course:
 class Conditions:
     """The drone, its sensors, and what disturbs it."""
 
-    vehicle: Drone = "mambo"
+    vehicle: Drone = None
     motor_lag_s: Annotated[
         float | None,
         typer.Option(help="Time constant of the motors, in s; by default the vehicle's.", metavar="S"),

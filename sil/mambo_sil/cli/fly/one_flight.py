@@ -14,12 +14,11 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.model import Settings
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
-from mambo_sil.cli.options import load, show
+from mambo_sil.cli.options import load, load_drone, show
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.gusts import LIGHT_M_S
 from mambo_sil.drone.plant.vehicle import LARGEST_LAG_S, Vehicle
-from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.errors import FlightError, TrajectoryError
@@ -60,7 +59,7 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
             "--real-time lets the clock of a board call the step: give its --port, or leave it out"
         )
     _refuse_settings_of_a_pd(runner)
-    settings, drone = load_settings(runner), vehicle_toml.load(conditions.vehicle)
+    settings, drone = load_settings(runner), load_drone(conditions.vehicle, named_source(runner))
     flight = described_flight(course, conditions, runner, settings, drone)
     with new_results(output.output, FlySummary.command, FLIGHT_FILES) as folder:
         flies = _controller(runner, settings, flight) if runner.on is None else _on_board(runner, settings)

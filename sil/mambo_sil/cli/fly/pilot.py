@@ -7,24 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from mambo_sil.cli.fly.fly_options import CurveChoice, CurveRate, CurveSize, CurveTime
-from mambo_sil.cli.options import (
-    VEHICLE_NAMES,
-    AsJson,
-    Results,
-    Scalar,
-    Source,
-    complete_vehicles,
-    load,
-    show,
-)
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show
 
 if TYPE_CHECKING:
     from mambo_sil.cli.progress import Bar
     from mambo_sil.link.links import AutopilotLink
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.steering import Update
-
-SIMULATED_DRONE = "crazyflie"
 
 
 def pilot(
@@ -38,15 +27,7 @@ def pilot(
         Literal["px4", "ardupilot"] | None,
         typer.Option(help="px4 or ardupilot: fly a simulated drone behind its messages.", metavar="NAME"),
     ] = None,
-    vehicle: Annotated[
-        str | None,
-        typer.Option(
-            help=f"The simulated drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml; by default "
-            f"{SIMULATED_DRONE}.",
-            metavar="NAME|FILE",
-            autocompletion=complete_vehicles,
-        ),
-    ] = None,
+    vehicle: Drone = None,
     scalar: Scalar = None,
     trajectory: CurveChoice = "gerono",
     size_m: CurveSize = None,
@@ -76,7 +57,7 @@ def pilot(
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
-    open_link = _opener(link, simulate, vehicle)
+    open_link = _opener(source, link, simulate, vehicle)
     updates: list[Update] = []
     with new_results(output, PilotSummary.command, (LOG,)) as folder, progress_bar("connecting") as bar:
         flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar))
@@ -108,9 +89,10 @@ def pilot(
         raise typer.Exit(1)
 
 
-def _opener(link: str | None, simulate: str | None, vehicle: str | None) -> "Callable[[], AutopilotLink]":
+def _opener(
+    source: str, link: str | None, simulate: str | None, vehicle: str | None
+) -> "Callable[[], AutopilotLink]":
     """Return what opens the link that the options describe; raises LinkError, BadParameter."""
-    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.link.links import SimulatedLink, UdpLink
     from mambo_sil.link.records import STACKS
     from mambo_sil.link.sockets import parse_link
@@ -124,7 +106,7 @@ def _opener(link: str | None, simulate: str | None, vehicle: str | None) -> "Cal
             raise typer.BadParameter("it is the drone of --simulate: leave it out", param_hint="--vehicle")
         address = parse_link(link)
         return lambda: UdpLink(address)
-    stack, drone = STACKS[str(simulate)], vehicle_toml.load(vehicle or SIMULATED_DRONE)
+    stack, drone = STACKS[str(simulate)], load_drone(vehicle, source)
     return lambda: SimulatedLink(stack, drone)
 
 

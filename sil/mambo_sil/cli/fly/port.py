@@ -23,13 +23,13 @@ from mambo_sil.cli.fly.one_flight import (
     described_flight,
     finish,
     load_settings,
+    named_source,
     summary_fields,
     write_flight,
     written,
 )
-from mambo_sil.cli.options import BAUD
+from mambo_sil.cli.options import BAUD, load_drone
 from mambo_sil.cli.progress import progress_bar
-from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
@@ -56,7 +56,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
     port = str(runner.port)
     if runner.controller != "nmpc" or runner.on is not None:
         raise FlightError(f"--port {echo(port)} flies the C on a board: leave out --controller and --on")
-    settings, drone = load_settings(runner), vehicle_toml.load(conditions.vehicle)
+    settings, drone = load_settings(runner), load_drone(conditions.vehicle, named_source(runner))
     flight = described_flight(course, conditions, runner, settings, drone)
     library = build_library(settings, host_toolchain())
     with new_results(output.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:

@@ -180,20 +180,6 @@ class Vehicle:
         body[VELOCITY] = np.where(impulse_n_s.any(axis=0), body[VELOCITY] + change_m_s, body[VELOCITY])
         return replace(state, body=body)
 
-    def step(
-        self,
-        state: VehicleState,
-        command_rad: FloatArray,
-        thrust_n: FloatArray,
-        yaw_reference_rad: PerFlight,
-        *,
-        seen: Seen,
-        moment: Moment | None = None,
-    ) -> VehicleState:
-        """Return the state one tick later; arguments as of `advance`."""
-        state, _ = self.advance(state, command_rad, thrust_n, yaw_reference_rad, seen=seen, moment=moment)
-        return state
-
     def advance(
         self,
         state: VehicleState,

@@ -7,9 +7,10 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
+from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.messages import faults
-from mambo_codegen.settings.toml_file import parse_document, read_text
+from mambo_codegen.settings.toml_file import PRESETS, existing_path, parse_document, read_text
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile, form
 
@@ -36,6 +37,29 @@ def load(name_or_path: str) -> VehicleFile:
     """
     path = VEHICLES.own_file(name_or_path)
     return preset(name_or_path) if path is None else read(path)
+
+
+def of_settings(source: str) -> str | None:
+    """Return the drone that a settings file is for, as `load` takes it; None without one, or for a preset.
+
+    The file names a shipped drone, or a vehicle.toml with a path relative to its own folder. Raises
+    InvalidSettingsError if there is neither, and what `controller_toml.named_vehicle` raises.
+    """
+    path = existing_path(source)
+    if source in PRESETS.names() or path is None or not path.is_file():
+        return None
+    named = controller_toml.named_vehicle(path)
+    if named is None or named in names():
+        return named
+    beside = path.parent / named
+    if not beside.exists():
+        raise InvalidSettingsError(
+            (
+                f"{echo(source)}: {controller_toml.VEHICLE} = {echo_value(named)} is neither a shipped drone "
+                "nor a file; write where its vehicle.toml is, or name a drone with --vehicle",
+            )
+        )
+    return str(beside)
 
 
 def read(path: Path) -> VehicleFile:

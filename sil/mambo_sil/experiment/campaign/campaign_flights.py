@@ -15,9 +15,10 @@ from mambo_codegen import __version__
 from mambo_codegen.methods import method_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import WorkerError
-from mambo_sil.experiment.campaign.campaign_file import Entrant, scenario
+from mambo_sil.experiment.campaign.campaign_file import scenario
 from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate

@@ -14,10 +14,11 @@ from typing import Any, Final
 from mambo_codegen import __version__
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.campaign.campaign_file import Campaign, Entrant, scenario
+from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import DIGEST
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import DATABASE, FlightStore, Value, convert_os_errors, read_flight
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import GENERATOR
 

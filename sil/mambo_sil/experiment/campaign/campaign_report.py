@@ -93,7 +93,8 @@ class CampaignSummary(ReportedSummary):
         }
         crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
         finding = f"{self.flights} flights; crashed: {crashes}"
-        good = all(one.crashed.count == 0 for name, one in found.items() if name not in PD_TITLES)
+        crashed = any(one.crashed.count for name, one in found.items() if name not in PD_TITLES)
+        good = False if crashed else None
         return Section("campaign", self.campaign.title, good, finding, content, _missing(folder))
 
 

@@ -12,7 +12,6 @@ from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, 
 from mambo_sil.experiment.compare.control_terms import AxisLaw, ObserverGains, axis_laws, observer_gains
 from mambo_sil.experiment.margins.axis_margins import Margins
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
-from mambo_sil.results.summary import Summary
 
 PICTURES: Final = ("step.png", "step.svg")
 
@@ -43,26 +42,6 @@ class ControllerFigures(BaseModel):
     """With the true state; None if no linear margin applies."""
     step: tuple[StepAnswer, StepAnswer]
     eight: EightAnswer
-
-
-class DiffSummary(Summary):
-    """Two controllers compared; without figures if they are the same."""
-
-    command = "diff"
-
-    a: str
-    b: str
-    settings_a: str
-    settings_b: str
-    vehicle: VehicleFile
-    differences: list[SettingDifference]
-    figures_a: ControllerFigures | None = None
-    figures_b: ControllerFigures | None = None
-
-    @property
-    def same(self) -> bool:
-        """Whether the C is the same."""
-        return self.settings_a == self.settings_b
 
 
 def differences(a: Settings, b: Settings) -> list[SettingDifference]:

@@ -1,15 +1,18 @@
-"""A comparison of two controllers as text."""
+"""A comparison of two controllers as a record, as text and as a section of the report."""
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.key import spell
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.compare.compared_flights import EIGHT_S, SETTLED_SHARE, STEP_M
 from mambo_sil.experiment.compare.control_terms import AXES
-from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
+from mambo_sil.experiment.compare.diff_record import ControllerFigures, SettingDifference
 from mambo_sil.experiment.margins.axis_margins import Margins
 from mambo_sil.results.number_format import distance, three_digits_or_dash
+from mambo_sil.results.summary import PageTable, ReportedSummary, Section, plain_section
 from mambo_sil.results.terminal import sentence, table
 
 _DASH = "\N{EN DASH}"
@@ -18,24 +21,61 @@ Row = tuple[str, float | None, str]
 """Name, value and unit of a figure."""
 
 
+class DiffSummary(ReportedSummary):
+    """Two controllers compared; without figures if they are the same."""
+
+    command = "diff"
+
+    a: str
+    b: str
+    settings_a: str
+    settings_b: str
+    vehicle: VehicleFile
+    differences: list[SettingDifference]
+    figures_a: ControllerFigures | None = None
+    figures_b: ControllerFigures | None = None
+
+    @property
+    def same(self) -> bool:
+        """Whether the C is the same."""
+        return self.settings_a == self.settings_b
+
+    def section(self, _folder: Path, /) -> Section:
+        """Return the section of the report: what differs in the settings, and figures of both."""
+        title = f"{self.a} and {self.b} compared, vehicle {self.vehicle.name}"
+        return plain_section(title, None, "; ".join(_answers(self)), _tables(self))
+
+
 def diff_text(summary: DiffSummary) -> str:
     """Format a comparison."""
+    lines = [sentence(words) for words in _answers(summary)]
+    for one in _tables(summary):
+        lines += ["", *table(one.heads, list(map(tuple, one.rows)), (0, -1))]
+    return "\n".join(lines)
+
+
+def _answers(summary: DiffSummary) -> list[str]:
+    """Return what both controllers are, or that they are the same."""
     if summary.same:
-        return (
-            f"{echo(summary.a)} and {echo(summary.b)} are the same controller: "
-            f"settings {summary.settings_a[:16]}"
-        )
-    a, b = summary.figures_a, summary.figures_b
-    lines = [
-        sentence(f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}{_answer(a)}"),
-        sentence(f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}{_answer(b)}"),
-        "",
-        *table(("setting", "A", "B", "meaning"), [_setting(one) for one in summary.differences], (0, -1)),
+        both = f"{echo(summary.a)} and {echo(summary.b)} are the same controller"
+        return [f"{both}: settings {summary.settings_a[:16]}"]
+    return [
+        f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}{_answer(summary.figures_a)}",
+        f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}{_answer(summary.figures_b)}",
     ]
+
+
+def _tables(summary: DiffSummary) -> list[PageTable]:
+    """Return what differs in the settings, and figures of both; nothing for the same controller."""
+    if summary.same:
+        return []
+    heads = ("setting", "A", "B", "meaning")
+    found = [PageTable(heads, [_setting(one) for one in summary.differences], {3})]
+    a, b = summary.figures_a, summary.figures_b
     if a is not None and b is not None:
         heads = (f"on vehicle {echo(summary.vehicle.name)}", "A", "B", "")
-        lines += ["", *table(heads, list(_figures(a, b)), (0, -1))]
-    return "\n".join(lines)
+        found.append(PageTable(heads, list(_figures(a, b)), {3}))
+    return found
 
 
 def _answer(figures: ControllerFigures | None) -> str:

@@ -28,6 +28,11 @@ class FaultsSummary(ReportedSummary):
     vehicle: VehicleFile = NOMINAL
     flights: list[Verdict]
 
+    @property
+    def crashed(self) -> bool:
+        """Whether the drone crashed in a flight."""
+        return any(flight.end is End.CRASHED for flight in self.flights)
+
     def section(self, _folder: Path) -> Section:
         """Return the section of the report: one row per fault, both courses side by side."""
         courses = list(dict.fromkeys(flight.course for flight in self.flights))
@@ -37,12 +42,11 @@ class FaultsSummary(ReportedSummary):
         for flight in self.flights:
             percent = _bar_percent(flight.largest_error_m, largest_m)
             rows.setdefault(flight.fault, []).append((flight, percent))
-        ends = [flight.end for flight in self.flights]
-        counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
-        finding = f"{len(ends)} flights with {len(rows)} faults: {counts}"
         content = {"summary": self, "courses": courses, "rows": list(rows.items())}
         title = f"Faults in flight, {self.source}, vehicle {self.vehicle.name}"
-        return Section("faults", title, End.CRASHED not in ends, finding, content)
+        recovered = all(flight.end is End.RECOVERED for flight in self.flights)
+        good = False if self.crashed else recovered or None
+        return Section("faults", title, good, _counts(self), content)
 
 
 def _bar_percent(error_m: float, largest_m: float) -> float:
@@ -61,20 +65,28 @@ _HEADS: Final = (
 
 def faults_text(summary: FaultsSummary) -> str:
     """Return the verdicts as text: how many faults ended how, then a row per fault."""
-    faults = {
-        flight.fault: [one for one in summary.flights if one.fault == flight.fault]
-        for flight in summary.flights
-    }
-    ends = [_worst_end(pair) for pair in faults.values()]
-    counts = ", ".join(f"{ends.count(end)} {end}" for end in ORDER if end in ends)
-    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {len(faults)} faults, {counts}"
+    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {_counts(summary)}"
     heads = [
         "fault",
         *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
     ]
-    rows = [[fault, *(cell for flight in pair for cell in _cells(flight))] for fault, pair in faults.items()]
+    rows = [
+        [fault, *(cell for flight in pair for cell in _cells(flight))]
+        for fault, pair in _pairs(summary.flights).items()
+    ]
     lines = [sentence(answer), "", *table(heads, rows)]
     return "\n".join([*lines, "", sentence(_bands(summary.flights))])
+
+
+def _counts(summary: FaultsSummary) -> str:
+    """Return how many faults ended how; the worse of the two courses counts."""
+    ends = [_worst_end(pair) for pair in _pairs(summary.flights).values()]
+    return f"{len(ends)} faults, " + ", ".join(f"{ends.count(end)} {end}" for end in ORDER if end in ends)
+
+
+def _pairs(verdicts: Sequence[Verdict]) -> dict[str, list[Verdict]]:
+    """Return the flights of each fault, one for each course."""
+    return {one.fault: [other for other in verdicts if other.fault == one.fault] for one in verdicts}
 
 
 def faults_markdown(verdicts: Sequence[Verdict]) -> str:
@@ -95,8 +107,7 @@ def _worst_end(pair: Sequence[Verdict]) -> End:
 
 
 def _rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, ...]]:
-    for fault in dict.fromkeys(verdict.fault for verdict in verdicts):
-        pair = [verdict for verdict in verdicts if verdict.fault == fault]
+    for fault, pair in _pairs(verdicts).items():
         row = [fault, ", ".join(all_statuses(pair))]
         row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
         row.append(f"{100 * max(verdict.saturated_share for verdict in pair):.1f}")

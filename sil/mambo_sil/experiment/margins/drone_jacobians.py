@@ -205,7 +205,7 @@ def _tick(
     moment = Moment(push_m_s2=(push[1], push[0]), lift_m_s2=push[2] if commands_thrust else 0.0)
     demand = np.zeros((signals.axes, inputs.shape[1]))
     if isinstance(vehicle.loop, FirstOrderDrone):
-        state = vehicle.step(state, command[:2], thrust_n, 0.0, seen=seen, moment=moment)
+        state, _ = vehicle.advance(state, command[:2], thrust_n, 0.0, seen=seen, moment=moment)
     else:
         asked = Demand(command[:2], 0.0, thrust_n, seen.euler_rad, seen.rates_rad_s)
         motor_command, memory = vehicle.loop.command_motors(asked, state.memory)

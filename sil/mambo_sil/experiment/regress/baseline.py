@@ -18,9 +18,9 @@ from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, echo, echo_value
 from mambo_codegen.plain_file import find_obstacle
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import DIGEST, INDICES, Row
 from mambo_sil.experiment.campaign.store import convert_os_errors
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.results.folders import GENERATOR

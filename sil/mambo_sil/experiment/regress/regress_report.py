@@ -12,8 +12,8 @@ from pydantic import Field
 
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATURATED, Row
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
@@ -179,7 +179,8 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    lines = [sentence(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")]
+    flown = f"{echo(summary.suite)} with {summary.controller} on {' and '.join(map(echo, summary.vehicles))}"
+    lines = [sentence(f"{flown}: {finding(summary)}")]
     lines += [sentence(one) for one in remarks(summary)]
     ratio = () if summary.baseline is None else ("over recorded",)
     heads = ("group", "metric", "bound", "median", "worst", *ratio, "at limit", "failed")

@@ -21,8 +21,8 @@ from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.campaign.campaign_file import FileSection, load_drone, read_as
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, OF_LIMITS
+from mambo_sil.experiment.inputs import FileSection, load_drone, read_as
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import Scenario
 
@@ -191,19 +191,23 @@ class FlightSuite:
     same_bits: bool
 
 
-def load_suite(named: str, vehicle: str | None = None) -> FlightSuite:
+def load_suite(named: str, vehicle: str | None = None, of_settings: str | None = None) -> FlightSuite:
     """Load a shipped suite or a file; `envelope` is the suite, `./envelope` a file.
 
     `vehicle` replaces the drone of all flights and, where it has not the sensors of a flight, these by its
-    own; another one than the Mambo is part of the suite's name. The baselines of a shipped suite are in the
-    working directory. Raises SourceNotFoundError if there is neither, UnreadableFileError for a file that is
-    not TOML, InvalidSettingsError with all its errors.
+    own; another one than the Mambo is part of the suite's name. Without it `of_settings`, the drone of the
+    controller's settings, replaces that of a shipped suite, and of a file that names none. The baselines of
+    a shipped suite are in the working directory. Raises SourceNotFoundError if there is neither,
+    UnreadableFileError for a file that is not TOML, InvalidSettingsError with all its errors.
     """
     found = SUITES.own_file(named)
     if found is None:
         with as_file(SUITES.file(named)) as path:
-            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}", vehicle)
-    return _suite(read_as(SuiteFile, found), found.stem, found.parent, echo(named), vehicle)
+            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}", vehicle or of_settings)
+    file = read_as(SuiteFile, found)
+    if vehicle is None and not any(getattr(one, VEHICLE) for one in (file.flight, *file.flights.values())):
+        vehicle = of_settings
+    return _suite(file, found.stem, found.parent, echo(named), vehicle)
 
 
 def _suite(file: SuiteFile, name: str, folder: Path, source: str, vehicle: str | None) -> FlightSuite:

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_sil.errors import FlightError, WorkerError
-from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import MOST_TOGETHER, OF_LIMITS, Row, fly_scenarios
 from mambo_sil.experiment.campaign.executors import Pool
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import SHARED_KEYS, flight_of
 

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly
@@ -136,8 +137,9 @@ def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summa
 def table2_text(summary: Table2Summary) -> str:
     """Return Table II as text: the answer, a table for each case, printed above flown, then the claims."""
     shortest = next(iter(CASES))
+    drone = vehicle_toml.DEFAULT
     lines = [
-        f"{row.controller}: {distance(row.measured[0] / DURATION_S)} in the mean on {shortest}"
+        f"{row.controller} on {drone}: {distance(row.measured[0] / DURATION_S)} in the mean on {shortest}"
         for row in summary.rows
         if row.case == shortest
     ]

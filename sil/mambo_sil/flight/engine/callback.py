@@ -28,20 +28,19 @@ def called_back(
         nonlocal done
         if errors:
             return NOT_CALLED
-        try:
-            measured, wanted = _row(state, 10 if has_thrust else 7), _row(target, targets.shape[2])
-            outcome = controller.step(measured, wanted, np.array([thrust_m_s2]))
-            numbers, status = numbers_of(outcome), int(outcome.status[0])
-            ffi.memmove(command, numbers, numbers.nbytes)
-            done += 1
-            if progress is not None:
-                progress(done / updates)
-        except BaseException as error:  # of an interrupt too: `fly_compiled` raises it again
-            errors.append(error)
-            return NOT_CALLED
-        return status
+        measured, wanted = _row(state, 10 if has_thrust else 7), _row(target, targets.shape[2])
+        outcome = controller.step(measured, wanted, np.array([thrust_m_s2]))
+        numbers = numbers_of(outcome)
+        ffi.memmove(command, numbers, numbers.nbytes)
+        done += 1
+        if progress is not None:
+            progress(done / updates)
+        return int(outcome.status[0])
 
-    function = ffi.callback("engine_controller_t", step)
+    def keep(_kind: Any, error: BaseException, traceback: Any) -> None:
+        errors.append(error.with_traceback(traceback))
+
+    function = ffi.callback("engine_controller_t", step, error=NOT_CALLED, onerror=keep)
     return Native(function, ffi.NULL, 0, (function,), has_thrust), errors
 
 

@@ -3,6 +3,7 @@
 Thresholds and factors are measured: docs/explanation/design.md.
 """
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Final
 
 from mambo_codegen import __version__
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.settings.controller_toml import comment
+from mambo_codegen.settings.controller_toml import VEHICLE, comment
 from mambo_codegen.settings.key import spell
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import (
@@ -88,12 +89,21 @@ def derive(drone: VehicleFile) -> list[Derived]:
     ]
 
 
-def controller_text(drone: VehicleFile, source: str) -> str:
-    """Return a controller.toml for the drone of `source`, with the reason of each value as a comment."""
+def controller_text(drone: VehicleFile, source: str, vehicle: str | None = None) -> str:
+    """Return a controller.toml for the drone of `source`, with the reason of each value as a comment.
+
+    vehicle: what the key `vehicle` names, for commands that fly the settings; None leaves it out.
+    """
     lines = [
         comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
         comment("A missing key takes the value of preset table1."),
     ]
+    if vehicle is not None:
+        lines += [
+            "",
+            comment("The drone that commands fly; the C does not depend on it."),
+        ]
+        lines += [f"{VEHICLE} = {json.dumps(vehicle, ensure_ascii=False)}"]
     section = ""
     for each in derive(drone):
         if each.section != section:

@@ -48,7 +48,7 @@ def _answers(drone: VehicleFile) -> FloatArray:
     for _ in range(round(DURATION_S / drone.step_s)):
         seen = truth(state)
         thrust_n = loops.altitude_thrust(drone, 0.0, seen.position_m[2], seen.velocity_m_s[2])
-        state = vehicle.step(state, command_rad, thrust_n, 0.0, seen=seen)
+        state, _ = vehicle.advance(state, command_rad, thrust_n, 0.0, seen=seen)
         answers.append(state.body[EULER][[0, 1], [0, 1]] / STEP_RAD)
     return np.stack(answers, axis=1)
 

@@ -21,10 +21,10 @@ import numpy as np
 from mambo_codegen import __version__
 from mambo_codegen.errors import echo
 from mambo_sil.errors import StudyError
-from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, Row, fly_batch
 from mambo_sil.experiment.campaign.distributions import Distribution
 from mambo_sil.experiment.campaign.executors import Pool
+from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.model.tune.tuning_file import Tuning
 
 if TYPE_CHECKING:

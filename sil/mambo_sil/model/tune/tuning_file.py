@@ -15,17 +15,14 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import (
     Draws,
-    FileSection,
     FlightSection,
     demand_flyable,
     distributions,
-    format_value,
     load_its_drone,
-    load_settings,
-    read_as,
 )
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.experiment.campaign.parameters import Draw, draw
+from mambo_sil.experiment.inputs import FileSection, format_value, load_settings, read_as
 
 DEFAULT_SEARCH: Final[dict[str, dict[str, dict[str, Any]]]] = {
     "1-norm": {

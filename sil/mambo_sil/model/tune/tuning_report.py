@@ -14,14 +14,15 @@ from mambo_sil.model.tune.study import FinishedTrial, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.number_format import digits, distance
-from mambo_sil.results.summary import Summary
+from mambo_sil.results.summary import PageTable, ReportedSummary, Section, plain_section
 from mambo_sil.results.terminal import sentence, table
 
 CONTROLLER: Final = "controller.toml"
 FRONT: Final = "front"
+_HEADS: Final = ("", "trial", "IAE, m s", "command variation, rad", "crashed")
 
 
-class TuneSummary(Summary):
+class TuneSummary(ReportedSummary):
     """A finished study; `base` is the trial with the base's settings, None while another machine flies it."""
 
     command = "tune"
@@ -39,6 +40,15 @@ class TuneSummary(Summary):
     chosen: FinishedTrial
     rule: str
     front: list[FinishedTrial]
+
+    def section(self, _folder: Path, /) -> Section:
+        """Return the section of the report: base and chosen trial, and the trials of the front."""
+        values = [f"{key} {value:g}" for key, value in self.chosen.values.items()]
+        front = [_row(self, "front", one) for one in self.front]
+        named = PageTable(_HEADS, [*_rows(self), *front])
+        title = f"Tuning with {self.trials} trials, vehicle {self.vehicle.name}"
+        said = [f"Chosen: {self.rule}.", f"Its settings: {', '.join(values)}."]
+        return plain_section(title, None, _answer(self), [named], sentences=said)
 
 
 def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
@@ -79,27 +89,32 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
 
 def tune_text(summary: TuneSummary) -> str:
     """Return base and chosen trial as text: the answer, the rule of the choice, and a table."""
+    lines = [sentence(_answer(summary)), sentence(f"chosen: {summary.rule}"), ""]
+    return "\n".join([*lines, *table(_HEADS, _rows(summary))])
+
+
+def _answer(summary: TuneSummary) -> str:
+    """Return how closely the chosen trial flies, and the base, if it has flown."""
+    chosen, base = summary.chosen, summary.base
+    answer = f"trial {chosen.number} of {summary.trials}: {distance(chosen.iae_m_s / summary.duration_s)}"
+    answer += " in the mean"
+    answer += f", the base {distance(base.iae_m_s / summary.duration_s)}" if base is not None else ""
+    return f"{answer}; {chosen.crashed} of {summary.flights} flights crashed"
+
+
+def _rows(summary: TuneSummary) -> list[tuple[str, ...]]:
     named = {"base": summary.base, "chosen": summary.chosen}
-    distances = {
-        name: distance(one.iae_m_s / summary.duration_s) for name, one in named.items() if one is not None
-    }
-    answer = f"trial {summary.chosen.number} of {summary.trials}: {distances['chosen']} in the mean"
-    answer += f", the base {distances['base']}" if summary.base is not None else ""
-    crashed = f"{summary.chosen.crashed} of {summary.flights} flights crashed"
-    rows = [
-        (
-            name,
-            str(one.number),
-            digits(one.iae_m_s),
-            digits(one.command_variation_rad),
-            f"{one.crashed} of {summary.flights}",
-        )
-        for name, one in named.items()
-        if one is not None
-    ]
-    heads = ("", "trial", "IAE, m s", "command variation, rad", "crashed")
-    lines = [sentence(f"{answer}; {crashed}"), sentence(f"chosen: {summary.rule}"), "", *table(heads, rows)]
-    return "\n".join(lines)
+    return [_row(summary, name, one) for name, one in named.items() if one is not None]
+
+
+def _row(summary: TuneSummary, name: str, one: FinishedTrial) -> tuple[str, ...]:
+    return (
+        name,
+        str(one.number),
+        digits(one.iae_m_s),
+        digits(one.command_variation_rad),
+        f"{one.crashed} of {summary.flights}",
+    )
 
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:
