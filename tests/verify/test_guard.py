@@ -33,7 +33,7 @@ FAULTS = {
         "nmpc.c", r"\(product < \(nmpc_real_t\)0\) \? -product", "(0) ? -product"
     ),
     "what is not believed is not forgotten": Harm(
-        "nmpc.c", r"unbelieved = NMPC_WHOLE - share", "unbelieved = share - share"
+        "nmpc.c", r"square = doubt \* doubt", "square = doubt - doubt"
     ),
 }
 

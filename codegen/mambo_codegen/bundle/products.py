@@ -21,7 +21,6 @@ _NAMES: Final = (
         "initial_error",
         "knee_product",
         "noise_product",
-        "noise_share",
     ),
     *("move_acceleration", "per_step2_product", "per_step_product", "position_change"),
     *("position_correction", "rate_product", "ratio_product", "reach_product", "row_sum", "scaled_velocity"),
@@ -38,7 +37,6 @@ _FORMS: Final = {1: "{}", 2: "{} * {}", 4: "({} * {}) + ({} * {})"}
 _OTHER_FORMS: Final = {
     "half_change": "NMPC_HALF * {}",
     "halved": "NMPC_HALF * {}",
-    "noise_share": "NMPC_ONE / (NMPC_ONE + (NMPC_NOISE_SQUARE * {}))",
     "squared": "{0} * {0}",
     "angle_square": "{0} * {0}",
     "sine_difference": "({} * {}) - ({} * {})",

@@ -19,11 +19,9 @@ from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.step_choices import step_choices
-from mambo_codegen.methods.shared.arithmetic import INVERSE_BITS
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
-from mambo_codegen.methods.shared.tracker_constants import MOST_NOISE
-from mambo_codegen.numbers.fixed_point import FACTOR_BITS
+from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.key import Refusal
 
@@ -143,8 +141,8 @@ class Quadratic(QuadraticConstants, Method):
             **height_context(self.height),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
-            "factor_bits": FACTOR_BITS,
-            "inverse_bits": INVERSE_BITS,
+            "least_change": LEAST_CHANGE,
+            "most_counted": MOST_COUNTED,
             "most_noise": MOST_NOISE,
             "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),

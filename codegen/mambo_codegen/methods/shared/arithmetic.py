@@ -7,17 +7,13 @@ none of its numbers overflows.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.math import Real, fixed_sine_cosine, rounded, sine_cosine
-from mambo_codegen.methods.shared.tracker_constants import MOST_NOISE
-from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS
-
-INVERSE_BITS: Final = 15
-"""Fractional bits of an inverse in fixed point."""
+from mambo_codegen.numbers.fixed_point import SINE_BITS
 
 
 class Products:
@@ -87,14 +83,6 @@ class Arithmetic(Products):
     def noise_product(self, steps2_per_m: Any, acceleration_m_step2: Real) -> Real:
         """Return steps2_per_m * acceleration, a factor."""
         return self._nearest(steps2_per_m * acceleration_m_step2, "noise_product")
-
-    def noise_share(self, reversal: Real) -> Real:
-        """Return 1 / (1 + MOST_NOISE^2 reversal) of reversals in 0..1; in fixed point to 15 bits."""
-        if self._shifts is None:
-            one, square = reversal.dtype.type(1), reversal.dtype.type(MOST_NOISE**2)
-            return np.asarray(one / (one + (square * reversal)))
-        more = 2**INVERSE_BITS + rounded(reversal * MOST_NOISE**2, FACTOR_BITS - INVERSE_BITS)
-        return (2 ** (2 * INVERSE_BITS) // more) * 2 ** (FACTOR_BITS - INVERSE_BITS)
 
     def feedback_product(self, steps: Any, change_rad: Real) -> Real:
         """Return steps * change of an angle, rad."""

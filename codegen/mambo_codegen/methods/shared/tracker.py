@@ -6,8 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.shared.arithmetic import Arithmetic
-from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.methods.shared.tracker_constants import TargetNoise, TrackerConstants
+from mambo_codegen.methods.shared.math import Real, clamp, confine
+from mambo_codegen.methods.shared.tracker_constants import (
+    LEAST_CHANGE,
+    MOST_COUNTED,
+    MOST_NOISE,
+    TargetNoise,
+    TrackerConstants,
+)
 
 
 @dataclass(frozen=True)
@@ -18,7 +24,8 @@ class TargetMotion:
     acceleration_m_step2: (n, 2) tau^2 times the estimated acceleration.
     jerk_m_step2_update:  (n, 2) estimated change of that from one control step to the next.
     deviation:            (n, 2) what was new of the acceleration in the last step, over the most that counts.
-    reversal:             (n, 2) mean product of successive deviations of opposite sign. 0 without a guard.
+    reversal:             (n, 2) mean product of successive deviations of opposite sign.
+    doubt:                (n, 2) 1 less the believed share of what is new. All three are 0 without a guard.
     is_known:             (n,) whether there was a good step.
     """
 
@@ -27,13 +34,14 @@ class TargetMotion:
     jerk_m_step2_update: Real
     deviation: Real
     reversal: Real
+    doubt: Real
     is_known: NDArray[np.bool_]
 
 
 def unknown_motion(like: Real) -> TargetMotion:
     """Return the motion before the first step, with the shape (n, 2) and the type of `like`."""
     zeros = np.zeros_like(like)
-    return TargetMotion(zeros, zeros, zeros, zeros, zeros, np.zeros(len(like), np.bool_))
+    return TargetMotion(zeros, zeros, zeros, zeros, zeros, zeros, np.zeros(len(like), np.bool_))
 
 
 class TargetNoiseShare:
@@ -45,26 +53,31 @@ class TargetNoiseShare:
         self._per_noise = constant(noise.steps2_per_m, "per_noise")
         self._limit = constant(noise.limit_m_step2, "acceleration")
         self._share, self._rest = constant(noise.share, "factor"), constant(1 - noise.share, "factor")
-        self._whole = constant(1.0, "factor")
+        self._whole, self._two = constant(1.0, "factor"), constant(2.0, "factor")
+        self._least, self._most = constant(LEAST_CHANGE, "factor"), constant(MOST_COUNTED, "factor")
+        self._square = constant(MOST_NOISE**2, "whole")
         self._bound = constant(constants.acceleration_bound_m_step2, "acceleration")
 
-    def update(self, deviation: Real, reversal: Real, difference: Real) -> tuple[Real, Real, Real]:
-        """Return deviations and reversals after what is new of accelerations (n, 2), and the shares."""
+    def update(self, motion: TargetMotion, difference: Real) -> tuple[Real, Real, Real]:
+        """Return deviations, reversals and doubts after what is new of accelerations (n, 2)."""
         product = self._arithmetic.factor_product
         new = self._arithmetic.noise_product(self._per_noise, clamp(difference, self._limit))
-        both = product(new, deviation)
+        both = product(new, motion.deviation)
         latest = np.where(both < 0, -both, np.zeros_like(both))
-        mean = clamp(product(self._rest, reversal) + product(self._share, latest), self._whole)
-        return new, mean, self._arithmetic.noise_share(mean)
+        mean = clamp(product(self._rest, motion.reversal) + product(self._share, latest), self._whole)
+        share = self._whole - motion.doubt
+        counted = np.minimum(product(share, mean), self._most)
+        better = product(share, self._two - (share + (self._square * counted)))
+        return new, mean, self._whole - confine(better, product(self._least, share), self._whole)
 
-    def believe(self, difference: Real, share: Real) -> Real:
-        """Return a share (n, 2) of accelerations (n, 2)."""
-        return self._arithmetic.factor_product(difference, share)
+    def believe(self, difference: Real, doubt: Real) -> Real:
+        """Return the believed share (n, 2) of accelerations (n, 2)."""
+        return self._arithmetic.factor_product(difference, self._whole - doubt)
 
-    def fade(self, predicted: Real, share: Real) -> Real:
+    def fade(self, predicted: Real, doubt: Real) -> Real:
         """Return accelerations or jerks (n, 2), the nearer to 0 the less of what is new is believed."""
-        product, unbelieved = self._arithmetic.factor_product, self._whole - share
-        return product(predicted, self._whole - product(self._share, product(unbelieved, unbelieved)))
+        product = self._arithmetic.factor_product
+        return product(predicted, self._whole - product(self._share, product(doubt, doubt)))
 
     def limited(self, acceleration: Real) -> Real:
         """Return accelerations (n, 2) within their bound, which none exceeds but by rounding."""
@@ -90,8 +103,11 @@ class Tracker:
     def stored(self, motion: TargetMotion) -> list[Real]:
         """Return the columns (n, k) that nmpc_t stores of motions, in their order."""
         velocity = [] if self.is_given else [motion.velocity_m_s]
-        noise = [motion.deviation, motion.reversal] if self._noise else []
-        return [*velocity, motion.acceleration_m_step2, motion.jerk_m_step2_update, *noise]
+        stored = [*velocity, motion.acceleration_m_step2, motion.jerk_m_step2_update]
+        if self._noise is not None:
+            noise = np.stack([motion.deviation, motion.reversal, motion.doubt], axis=2)
+            stored.append(noise.reshape(len(noise), -1))
+        return stored
 
     def update(self, motion: TargetMotion, given: Real) -> TargetMotion:
         """Take what the tracker reads of the target (n, 2) in a control step into the estimates.
@@ -110,20 +126,21 @@ class Tracker:
             measured = self._arithmetic.target_product(self._factor, change)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
-        jerk, deviation, reversal = motion.jerk_m_step2_update, motion.deviation, motion.reversal
+        jerk, noise = motion.jerk_m_step2_update, (motion.deviation, motion.reversal, motion.doubt)
         if self._noise is None:
             acceleration = product(self._rest, predicted) + product(self._gain, measured)
         else:
-            deviation, reversal, share = self._noise.update(deviation, reversal, difference)
-            difference = self._noise.believe(difference, share)
-            predicted, jerk = (self._noise.fade(given, share) for given in (predicted, jerk))
+            noise = self._noise.update(motion, difference)
+            difference = self._noise.believe(difference, noise[2])
+            predicted, jerk = (self._noise.fade(each, noise[2]) for each in (predicted, jerk))
             acceleration = self._noise.limited(predicted + product(self._gain, difference))
         jerk = clamp(jerk + product(self._jerk_gain, difference), self._jerk_limit)
         return TargetMotion(
             velocity_m_s=velocity,
             acceleration_m_step2=np.where(steady, acceleration, at_first),
             jerk_m_step2_update=np.where(steady, jerk, np.zeros_like(jerk)),
-            deviation=np.where(steady, deviation, motion.deviation),
-            reversal=np.where(steady, reversal, motion.reversal),
+            deviation=np.where(steady, noise[0], motion.deviation),
+            reversal=np.where(steady, noise[1], motion.reversal),
+            doubt=np.where(steady, noise[2], motion.doubt),
             is_known=np.ones_like(motion.is_known),
         )

@@ -19,6 +19,12 @@ JERK_SHARE: Final = 0.1
 MOST_NOISE: Final = 16
 """What is new of the target's acceleration counts up to this many times its noise."""
 
+LEAST_CHANGE: Final = 0.25
+"""The share that a tracker believes falls to this much of itself at most in a control step."""
+
+MOST_COUNTED: Final = 2.0**-6
+"""Reversals times the share count up to this: beyond it the share falls as far as it may."""
+
 NOISE_MEMORY_S: Final = 0.5
 """The time over which a guard averages how much the target's motion reverses."""
 
