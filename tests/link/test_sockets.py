@@ -51,5 +51,5 @@ def test_an_address_of_another_machine_is_a_sentence() -> None:
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the command that installs it."""
     monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
-    with pytest.raises(LinkError, match=r"pip install 'mambo-nmpc\[mavlink\]'"):
+    with pytest.raises(LinkError, match=r"pip install pymavlink \(the extra"):
         MavlinkSocket(Address("127.0.0.1", 0), None)

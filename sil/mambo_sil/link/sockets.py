@@ -47,8 +47,7 @@ def dialect() -> Any:
         from pymavlink.dialects.v20 import common  # noqa: PLC0415 - an optional package
     except ImportError:
         raise LinkError(
-            "MAVLink needs pymavlink, which is missing: pip install 'mambo-nmpc[mavlink]', "
-            "or pymavlink itself"
+            'MAVLink needs pymavlink, which is missing: pip install pymavlink (the extra "mavlink")'
         ) from None
     return common
 

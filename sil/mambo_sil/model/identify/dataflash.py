@@ -6,6 +6,8 @@ over that of hover, which is learnt in flight, times g: thrust over mass.
 
 import contextlib
 import io
+import shlex
+import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -66,12 +68,8 @@ def _messages(path: Path) -> dict[str, Columns]:
     try:
         from pymavlink.DFReader import DFReader_binary  # noqa: PLC0415 - an optional extra
     except ImportError:
-        raise LogError(
-            (
-                f"{name}: reading DataFlash needs pymavlink: pip install 'mambo-nmpc[mavlink]', or pymavlink "
-                "itself",
-            )
-        ) from None
+        install = shlex.join([sys.executable, "-m", "pip", "install", "pymavlink"])
+        raise LogError((f"{name}: reading DataFlash needs pymavlink; install it: {install}",)) from None
     try:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
