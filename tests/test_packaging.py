@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 OF_DEVELOPERS = {"docs", "test"}
 """Extras that nobody needs who uses the commands."""
-FAMILIES = ("Apache", "BSD", "GPL", "MIT", "Public Domain", "PSF")
+FAMILIES = ("Apache", "BSD", "GPL", "LGPL", "MIT", "Public Domain", "PSF")
 ROOTS = ("codegen", "sil", "templates")
 BUILD_SDIST = "import sys; from hatchling import build; print(build.build_sdist(sys.argv[1]))"
 # Runs each line of stdin as a command; the exit code of this script is that of the first that fails.

@@ -33,6 +33,7 @@ from benchmarks.evidence.campaign_tables import (
     read_quantiles,
 )
 from benchmarks.evidence.item import RESULTS, Figures, Item
+from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause, link_wires, read_link
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
@@ -283,6 +284,22 @@ ITEMS: Final = (
             "faults-compared": faults_compared,
         },
         pictures={"faults.png": "mambo/faults.png"},
+    ),
+    Item(
+        name="link",
+        commands=(f"python -m benchmarks.flights.link {RESULTS}/link/link",),
+        controllers=(f"design {_HERE}/link-drone.toml",),
+        paths=(
+            *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/link", "sil/mambo_sil/model/derive"),
+            *("benchmarks/flights/link.py", "benchmarks/flights/wire.py", f"{_HERE}/link-drone.toml"),
+        ),
+        read=read_link,
+        tables={
+            "link-curves": link_curves,
+            "link-wires": link_wires,
+            "link-pause": link_pause,
+            "link-jumps": link_jumps,
+        },
     ),
     Item(
         name="adapters",

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.simulators.identified import SENSORS, LogRow, identified, identified_settings, manoeuvre
 from benchmarks.simulators.missions import HEIGHT_M, MISSIONS, STEP_S, Flight3d, Mission, Score
-from benchmarks.simulators.pilots import Challenger, OurSettings, Pilot, Sight, laws
+from benchmarks.simulators.pilots import Challenger, OurSettings, Sight, SimulatorPilot, laws
 from mambo_codegen.settings import presets
 from mambo_nmpc import Controller
 from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
@@ -83,7 +83,7 @@ class Mellinger:
     acceleration: bool = True
     planned: bool = False
 
-    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> Pilot:  # noqa: ARG002 - knows neither
+    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:  # noqa: ARG002 - knows neither
         """Return a controller for new drones."""
         return _MellingerPilot(parametrize(state2attitude, self.drone), self.acceleration)
 

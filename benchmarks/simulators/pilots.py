@@ -46,7 +46,7 @@ class Sight:
         return Sight(self.position_m[part], self.velocity_m_s[part], self.angles_rad[part])
 
 
-class Pilot(Protocol):
+class SimulatorPilot(Protocol):
     """Flies w drones for one flight."""
 
     def command(self, seen: Sight, target: FloatArray) -> FloatArray:
@@ -62,7 +62,7 @@ class Challenger(Protocol):
         """Whether its targets are planned: `Mission.targets`."""
         ...
 
-    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> Pilot:
+    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return a pilot for new drones."""
         ...
 
@@ -91,7 +91,7 @@ class OurSettings:
     height: AltitudeName = HEIGHT
     planned: bool = False
 
-    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> Pilot:
+    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return the C for new drones; it knows how old its states are."""
         options: ControllerOptions = {"age_s": AGE_S if noisy else 0.0}
         settings = with_options(without_height(self.settings), options)
@@ -122,7 +122,7 @@ class WithoutModel:
     drone: VehicleFile
     planned: bool = False
 
-    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> Pilot:  # noqa: ARG002 - knows no age
+    def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:  # noqa: ARG002 - knows no age
         """Return the law for new drones."""
         law: Law = PidFeedForwardController(pid_gains()["crazyflie"], drones)
         if self.gains is not None:

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.simulators.identified import LogRow, identified, manoeuvre
 from benchmarks.simulators.missions import HEIGHT_M, MISSIONS, STEP_S, Flight3d, Mission, Score
-from benchmarks.simulators.pilots import Challenger, OurSettings, Pilot, Sight, laws
+from benchmarks.simulators.pilots import Challenger, OurSettings, Sight, SimulatorPilot, laws
 from mambo_codegen.settings import controller_toml, presets
 from mambo_nmpc import Controller
 from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
@@ -122,7 +122,7 @@ def _own(
     return control, np.array([*angles_rad, float(control["cmd_thrust"])])
 
 
-def _ours(pilot: Pilot, seen: Sight, target: FloatArray) -> tuple[Mapping[str, Any], FloatArray]:
+def _ours(pilot: SimulatorPilot, seen: Sight, target: FloatArray) -> tuple[Mapping[str, Any], FloatArray]:
     """Return the control of a pilot, and its attitude and thrust."""
     command = pilot.command(seen, target)[0]
     attitude = Rotation.from_euler("xyz", command[:3]).as_quat()

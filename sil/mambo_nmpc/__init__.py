@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mambo_sil.api.states import DroneState, TargetState
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
+    from mambo_sil.link.pilot import Pilot
 
 __all__ = [
     "ArgumentError",
@@ -28,6 +29,7 @@ __all__ = [
     "DroneState",
     "Flown",
     "MamboNmpcError",
+    "Pilot",
     "StepOutcome",
     "TargetState",
     "Vehicle",
@@ -43,6 +45,7 @@ _HOMES: Final = {
     "DroneState": "mambo_sil.api.states",
     "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
+    "Pilot": "mambo_sil.link.pilot",
     "StepOutcome": "mambo_sil.api.outcome",
     "TargetState": "mambo_sil.api.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",

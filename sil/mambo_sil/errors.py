@@ -1,5 +1,7 @@
 """The exceptions of `sil`, one class for each thing that a caller would do differently."""
 
+from typing import ClassVar
+
 from mambo_codegen.errors import MamboNmpcError
 
 
@@ -49,6 +51,16 @@ class EmulationError(MamboNmpcError):
 
 class BoardError(MamboNmpcError):
     """The board behind a port does not answer, or runs other firmware; the message names the port."""
+
+
+class LinkError(MamboNmpcError):
+    """The link to an autopilot cannot be opened, or the controller cannot fly over it."""
+
+
+class PilotError(MamboNmpcError):
+    """A flight over a link did not begin, or ended otherwise than planned; the message says how."""
+
+    exit_code: ClassVar[int] = 1
 
 
 class WorkerError(MamboNmpcError):

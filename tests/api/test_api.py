@@ -142,7 +142,10 @@ class Moving:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"sensors": "x"}, 'sensors = "x" must be "true" or "mocap" or "flow-deck" or "mambo"'),
+        (
+            {"sensors": "x"},
+            'sensors = "x" must be "true" or "mocap" or "flow-deck" or "autopilot" or "mambo"',
+        ),
         ({"sensors": None}, "sensors = None must be"),
         ({"sensors": "mocap"}, 'sensors = "mocap" must be "true" or "mambo"'),
         ({"start": "landed"}, 'start = "landed" must be "hover" or "take-off"'),

@@ -132,8 +132,8 @@ def test_sensors_without_figures_are_refused_by_name() -> None:
         InvalidSettingsError, match=r'sensors = "mambo" needs its figures, \[sensors\], in the file'
     ):
         Controller.from_vehicle("crazyflie", sensors="mambo")
-    wrong: Any = "autopilot"
-    with pytest.raises(ArgumentError, match='sensors = "autopilot" must be "true" or "mocap" or "flow-deck"'):
+    wrong: Any = "sonar"
+    with pytest.raises(ArgumentError, match='sensors = "sonar" must be "true" or "mocap" or "flow-deck"'):
         Controller.from_vehicle("crazyflie", sensors=wrong)
 
 

@@ -108,10 +108,10 @@ def test_sensors_of_another_drone_are_refused() -> None:
 
 def test_one_list_of_sensors_for_every_command() -> None:
     """A wrong name prints it; the older one of the true state is read."""
-    kinds = "'true', 'mocap', 'flow-deck', 'mambo'"
+    kinds = "'true', 'mocap', 'flow-deck', 'autopilot', 'mambo'"
     for command, more in (("design", ""), ("fly", ", 'mambo-derotated'"), ("margins", ", 'mambo-derotated'")):
-        _, said = run(command, "crazyflie", "--sensors", "autopilot", code=2)
-        assert f"'autopilot' is not one of {kinds}{more}." in " ".join(said.replace("│", " ").split())
+        _, said = run(command, "crazyflie", "--sensors", "sonar", code=2)
+        assert f"'sonar' is not one of {kinds}{more}." in " ".join(said.replace("│", " ").split())
     flags = ("--duration-s", "1", "--controller", "pd")
     run("fly", "--sensors", "none", *flags, "-o", "older")
     run("fly", "--sensors", "true", *flags, "-o", "newer")

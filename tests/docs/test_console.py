@@ -14,7 +14,10 @@ PAGES = sorted([*DOCS.glob("tutorials/*.md"), *DOCS.glob("how-to/*.md")])
 RUN = [page for page in PAGES if read(page).steps]
 NAMES = [str(page.relative_to(DOCS)) for page in RUN]
 LONG = {
-    *(f"tutorials/{name}.md" for name in ("crazyflie", "first-flight", "own-drone", "paper")),
+    *(
+        f"tutorials/{name}.md"
+        for name in ("crazyflie", "first-flight", "own-drone", "paper", "px4-ardupilot")
+    ),
     *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
     *(f"how-to/{name}.md" for name in ("gymnasium", "rotorpy")),
     *(f"how-to/{name}.md" for name in ("identify-binary", "regress", "replay", "report", "tune", "verify")),
@@ -64,6 +67,7 @@ NOT_RUN = {
         "needs the firmware of Bitcraze, and a Crazyflie",
         "needs a Crazyflie",
     ),
+    "tutorials/px4-ardupilot.md": ("needs PX4",),
     "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }

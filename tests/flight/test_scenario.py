@@ -83,7 +83,7 @@ def test_the_older_name_of_the_true_state_is_read() -> None:
         ({"seed": -1}, "scenario.seed: Input should be greater than or equal to 0"),
         (
             {"sensors": "radar"},
-            "scenario.sensors: Input should be 'true', 'mocap', 'flow-deck', 'mambo'",
+            "scenario.sensors: Input should be 'true', 'mocap', 'flow-deck', 'autopilot', 'mambo'",
         ),
     ],
 )

@@ -293,12 +293,17 @@ def crazyflie_columns(columns: Mapping[str, Array]) -> dict[str, Array]:
     return found | {name: factor * columns[key] for key, (name, factor) in names.items()}
 
 
-def ulog(columns: Mapping[str, Array], *, quaternion: bool, target: Sequence[str] = ()) -> bytes:
+def ulog(
+    columns: Mapping[str, Array], *, quaternion: bool, target: Sequence[str] = (), hover: float | None = None
+) -> bytes:
     """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body.
 
-    `target` names the columns of position, velocity and acceleration of the target, as far as it has them.
+    `target` names the columns of position, velocity and acceleration of the target, as far as it has them;
+    `hover` is the estimated share of the thrust in hover, where the columns have a thrust.
     """
     setpoint = "float[4] q_d" if quaternion else "float roll_body;float pitch_body"
+    thrust = [np.zeros_like(columns["time_s"])] * 2 + [-columns.get("thrust_command", columns["time_s"])]
+    setpoint += ";float[3] thrust_body" if "thrust_command" in columns else ""
     formats = {
         "vehicle_attitude_setpoint": f"uint64_t timestamp;{setpoint};",
         "vehicle_attitude": "uint64_t timestamp;float[4] q;",
@@ -306,10 +311,11 @@ def ulog(columns: Mapping[str, Array], *, quaternion: bool, target: Sequence[str
     }
     roll, pitch, yaw = (columns[f"{name}_rad"] for name in ("roll", "pitch", "yaw"))
     commands = [columns["roll_command_rad"], columns["pitch_command_rad"]]
-    motion = [columns[name] for name in ("x_m", "y_m")] + [0.0 * roll - 1.0]
+    motion = [columns[name] for name in ("x_m", "y_m")] + [columns.get("z_m", 0.0 * roll - 1.0)]
     motion += [columns[name] for name in ("vx_m_s", "vy_m_s")]
     topics = [
-        _quaternion(commands[0], commands[1], yaw) if quaternion else commands,
+        (_quaternion(commands[0], commands[1], yaw) if quaternion else commands)
+        + (thrust if "thrust_command" in columns else []),
         _quaternion(roll, pitch, yaw),
         motion,
     ]
@@ -320,6 +326,10 @@ def ulog(columns: Mapping[str, Array], *, quaternion: bool, target: Sequence[str
         topics.append(
             [each for x, y in zip(given[::2], given[1::2], strict=True) for each in (x, y, nothing)]
         )
+
+    if hover is not None:
+        formats["hover_thrust_estimate"] = "uint64_t timestamp;float hover_thrust;float valid;"
+        topics.append([np.full_like(roll, hover), np.ones_like(roll)])
 
     def message(kind: bytes, content: bytes) -> bytes:
         return struct.pack("<Hc", len(content), kind) + content
@@ -346,3 +356,36 @@ def _quaternion(roll: Array, pitch: Array, yaw: Array) -> list[Array]:
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     ]
+
+
+def dataflash(columns: Mapping[str, Array], *, hover: float = 0.4, every: int = 1) -> bytes:
+    """Return a log in ArduPilot's format DataFlash: ATT, in every n-th row, XKF1 of two estimators, CTUN."""
+    kinds = {
+        129: ("ATT", "Qfffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw"),
+        130: ("XKF1", "QBfffff", "TimeUS,C,VN,VE,PN,PE,PD"),
+        131: ("CTUN", "Qff", "TimeUS,ThO,ThH"),
+    }
+    layouts = {number: "<" + form for number, (_, form, _) in kinds.items()}
+
+    def message(number: int, *values: float) -> bytes:
+        return b"\xa3\x95" + bytes([number]) + struct.pack(layouts[number], *values)
+
+    parts = []
+    for number, (name, form, labels) in kinds.items():
+        size = 3 + struct.calcsize(layouts[number])
+        head = struct.pack("<BB4s16s64s", number, size, name.encode(), form.encode(), labels.encode())
+        parts.append(b"\xa3\x95\x80" + head)
+    angles = ("roll_command_rad", "roll_rad", "pitch_command_rad", "pitch_rad", "yaw_rad")
+    degrees = [np.degrees(columns[name]) for name in angles]
+    degrees[-1] = degrees[-1] % 360.0
+    level = np.zeros_like(columns["time_s"])
+    motion = [columns.get(name, level) for name in ("vx_m_s", "vy_m_s", "x_m", "y_m", "z_m")]
+    throttle = columns.get("thrust_command", level + hover)
+    for row, time_s in enumerate(columns["time_s"].tolist()):
+        stamp = round(1e6 * time_s) + 10**7
+        if row % every == 0:
+            parts.append(message(129, stamp, *(each[row] for each in degrees)))
+        parts.append(message(130, stamp, 0, *(each[row] for each in motion)))
+        parts.append(message(130, stamp, 1, *(each[row] + 9.0 for each in motion)))
+        parts.append(message(131, stamp, throttle[row], hover))
+    return b"".join(parts)

@@ -97,7 +97,7 @@ def identify(
     logs: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="Logs of one drone: CSV, also trace.csv and that of the Crazyflie's client, or ULog.",
+            help="Logs of one drone: CSV, trace.csv and that of the Crazyflie's client too; ULog; DataFlash.",
             metavar="LOG...",
         ),
     ] = None,
@@ -185,7 +185,8 @@ def design(
     sensors: Annotated[
         SensorsKind | None,
         sensors_option(
-            SENSORS_KINDS, "What measures, in place of the file's sensors: true, mocap, flow-deck or mambo."
+            SENSORS_KINDS,
+            "What measures, in place of the file's sensors: true, mocap, flow-deck, autopilot, mambo.",
         ),
     ] = None,
 ) -> None:

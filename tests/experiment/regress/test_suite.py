@@ -139,7 +139,10 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
         ("yaw_rad = { from = 0, to = 1, count = 1001 }", "must have a count of 2 to 1000"),
         ("yaw_rad = { from = 0, to = nan, count = 3 }", "must be a value, a list of values, or { from ="),
         ("yaw_rad = { from = 0, to = 1, count = 1 }", "must have a count of 2 to 1000"),
-        ('sensors = "all"', "sensors = \"all\" must be 'true', 'mocap', 'flow-deck', 'mambo' or"),
+        (
+            'sensors = "all"',
+            "sensors = \"all\" must be 'true', 'mocap', 'flow-deck', 'autopilot', 'mambo' or",
+        ),
         ("yaw_rad = 1979-05-27", "must be a valid number"),
         ("bounds = 3", "bounds = 3 must be a section; write [flights.eight.bounds] and its keys below"),
         ("bounds.iae_m_s = -1", "bounds.iae_m_s = -1 must lie in 0..1000000000000"),

@@ -252,3 +252,12 @@ def test_the_gain_of_the_thrust_is_that_of_the_file(gain: float) -> None:
     assert height is not None
     assert height.thrust_gain == gain
     assert ("thrust_gain" in controller_text(drone, "mine")) is (gain != 1.0)
+
+
+def test_the_estimator_of_an_autopilot_is_believed_slowly() -> None:
+    """Its velocity least of all; figures of it are not needed."""
+    observer = settings_for(GENERIC.with_sensors("autopilot")).observer
+    captured = settings_for(GENERIC).observer
+    assert observer.velocity_noise > 5.0 * captured.velocity_noise
+    assert observer.disturbance_noise < 0.2 * captured.disturbance_noise
+    assert observer.position_noise > 10.0 * captured.position_noise

@@ -23,30 +23,33 @@ from mambo_sil.flight.names import (
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
 """Of the Table II case."""
+CurveChoice = Annotated[
+    str,
+    typer.Option(
+        help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m.", metavar="CURVE"
+    ),
+]
+CurveSize = Annotated[
+    float | None,
+    typer.Option(
+        help=f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}.", metavar="M"
+    ),
+]
+CurveRate = Annotated[
+    float | None,
+    typer.Option(help=f"Rate of the curve, in rad/s; by default {RATE_RAD_S:g}.", metavar="RATE"),
+]
+CurveTime = Annotated[float, typer.Option(help="Time on the curve, in s.", metavar="S")]
 
 
 @dataclass(frozen=True)
 class Course:
     """What is to be followed, from where, and for how long."""
 
-    trajectory: Annotated[
-        str,
-        typer.Option(
-            help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m.",
-            metavar="CURVE",
-        ),
-    ] = "bernoulli"
-    size_m: Annotated[
-        float | None,
-        typer.Option(
-            help=f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}.", metavar="M"
-        ),
-    ] = None
-    rate_rad_s: Annotated[
-        float | None,
-        typer.Option(help=f"Rate of the curve, in rad/s; by default {RATE_RAD_S:g}.", metavar="RATE"),
-    ] = None
-    duration_s: Annotated[float, typer.Option(help="Time on the curve, in s.", metavar="S")] = 100.0
+    trajectory: CurveChoice = "bernoulli"
+    size_m: CurveSize = None
+    rate_rad_s: CurveRate = None
+    duration_s: CurveTime = 100.0
     start: Annotated[
         Start,
         typer.Option(help="hover, or take-off: 5 s earlier on the ground.", metavar="START"),

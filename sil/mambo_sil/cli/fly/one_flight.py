@@ -94,7 +94,7 @@ def described_flight(
 ) -> Flight:
     """Return the flight that the options describe; raises FlightError and TrajectoryError."""
     period_s = settings.horizon.update_period_s
-    curve = _trajectory(course)
+    curve = curve_of(course)
     _within("--yaw-rad", course.yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD)
     disturbances = Disturbances(_wind_speed_m_s(conditions.wind), push_m_s2=_push_m_s2(conditions.push))
     vehicle = _vehicle(conditions, drone)
@@ -233,7 +233,8 @@ def _on_board(runner: Runner, settings: Settings) -> PositionController:
         return EmulatedController(settings, build_guest(settings, builder(chosen), work), core)
 
 
-def _trajectory(course: Course) -> Trajectory:
+def curve_of(course: Course) -> Trajectory:
+    """Return the curve by name, or the waypoints of a file; raises FlightError and TrajectoryError."""
     size_m, rate_rad_s = _size_and_rate(course)
     for name, curve in CURVES.items():
         if name == course.trajectory:

@@ -14,6 +14,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     AltitudeGains,
     AnyAttitude,
     AnySensors,
+    AutopilotSensors,
     Body,
     FirstOrderAttitude,
     FlowDeckSensors,
@@ -142,7 +143,7 @@ class VehicleFile(VehicleSection):
         """
         if kind == self.sensors.kind and self.knows_sensors:
             return self
-        plain = {"true": TrueState(), "flow-deck": FlowDeckSensors()}
+        plain = {"true": TrueState(), "flow-deck": FlowDeckSensors(), "autopilot": AutopilotSensors()}
         if kind not in plain:
             rule = f"needs its figures, [sensors], in the file of vehicle {echo(self.name)}"
             raise InvalidSettingsError((f"sensors = {spell(kind)} {rule}",))

@@ -226,5 +226,17 @@ class FlowDeckSensors(VehicleSection):
     kind: Literal["flow-deck"] = Field("flow-deck", description="Optical flow and range, on a Crazyflie.")
 
 
+class AutopilotSensors(VehicleSection):
+    """The estimator of an autopilot, whose velocity errs slowly; what `pilot --simulate` flies by."""
+
+    kind: Literal["autopilot"] = Field("autopilot", description="The estimator of PX4 or ArduPilot.")
+    velocity_error_m_s: Noise = Field(0.12, description="Standard deviation of the velocity's error.")
+    velocity_error_s: Annotated[float, Field(ge=0.05, le=10)] = Field(
+        0.7, description="Correlation time of that error; with it errors of the position fade."
+    )
+
+
 AnyAttitude = Annotated[MamboAttitude | CascadeAttitude | FirstOrderAttitude, Field(discriminator="kind")]
-AnySensors = Annotated[TrueState | MamboSensors | MocapSensors | FlowDeckSensors, Field(discriminator="kind")]
+AnySensors = Annotated[
+    TrueState | MamboSensors | MocapSensors | FlowDeckSensors | AutopilotSensors, Field(discriminator="kind")
+]

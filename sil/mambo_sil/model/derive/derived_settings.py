@@ -15,6 +15,7 @@ from mambo_codegen.settings.controller_toml import VEHICLE, comment
 from mambo_codegen.settings.key import spell
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import (
+    AutopilotSensors,
     FirstOrderAttitude,
     FlowDeckSensors,
     MamboSensors,
@@ -40,6 +41,7 @@ LATE_VELOCITY_M_S: Final = 0.15
 TRUE_VELOCITY_M_S: Final = 0.02
 LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
+ESTIMATED_POSITION_M, ESTIMATED_VELOCITY_M_S, SLOW_DISTURBANCE_M_S3 = 0.03, 1.0, 0.5
 """Noise densities of the observer."""
 
 QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.13, 1.5, 1.15
@@ -180,6 +182,13 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
         yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
+    elif isinstance(sensors, AutopilotSensors):
+        words = "The estimate goes astray by centimetres, and back: not at once into a command"
+        yield Derived("observer", "position_noise", ESTIMATED_POSITION_M, words)
+        words = "Learns wind within a second: what is quicker is the error of the estimate"
+        yield Derived("observer", "disturbance_noise", SLOW_DISTURBANCE_M_S3, words)
+        words = "Large, because the estimated velocity errs by decimetres a second"
+        yield Derived("observer", "velocity_noise", ESTIMATED_VELOCITY_M_S, words)
     elif drone.knows_sensors and isinstance(sensors, TrueState):
         yield Derived("observer", "position_noise", LEAST_POSITION_M, "The true state has no noise")
         words = "Learns wind within tenths of a second"

@@ -77,7 +77,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise LogError(
-            (f"{name}: line {line}: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg for ULog",)
+            (f"{name}: line {line}: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg or .bin",)
         ) from None
 
 

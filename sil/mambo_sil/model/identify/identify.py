@@ -1,7 +1,7 @@
 """From logs to a model: read, check, cut, fit, judge."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,7 @@ from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, Checked, check_l
 from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.curves import Curves
+from mambo_sil.model.identify.dataflash import read_dataflash
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
 from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, tumbled
@@ -32,25 +33,29 @@ LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
 """Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
 
 
+READERS: Final[dict[str, Callable[[Path], FlightLog]]] = {".ulg": read_ulog, ".bin": read_dataflash}
+"""What reads the logs of autopilots, by ending: ULog of PX4, DataFlash of ArduPilot."""
+
+
 def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> tuple[list[FlightLog], list[str]]:
-    """Read CSV files and, by their ending .ulg, ULog files; return the logs, and the faults of other files.
+    """Read CSV files and, by their ending, logs of autopilots; return the logs, and the faults of others.
 
     Raises LogError with all faults if there is no log at all, or a path names no file, or a file twice.
     """
     logs: list[FlightLog] = []
     faults: list[str] = []
     mistaken = False
-    ulogs = [path.suffix.lower() == ".ulg" for path in paths]
-    if columns and all(ulogs):
+    readers = [READERS.get(path.suffix.lower()) for path in paths]
+    if columns and all(readers):
         mistaken = True
-        faults.append("--columns is for CSV files; a ULog needs none")
-    for path, is_ulog in zip(paths, ulogs, strict=True):
+        faults.append("--columns is for CSV files; the log of an autopilot needs none")
+    for path, read in zip(paths, readers, strict=True):
         if sum(path.resolve() == other.resolve() for other in paths) > 1:
             mistaken = True
             faults.append(f"{echo(str(path))}: is named twice; a log counts once")
             continue
         try:
-            logs.append(read_ulog(path) if is_ulog else read_csv(path, columns))
+            logs.append(read_csv(path, columns) if read is None else read(path))
         except LogError as error:
             mistaken |= not path.is_file()
             faults += error.faults

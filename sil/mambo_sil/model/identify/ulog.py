@@ -11,10 +11,11 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.errors import echo
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import THRUST_COMMAND, FlightLog, Signal
+from mambo_sil.model.identify.signals import THRUST, THRUST_COMMAND, FlightLog, Signal
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
 TRAJECTORY: Final = "trajectory_setpoint"
@@ -32,7 +33,12 @@ _ANGLES: Final = ("roll", "pitch", "yaw")
 _THRUST: Final = "thrust_body[2]"
 """Commanded thrust along z of the body, which points down."""
 _CLOCK: Final = "timestamp"
-_FASTER: Final = "log at 50 Hz or more (SDLOG_PROFILE, high rate)"
+HOVER: Final = "hover_thrust_estimate"
+_FASTER: Final = (
+    "log at 50 Hz or more: SDLOG_PROFILE with high rate, or these lines, of topic and interval in ms, in "
+    "etc/logging/logger_topics.txt on the SD card: "
+    f"{SETPOINT} 10; {ATTITUDE} 10; {MOTION} 10; {HOVER} 100"
+)
 
 
 def read_ulog(path: Path) -> FlightLog:
@@ -56,7 +62,7 @@ def read_ulog(path: Path) -> FlightLog:
     for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
         values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
         signals[f"{angle}_rad"] = _signal(attitude, values, f"{ATTITUDE}.q")
-    signals |= _thrust(command)
+    signals |= _thrust(command, topics.get(HOVER, {}))
     motion = topics.get(MOTION, {})
     for signal, field in _MOTION.items():
         if field in motion:
@@ -84,7 +90,7 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
-            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY])
+            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER])
     except OSError as error:
         raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
     except Exception as error:  # whatever a damaged file makes of the parser
@@ -105,12 +111,20 @@ def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return dict(zip(_ANGLES[:2], _euler_rad(parts)[:2], strict=True))
 
 
-def _thrust(setpoint: Mapping[str, FloatArray]) -> dict[str, Signal]:
-    """Return the commanded thrust, up positive, if there is one."""
+def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray]) -> dict[str, Signal]:
+    """Return the commanded thrust, up positive, if there is one.
+
+    It is over mass if PX4 has estimated the thrust of hover, else in the unit of the set-point.
+    """
     values = setpoint.get(_THRUST)
     if values is None or not np.isfinite(values).any():
         return {}
-    return {THRUST_COMMAND: _signal(setpoint, -values, f"-{SETPOINT}.{_THRUST}")}
+    valid = hover.get("valid", np.zeros(0)) > 0.0
+    if not valid.any():
+        return {THRUST_COMMAND: _signal(setpoint, -values, f"-{SETPOINT}.{_THRUST}")}
+    share = float(np.median(hover["hover_thrust"][valid]))
+    column = f"-g*{SETPOINT}.{_THRUST}/{HOVER}"
+    return {THRUST: _signal(setpoint, -GRAVITY_M_S2 / share * values, column)}
 
 
 def _euler_rad(q: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,0 +1,119 @@
+"""`pilot`: fly a real or simulated autopilot over MAVLink."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from mambo_sil.cli.fly.fly_options import CurveChoice, CurveRate, CurveSize, CurveTime
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show
+
+if TYPE_CHECKING:
+    from mambo_sil.cli.progress import Bar
+    from mambo_sil.link.links import AutopilotLink
+    from mambo_sil.link.pilot import Pilot
+    from mambo_sil.link.steering import Update
+
+
+def pilot(
+    source: Source,
+    *,
+    link: Annotated[
+        str | None,
+        typer.Option(help="Where the autopilot sends to on this machine.", metavar="udp:HOST:PORT"),
+    ] = None,
+    simulate: Annotated[
+        Literal["px4", "ardupilot"] | None,
+        typer.Option(help="px4 or ardupilot: fly a simulated drone behind its messages.", metavar="NAME"),
+    ] = None,
+    vehicle: Drone = None,
+    scalar: Scalar = None,
+    trajectory: CurveChoice = "gerono",
+    size_m: CurveSize = None,
+    rate_rad_s: CurveRate = None,
+    duration_s: CurveTime = 30.0,
+    height_m: Annotated[
+        float, typer.Option(help="Height above the place of take-off, in m.", metavar="M")
+    ] = 1.5,
+    output: Results = Path("piloted"),
+    as_json: AsJson = False,
+) -> None:
+    """Fly PX4 or ArduCopter over MAVLink: take off, fly a curve, land; exit 1 if it ends otherwise.
+
+    On the computer beside a drone, or on the desk: its autopilot flies the angles of the controller.
+
+    Ctrl-C lands, a second one stops the motors. It has flown in simulation only.
+    """
+    from mambo_sil.api.api_controller import Controller
+    from mambo_sil.cli.fly.fly_options import Course
+    from mambo_sil.cli.fly.one_flight import curve_of
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.errors import PilotError
+    from mambo_sil.link.flight_log import write_log
+    from mambo_sil.link.pilot import Pilot
+    from mambo_sil.link.pilot_report import LOG, PilotSummary, pilot_text
+    from mambo_sil.results.folders import new_results
+
+    settings = load(source, scalar)
+    curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
+    open_link = _opener(source, link, simulate, vehicle)
+    updates: list[Update] = []
+    with new_results(output, PilotSummary.command, (LOG,)) as folder, progress_bar("connecting") as bar:
+        flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar))
+        interrupted: KeyboardInterrupt | None = None
+        try:
+            with flown:
+                flown.take_off(height_m)
+                flown.fly(curve, duration_s)
+                flown.land()
+        except PilotError:
+            pass  # the summary says how it ended
+        except KeyboardInterrupt as error:
+            interrupted = error
+        write_log(updates, folder / LOG)
+        summary = PilotSummary.of(
+            flown.life,
+            updates,
+            source=source,
+            link=link or f"simulated {simulate}",
+            simulated=simulate is not None,
+            trajectory=trajectory,
+        )
+        summary.write(folder)
+    show(summary, pilot_text(summary), as_json=as_json)
+    typer.echo(f"{output}: {LOG}", err=True)
+    if interrupted is not None:
+        raise interrupted
+    if not summary.good:
+        raise typer.Exit(1)
+
+
+def _opener(
+    source: str, link: str | None, simulate: str | None, vehicle: str | None
+) -> "Callable[[], AutopilotLink]":
+    """Return what opens the link that the options describe; raises LinkError, BadParameter."""
+    from mambo_sil.link.links import SimulatedLink, UdpLink
+    from mambo_sil.link.records import STACKS
+    from mambo_sil.link.sockets import parse_link
+
+    if (link is None) == (simulate is None):
+        raise typer.BadParameter(
+            "name either this, such as udp:127.0.0.1:14540, or --simulate px4", param_hint="--link"
+        )
+    if link is not None:
+        if vehicle is not None:
+            raise typer.BadParameter("it is the drone of --simulate: leave it out", param_hint="--vehicle")
+        address = parse_link(link)
+        return lambda: UdpLink(address)
+    stack, drone = STACKS[str(simulate)], load_drone(vehicle, source)
+    return lambda: SimulatedLink(stack, drone)
+
+
+def _watch(bar: "Bar") -> "Callable[[Pilot], None]":
+    """Return what shows the flight in a line."""
+
+    def watch(flown: "Pilot") -> None:
+        bar.stage(flown.words)
+
+    return watch

@@ -1,0 +1,90 @@
+"""What a pilot lets the drone follow: a place, a curve, or the targets of a program."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from mambo_sil.api.states import TargetState
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.trajectories import Trajectory, vertical_of
+
+SOFT_S: Final = 4.0
+"""Time in which a curve reaches its rate, and comes to rest at its end."""
+
+
+class TargetCourse(Protocol):
+    """Targets over time."""
+
+    @property
+    def duration_s(self) -> float:
+        """When the course ends; from then on its last target holds."""
+        ...
+
+    def target(self, time_s: float) -> TargetState:
+        """Return the target at a time since the beginning of the course."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place (3,), z down, and the heading there, None for the present one."""
+
+    position_m: FloatArray
+    yaw_rad: float | None = None
+    duration_s: float = math.inf
+
+    def target(self, time_s: float) -> TargetState:  # noqa: ARG002 - it is the same at all times
+        """Return the target."""
+        return TargetState(self.position_m, np.zeros(3), np.zeros(3), self.yaw_rad)
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A curve whose beginning is moved to `start_m` (3,); its clock starts and ends softly."""
+
+    curve: Trajectory
+    start_m: FloatArray
+    duration_s: float
+
+    def target(self, time_s: float) -> TargetState:
+        """Return the target."""
+        clock_s, rate, change_1_s = _soft_clock(min(max(time_s, 0.0), self.duration_s), self.duration_s)
+        first, now = self._curve(0.0), self._curve(clock_s)
+        position_m = self.start_m + now[0] - first[0]
+        return TargetState(position_m, rate * now[1], rate * rate * now[2] + change_1_s * now[1])
+
+    def _curve(self, clock_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return position, velocity and acceleration (3,), z down."""
+        x, y, vx, vy = self.curve.target(clock_s).tolist()
+        ax, ay = self.curve.acceleration(clock_s).tolist()
+        height, climb, upwards = vertical_of(self.curve, clock_s).tolist()
+        return np.array([x, y, -height]), np.array([vx, vy, -climb]), np.array([ax, ay, -upwards])
+
+
+@dataclass(frozen=True, eq=False)
+class TargetProgram:
+    """The targets of a program."""
+
+    function: Callable[[float], TargetState]
+    duration_s: float
+
+    def target(self, time_s: float) -> TargetState:
+        """Return the target."""
+        return self.function(min(time_s, self.duration_s))
+
+
+def _soft_clock(time_s: float, duration_s: float) -> tuple[float, float, float]:
+    """Return the time on the curve, its rate, and the change of that per second.
+
+    The rate rises from 0 to 1 within `SOFT_S`, or half the duration, and falls to 0 as late before the end.
+    """
+    soft_s = min(SOFT_S, duration_s / 2.0)
+    if time_s < soft_s:
+        return time_s * time_s / (2.0 * soft_s), time_s / soft_s, 1.0 / soft_s
+    left_s = duration_s - time_s
+    if left_s < soft_s:
+        return duration_s - soft_s - left_s * left_s / (2.0 * soft_s), left_s / soft_s, -1.0 / soft_s
+    return time_s - soft_s / 2.0, 1.0, 0.0

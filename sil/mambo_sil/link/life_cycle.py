@@ -1,0 +1,398 @@
+"""The life of a flight: connect, check, arm, climb, fly, land; without a socket and without a clock.
+
+Give it what comes (`receive`), and send what it wants (`orders`), both with the present time. Every way in
+which it can end is a `FlightEnd` with a sentence.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from mambo_sil.link.checks import Preflight, stack_of
+from mambo_sil.link.courses import Place, TargetCourse
+from mambo_sil.link.records import (
+    COMPANION,
+    SET_MODE,
+    Answer,
+    Arm,
+    Beat,
+    EstimatedState,
+    Heartbeat,
+    OnGround,
+    Order,
+    Record,
+    SetMode,
+    SetPosition,
+    Stack,
+    TakeOff,
+    Text,
+)
+from mambo_sil.link.steering import PAUSE_S, Steering
+
+CONNECT_S, CHECK_S, ARM_S, LAND_S = 10.0, 8.0, 15.0, 60.0
+"""How long each phase may last before the pilot gives up; a climb: as `_climb_s`."""
+SLOWEST_M_S: Final = 0.5
+REACHED_M, RESTS_S = 0.3, 2.0
+"""When the climb is over: as near to the height, for as long."""
+LOST_S: Final = 2.0
+"""Time without an estimate after which the pilot lands, and without any message after which it ends."""
+OLDEST_S: Final = 0.1
+"""Age of an estimate beyond which nothing is flown by it."""
+REFUSED_S: Final = 0.5
+"""How long the controller may refuse the state before the pilot lands."""
+CLOCK_DRIFT: Final = 1e-3
+ASK_S, BEAT_S = 0.5, 1.0
+"""Periods of repeated requests and of heartbeats."""
+STOPS: Final = 5
+"""How often the motors are told to stop: a message may be lost."""
+
+
+class Phase(Enum):
+    """Phases of a flight, in words."""
+
+    CONNECTING = "connecting"
+    CHECKING = "checking"
+    ARMING = "arming"
+    CLIMBING = "climbing"
+    FLYING = "flying"
+    LANDING = "landing"
+    ENDED = "ended"
+
+
+_LONGEST: Final = {Phase.CONNECTING: CONNECT_S, Phase.CHECKING: CHECK_S, Phase.ARMING: ARM_S}
+_IN_FLIGHT: Final = (Phase.ARMING, Phase.CLIMBING, Phase.FLYING, Phase.LANDING)
+
+
+@dataclass(frozen=True)
+class FlightEnd:
+    """How a flight ended; good if as planned."""
+
+    sentence: str
+    good: bool
+
+
+class Timer:
+    """Is due at once, and then every period."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s, self._next_s = period_s, -math.inf
+
+    def is_due(self, now_s: float) -> bool:
+        """Return whether the period is over; it then begins anew."""
+        if now_s < self._next_s:
+            return False
+        self._next_s = now_s + self._period_s
+        return True
+
+
+class LifeCycle:
+    """One flight; `steering` flies it once it is at `height_m` above the ground."""
+
+    def __init__(self, steering: Steering, height_m: float) -> None:
+        self.steering, self.height_m = steering, height_m
+        self.phase = Phase.CONNECTING
+        self.end: FlightEnd | None = None
+        self.stack: Stack | None = None
+        self.system = 0
+        self.estimate: EstimatedState | None = None
+        self.course: TargetCourse = Place(np.zeros(3))
+        self.course_time_s = 0.0
+        """Time on the clock of the course, which stands still while there is no estimate."""
+        self._begun_s: float | None = None
+        self._preflight: Preflight | None = None
+        self._fresh: EstimatedState | None = None
+        self._landed, self._armed, self._mode = False, False, -1
+        self._lands = False
+        """Whether the autopilot has accepted to land."""
+        self._place_m = np.zeros(3)
+        self._why, self._good = "", True
+        self._last_text, self._lag_s, self._stops = "", math.inf, 0
+        self._stepped_s = -math.inf
+        self._message_s = self._estimate_s = self._rest_s = self._accepted_s = 0.0
+        self._beat, self._ask, self._level = Timer(BEAT_S), Timer(ASK_S), Timer(0.0)
+        self._arm, self._changes_mode = Timer(BEAT_S), Timer(BEAT_S)
+
+    # What the pilot is told to do.
+
+    def fly(self, course: TargetCourse) -> None:
+        """Fly a course from now on."""
+        self.course, self.course_time_s = course, 0.0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the flight has ended, and nothing is left to send."""
+        return self.end is not None and not self._stops
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether the motors may turn."""
+        return self.phase in _IN_FLIGHT
+
+    @property
+    def is_course_over(self) -> bool:
+        """Whether the clock of the course is at its end."""
+        return self.course_time_s >= self.course.duration_s
+
+    def land(self, why: str, *, good: bool) -> None:
+        """Land because of `why`; what does not fly yet ends at once."""
+        if self.phase in (Phase.CONNECTING, Phase.CHECKING):
+            self._finish(f"no flight: {why}", good=False)
+        elif self.phase in _IN_FLIGHT and self.phase is not Phase.LANDING:
+            if self.phase is not Phase.FLYING and self.estimate is not None:
+                self.course = Place(self.estimate.position_m)
+            self._enter(Phase.LANDING)
+            self._why, self._good = why, good
+
+    def stop(self, why: str) -> None:
+        """Stop the motors at once, wherever the drone is."""
+        if self.phase in _IN_FLIGHT:
+            self._stops = STOPS
+            self._finish(f"{why}: the motors are stopped", good=False)
+        elif self.phase is not Phase.ENDED:
+            self._finish(f"no flight: {why}", good=False)
+
+    # What comes.
+
+    def receive(self, record: Record, now_s: float) -> None:
+        """Take a record that has come."""
+        if self.phase is Phase.ENDED:
+            return
+        self._message_s = now_s
+        if self._preflight is not None and self.phase is Phase.CHECKING:
+            self._preflight.receive(record)
+        match record:
+            case Heartbeat():
+                self._receive_heartbeat(record)
+            case EstimatedState():
+                self._receive_estimate(record, now_s)
+            case Answer() if record.command == SET_MODE and self.phase is Phase.LANDING:
+                self._lands |= record.accepted
+            case OnGround():
+                self._landed = record.landed
+            case Text():
+                self._last_text = record.text
+
+    def _receive_heartbeat(self, beat: Heartbeat) -> None:
+        if beat.vehicle == COMPANION:
+            self._meet_pilot(beat)
+        elif beat.component != 1:
+            return
+        elif self.stack is None:
+            found = stack_of(beat)
+            if isinstance(found, str):
+                self._finish(f"no flight: {found}", good=False)
+            else:
+                self.stack, self.system = found, beat.system
+                self._preflight = Preflight(found, self.steering.controller.update_period_s)
+                self._enter(Phase.CHECKING)
+        elif beat.system == self.system:
+            self._armed, self._mode = beat.armed, beat.mode
+            self._check_control()
+
+    def _meet_pilot(self, beat: Heartbeat) -> None:
+        """Leave the drone to one pilot: two would send set-points in turn."""
+        who = f"another pilot is on the link (system {beat.system}, component {beat.component})"
+        if self.phase in (Phase.CONNECTING, Phase.CHECKING):
+            self._finish(f"no flight: {who}; end it first", good=False)
+        else:
+            self.land(who, good=False)
+
+    def _check_control(self) -> None:
+        """End the flight if somebody else has taken the drone, or it is not armed any more."""
+        if self.stack is None or self.phase not in (Phase.CLIMBING, Phase.FLYING, Phase.LANDING):
+            return
+        name = self.stack.name
+        if not self._armed:
+            if self.phase is Phase.LANDING:
+                self._finish(f"landed: {self._why}", good=self._good)
+            else:
+                why = f", which says: {self._last_text}" if self._last_text else ""
+                self._finish(f"{name} has stopped the motors in flight{why}", good=False)
+        elif self._mode != self.stack.guided and (
+            self.phase is not Phase.LANDING or self._mode != self.stack.land
+        ):
+            mode = self.stack.modes.get(self._mode, f"mode {self._mode}")
+            wanted = self.stack.modes[self.stack.guided]
+            self._finish(
+                f"{name} has changed from {wanted} to {mode}, by the pilot's switch or a failsafe: "
+                "nothing is sent any more",
+                good=False,
+            )
+
+    def _receive_estimate(self, estimate: EstimatedState, now_s: float) -> None:
+        """Keep an estimate that is newer than the last one, and not late."""
+        if self.estimate is not None and estimate.time_s <= self.estimate.time_s:
+            return
+        lag_s = now_s - estimate.time_s
+        since_s = 0.0 if self.estimate is None else estimate.time_s - self.estimate.time_s
+        self._lag_s = min(self._lag_s + CLOCK_DRIFT * since_s, lag_s)
+        self.estimate = estimate
+        if lag_s - self._lag_s <= OLDEST_S:
+            self._fresh, self._estimate_s = estimate, now_s
+
+    # What is sent.
+
+    def orders(self, now_s: float) -> list[Order]:
+        """Return what to send now."""
+        if self._stops:
+            self._stops -= 1
+            return [Arm(arm=False, force=True)]
+        if self._begun_s is None:
+            self._begun_s = self._message_s = self._estimate_s = now_s
+            self._level = Timer(self.steering.controller.update_period_s)
+        if self.phase is Phase.ENDED:
+            return []
+        self._give_up(now_s)
+        orders: list[Order] = [Beat()] if self._beat.is_due(now_s) else []
+        match self.phase:
+            case Phase.CHECKING:
+                orders += self._check(now_s)
+            case Phase.ARMING:
+                orders += self._start(now_s)
+            case Phase.CLIMBING:
+                orders += self._climb(now_s)
+            case Phase.FLYING:
+                orders += self._steer(now_s)
+            case Phase.LANDING:
+                orders += self._land(now_s)
+        return orders
+
+    def _give_up(self, now_s: float) -> None:
+        """End what has lasted too long."""
+        if self._begun_s is None:
+            return
+        passed_s = now_s - self._begun_s
+        if self.phase in _IN_FLIGHT and now_s - self._message_s > LOST_S + CONNECT_S:
+            self._finish("the link is lost: the autopilot acts by its own failsafe", good=False)
+        elif self.phase in (Phase.CLIMBING, Phase.FLYING) and now_s - self._estimate_s > LOST_S:
+            silent = now_s - self._message_s > LOST_S
+            what = "message" if silent else "estimate that is not late"
+            self.land(f"no {what} has come for {LOST_S:g} s", good=False)
+        elif self.phase in _LONGEST and passed_s > _LONGEST[self.phase]:
+            self._end_early()
+        elif self.phase is Phase.CLIMBING and passed_s > ARM_S + self.height_m / SLOWEST_M_S:
+            self.land(f"{self.height_m:g} m were not reached within {passed_s:.0f} s", good=False)
+        elif self.phase is Phase.LANDING and passed_s > LAND_S:
+            self._finish(f"{self._why}: the drone has not landed within {LAND_S:.0f} s", good=False)
+
+    def _end_early(self) -> None:
+        """End before the flight, and say what is missing."""
+        name = "the autopilot" if self.stack is None else self.stack.name
+        says = f", and says: {self._last_text}" if self._last_text else ""
+        if self.phase is Phase.CONNECTING:
+            waited = f"no heartbeat has come within {CONNECT_S:.0f} s"
+            why = f"{waited}: start the autopilot, and let it send to this port"
+        elif self.phase is Phase.CHECKING and self._preflight is not None:
+            why = f"{self._preflight.missing()}{says}"
+        else:
+            why = f"{name} did not arm within {ARM_S:.0f} s{says}"
+        if self._armed:
+            self.land(why, good=False)
+        else:
+            self._finish(f"no flight: {why}", good=False)
+
+    def _check(self, now_s: float) -> list[Order]:
+        """Ask for what is missing; go on once all is there and good."""
+        preflight, estimate = self._preflight, self.estimate
+        if preflight is None:
+            return []
+        if preflight.missing() is not None or estimate is None:
+            return preflight.requests() if self._ask.is_due(now_s) else []
+        if fault := preflight.fault():
+            self._finish(f"no flight: {fault}", good=False)
+        else:
+            self._place_m = estimate.position_m
+            self.steering.hover_thrust = self.steering.mean_thrust = preflight.hover_thrust
+            self._enter(Phase.ARMING)
+        return []
+
+    def _start(self, now_s: float) -> list[Order]:
+        """Change to the guided mode, and arm."""
+        stack = self.stack
+        if stack is None or self._begun_s is None:
+            return []
+        orders = self._hover_above()
+        if self._armed and self._mode == stack.guided:
+            self._enter(Phase.CLIMBING)
+            return orders
+        if now_s - self._begun_s >= stack.obeys_after_s:
+            if self._mode != stack.guided:
+                orders += [SetMode(stack.guided)] if self._changes_mode.is_due(now_s) else []
+            if self._mode == stack.guided or stack.climbs_by_set_points:
+                orders += [Arm(arm=True)] if self._arm.is_due(now_s) else []
+        return orders
+
+    def _hover_above(self) -> list[Order]:
+        """Return the set-point above the place of take-off, of an autopilot that climbs by set-points."""
+        estimate, self._fresh = self._fresh, None
+        if self.stack is None or estimate is None or not self.stack.climbs_by_set_points:
+            return []
+        position_m = self._place_m - np.array([0.0, 0.0, self.height_m])
+        return [SetPosition(estimate.time_s, position_m, float(estimate.attitude_rad[2]))]
+
+    def _climb(self, now_s: float) -> list[Order]:
+        """Let the autopilot climb; take over once it is up and at rest."""
+        estimate = self.estimate
+        if self.stack is None or estimate is None:
+            return []
+        away_m = abs(float(estimate.position_m[2] - self._place_m[2]) + self.height_m)
+        if away_m > REACHED_M:
+            self._rest_s = now_s
+        if now_s - self._rest_s > RESTS_S:
+            self._enter(Phase.FLYING)
+            above_m = self._place_m - np.array([0.0, 0.0, self.height_m])
+            self.fly(Place(above_m))
+            return self._steer(now_s)
+        orders = self._hover_above()
+        if not self.stack.climbs_by_set_points and away_m > REACHED_M and self._ask.is_due(now_s):
+            orders.append(TakeOff(self.height_m))
+        return orders
+
+    def _steer(self, now_s: float) -> list[Order]:
+        """Return the controller's set-point for a fresh estimate, or a level one where none comes."""
+        estimate, self._fresh = self._fresh, None
+        if estimate is not None:
+            return self._step(estimate, now_s)
+        if self.estimate is None or now_s - self._estimate_s <= PAUSE_S or not self._level.is_due(now_s):
+            return []
+        return [self.steering.level(self.estimate.time_s + now_s - self._estimate_s)]
+
+    def _step(self, estimate: EstimatedState, now_s: float) -> list[Order]:
+        """Step the controller; land if it refuses the state for long."""
+        last_s, self._stepped_s = self._stepped_s, estimate.time_s
+        passed_s = estimate.time_s - last_s
+        self.course_time_s += passed_s if passed_s <= PAUSE_S else 0.0
+        set_point = self.steering.steer(
+            estimate, lambda ago_s: self.course.target(max(self.course_time_s - ago_s, 0.0))
+        )
+        if self.steering.is_accepted:
+            self._accepted_s = now_s
+        elif self.phase is Phase.FLYING and now_s - self._accepted_s > REFUSED_S:
+            self.land("the controller refuses the state, which is out of its [ranges]", good=False)
+        return [] if set_point is None else [set_point]
+
+    def _land(self, now_s: float) -> list[Order]:
+        """Let the autopilot land; fly on until it has changed its mode."""
+        stack = self.stack
+        if stack is None:
+            return []
+        orders: list[Order] = []
+        if self._mode != stack.land:
+            orders += [SetMode(stack.land)] if self._changes_mode.is_due(now_s) else []
+            if self.steering.take_overs and not self._lands:
+                orders += self._steer(now_s)
+        elif self._landed and self._arm.is_due(now_s):
+            orders.append(Arm(arm=False))
+        return orders
+
+    def _enter(self, phase: Phase) -> None:
+        """Begin a phase; its time begins with the next orders."""
+        self.phase, self._begun_s = phase, self._message_s
+        self._rest_s = self._accepted_s = self._message_s
+        self._ask, self._arm, self._changes_mode = Timer(ASK_S), Timer(BEAT_S), Timer(BEAT_S)
+
+    def _finish(self, sentence: str, *, good: bool) -> None:
+        self.phase, self.end = Phase.ENDED, FlightEnd(sentence, good)

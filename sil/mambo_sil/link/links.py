@@ -1,0 +1,86 @@
+"""The two ends that a pilot can have: a real autopilot, in real time, or a simulated one, in its own time."""
+
+import time
+from typing import Any, Protocol
+
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.link.messages import RecordReader
+from mambo_sil.link.records import Record, Stack
+from mambo_sil.link.simulated import Condition, SimulatedAutopilot
+from mambo_sil.link.sockets import Address, MavlinkSocket
+
+
+class AutopilotLink(Protocol):
+    """What the pilot's loop needs of a link."""
+
+    @property
+    def mav(self) -> Any:
+        """Pymavlink's MAVLink object, which sends."""
+        ...
+
+    def now_s(self) -> float:
+        """Return the time of the pilot's clock."""
+        ...
+
+    def receive(self) -> list[Record]:
+        """Return what has come; wait a moment for it."""
+        ...
+
+    def close(self) -> None:
+        """Close its sockets."""
+        ...
+
+
+WAIT_S = 0.005
+"""How long a loop waits for a message."""
+
+
+class UdpLink:
+    """An autopilot that sends to an address of this machine, in real time."""
+
+    def __init__(self, listen: Address) -> None:
+        self.socket, self._reader = MavlinkSocket(listen, None), RecordReader()
+
+    @property
+    def mav(self) -> Any:
+        """Pymavlink's MAVLink object, which sends."""
+        return self.socket.mav
+
+    def now_s(self) -> float:
+        """Return the time of the pilot's clock."""
+        return time.monotonic()
+
+    def receive(self) -> list[Record]:
+        """Return what has come; wait a moment for it."""
+        return self._read(WAIT_S)
+
+    def _read(self, wait_s: float) -> list[Record]:
+        records = map(self._reader.read, self.socket.receive(wait_s))
+        return [record for record in records if record is not None]
+
+    def close(self) -> None:
+        """Close its socket."""
+        self.socket.close()
+
+
+class SimulatedLink(UdpLink):
+    """A simulated autopilot behind a socket of the loopback, as fast as the machine computes."""
+
+    def __init__(self, stack: Stack, drone: VehicleFile, condition: Condition | None = None) -> None:
+        super().__init__(Address("127.0.0.1", 0))
+        pilot = ("127.0.0.1", self.socket.port)
+        self.autopilot = SimulatedAutopilot(stack, drone, pilot, condition)
+
+    def now_s(self) -> float:
+        """Return the time of the simulated autopilot."""
+        return self.autopilot.time_s
+
+    def receive(self) -> list[Record]:
+        """Let a tick of the simulation pass, and return what has come."""
+        self.autopilot.tick()
+        return self._read(0.0)
+
+    def close(self) -> None:
+        """Close both sockets."""
+        self.autopilot.socket.close()
+        super().close()

@@ -1,0 +1,116 @@
+"""The record of a flight over a link: how it ended, how near it stayed, what it learnt."""
+
+from collections.abc import Sequence
+from typing import Final, Self
+
+import numpy as np
+
+from mambo_sil.link.life_cycle import LifeCycle
+from mambo_sil.link.steering import Update
+from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.terminal import sentence, table
+
+LOG: Final = "flight.csv"
+SETTLES_S: Final = 5.0
+"""Time after the take-over from which on errors count."""
+
+
+class PilotSummary(Summary):
+    """A flight over a link; errors are of the estimate, in m."""
+
+    command = "pilot"
+
+    source: str
+    settings: str
+    link: str
+    autopilot: str | None
+    simulated: bool
+    end: str
+    good: bool
+    trajectory: str
+    set_points: int
+    flown_s: Number
+    interval_s: tuple[Number, Number]
+    """From one set-point to the next: median, and what 95 % do not exceed."""
+    horizontal_rms_m: Number
+    vertical_rms_m: Number
+    command_rms_rad_s: Number
+    """Rate of change of the commanded roll and pitch, together."""
+    hover_parameter: str | None
+    hover_thrust: Number
+    """The share of the largest thrust that the autopilot's parameter gives for hover."""
+    mean_thrust: Number
+    """The one that the flight needed, in the mean of its last seconds."""
+    jumps: int
+    pauses: int
+    refused: int
+
+    @classmethod
+    def of(cls, life: LifeCycle, updates: Sequence[Update], **named: object) -> Self:
+        """Return the record of a flight that has ended; `named` has what the options say."""
+        end, stack, steering = life.end, life.stack, life.steering
+        measured = _measures(updates)
+        return cls.model_validate(
+            named
+            | measured
+            | {
+                "settings": steering.controller.settings.digest,
+                "autopilot": None if stack is None else stack.name,
+                "end": "" if end is None else end.sentence,
+                "good": end is not None and end.good,
+                "hover_parameter": None if stack is None else stack.hover_parameter,
+                "hover_thrust": steering.hover_thrust,
+                "mean_thrust": steering.mean_thrust,
+                "jumps": steering.frame.jumps,
+                "pauses": max(steering.take_overs - 1, 0),
+            }
+        )
+
+
+def _measures(updates: Sequence[Update]) -> dict[str, object]:
+    """Return what the steps of a flight show; NaN where there are too few."""
+    none = float("nan")
+    time_s = np.array([one.estimate.time_s for one in updates])
+    found: dict[str, object] = {
+        "set_points": len(updates),
+        "refused": sum(one.status != 0 for one in updates),
+        "flown_s": float(np.ptp(time_s)) if len(updates) else 0.0,
+        **dict.fromkeys(("horizontal_rms_m", "vertical_rms_m", "command_rms_rad_s"), none),
+        "interval_s": (none, none),
+    }
+    if len(updates) < 3:
+        return found
+    intervals_s = np.diff(time_s)
+    found["interval_s"] = (float(np.median(intervals_s)), float(np.quantile(intervals_s, 0.95)))
+    judged = time_s >= time_s[0] + SETTLES_S
+    if judged.sum() < 3:
+        return found
+    errors = np.array([one.estimate.position_m - one.target.position_m for one in updates])[judged]
+    tilt = np.array([one.command_rad for one in updates])[judged]
+    rates = np.diff(tilt, axis=0) / np.diff(time_s[judged])[:, np.newaxis]
+    return found | {
+        "horizontal_rms_m": float(np.sqrt(np.mean(np.sum(errors[:, :2] ** 2, axis=1)))),
+        "vertical_rms_m": float(np.sqrt(np.mean(errors[:, 2] ** 2))),
+        "command_rms_rad_s": float(np.sqrt(np.mean(np.sum(rates**2, axis=1)))),
+    }
+
+
+def pilot_text(summary: PilotSummary) -> str:
+    """Return the record in words."""
+    lines = [sentence(summary.end)]
+    if summary.set_points:
+        median_s, most_s = summary.interval_s
+        rms_cm = 100.0 * summary.horizontal_rms_m, 100.0 * summary.vertical_rms_m
+        rows = [
+            ("set-points", f"{summary.set_points} in {summary.flown_s:.1f} s"),
+            ("interval", f"{1e3 * median_s:.0f} ms, 95 % within {1e3 * most_s:.0f} ms"),
+            ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
+            ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
+            (
+                "thrust of hover",
+                f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",
+            ),
+            ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
+        ]
+        lines += ["", *table((), rows, (0, 1))]
+    return "\n".join(lines)

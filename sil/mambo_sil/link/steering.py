@@ -1,0 +1,157 @@
+"""The controller between estimates and set-points: take-over, pauses, jumps, thrust of hover."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.frames import wrapped
+from mambo_sil.api.outcome import StepOutcome
+from mambo_sil.api.states import DroneState, TargetState
+from mambo_sil.errors import LinkError
+from mambo_sil.link.records import EstimatedState, SetAttitude
+from mambo_sil.link.steady_frame import SteadyFrame
+
+PAUSE_S: Final = 0.1
+"""Time without an estimate after which the controller begins anew, at the present attitude."""
+Targets = Callable[[float], TargetState]
+"""The target of a course a time ago, in s."""
+LEAST_THRUST, MOST_THRUST = 0.05, 1.0
+"""Bounds on the share of the largest thrust: with less an autopilot takes itself for landed."""
+LEARNS_S: Final = 3.0
+"""Time constant of the mean thrust that the flight needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """One step of the controller: what it got, and what it commanded."""
+
+    estimate: EstimatedState
+    """As the controller got it."""
+    target: TargetState
+    command_rad: tuple[float, float]
+    thrust_m_s2: float
+    status: int
+    take_overs: int
+    start_thrust_m_s2: float
+    """Thrust over mass with which the controller began."""
+    thrust: float
+    """Share of the largest thrust."""
+    jumps: int
+
+
+class Steering:
+    """Flies one drone with a controller of its height.
+
+    `hover_thrust` is the share of the largest thrust that carries the drone; the controller learns an error
+    of it as a steady disturbance. Raises LinkError for a controller that does not command the thrust.
+    """
+
+    def __init__(self, controller: Controller, record: Callable[[Update], None]) -> None:
+        if controller.settings.height is None:
+            raise LinkError(
+                "the settings have no [height], but the autopilot wants roll, pitch and thrust from one "
+                "controller: derive settings from a drone with [thrust] or [rotors] (mambo-nmpc design)"
+            )
+        self.controller = controller
+        self.hover_m_s2 = hover_thrust(controller.settings)
+        """The thrust over mass that the controller commands in hover."""
+        self.hover_thrust = self.mean_thrust = math.nan
+        """The shares of the largest thrust that carry the drone: as the autopilot says, and in the mean."""
+        self.is_accepted = True
+        """Whether the controller has accepted the last state."""
+        self.frame = SteadyFrame()
+        self.take_overs = 0
+        self._record = record
+        self._last: EstimatedState | None = None
+        self._sent_rad, self._sent_m_s2, self._yaw_rad = np.zeros(2), self.hover_m_s2, 0.0
+        self._last_s = self._clock_s = -math.inf
+
+    def begin(self, estimate: EstimatedState) -> None:
+        """Begin anew at an estimate, with the thrust of hover."""
+        roll_rad, pitch_rad, yaw_rad = estimate.attitude_rad.tolist()
+        most_rad = self.controller.settings.limits.tilt_rad
+        self._sent_rad = np.clip([roll_rad, pitch_rad], -most_rad, most_rad)
+        self._sent_m_s2 = self.hover_m_s2
+        self.controller.reset(self._sent_rad, thrust_m_s2=self._sent_m_s2)
+        self.frame.begin(estimate)
+        self._last = None
+        self._clock_s = estimate.time_s - self.controller.update_period_s
+        self._yaw_rad = yaw_rad - self.frame.heading_change_rad
+        self.take_overs += 1
+
+    def steer(self, estimate: EstimatedState, targets: Targets) -> SetAttitude | None:
+        """Return the set-point for an estimate; None if it comes within the period of the last one.
+
+        The controller steps once for each of its periods that has passed: where estimates are lost, with
+        states between the last one and this, and with the command that was sent last.
+        """
+        if estimate.time_s - self._last_s > PAUSE_S:
+            self.begin(estimate)
+        self._last_s, period_s = estimate.time_s, self.controller.update_period_s
+        steps = round((estimate.time_s - self._clock_s) / period_s)
+        self._clock_s += steps * period_s
+        held, last = self.frame.hold(estimate), self._last
+        if steps < 1:
+            return None
+        self._last = held
+        for left in range(steps - 1, 0, -1):
+            self._step(_between(last or held, held, 1.0 - left / steps), targets(left * period_s))
+            self.controller.set_command(self._sent_rad, self._sent_m_s2)
+        target = self._turned(targets(0.0))
+        outcome = self._step(held, target)
+        return self._send(held, target, outcome, steps * period_s)
+
+    def _step(self, held: EstimatedState, target: TargetState) -> StepOutcome:
+        state = DroneState(held.position_m, held.velocity_m_s, held.attitude_rad)
+        return self.controller.step(state, self._turned(target))
+
+    def _turned(self, target: TargetState) -> TargetState:
+        """Return a target with the heading at which the controller began, if it has none."""
+        yaw_rad = self._heading_rad if target.yaw_rad is None else target.yaw_rad
+        return TargetState(target.position_m, target.velocity_m_s, target.acceleration_m_s2, yaw_rad)
+
+    def _send(
+        self, held: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float
+    ) -> SetAttitude:
+        """Return the set-point of an outcome, and record it; the controller learns of a capped thrust."""
+        roll_rad, pitch_rad, heading_rad, thrust_m_s2 = outcome.attitude_thrust("NED").tolist()
+        share = thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
+        thrust = min(max(share, LEAST_THRUST), MOST_THRUST)
+        if thrust != share:
+            self.controller.set_thrust(thrust / self.hover_thrust * self.hover_m_s2)
+        self._sent_rad, self._sent_m_s2 = np.array([roll_rad, pitch_rad]), thrust_m_s2
+        self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
+        self.is_accepted = int(outcome.status) == 0
+        self._record(
+            Update(
+                *(held, target, (roll_rad, pitch_rad), thrust_m_s2, int(outcome.status)),
+                *(self.take_overs, self.hover_m_s2, thrust, self.frame.jumps),
+            )
+        )
+        attitude_rad = np.array([roll_rad, pitch_rad, heading_rad])
+        return SetAttitude(held.time_s, attitude_rad, thrust)
+
+    def level(self, time_s: float) -> SetAttitude:
+        """Return a level set-point with the thrust of hover, for a drone whose state is not known."""
+        return SetAttitude(time_s, np.array([0.0, 0.0, self._heading_rad]), self.mean_thrust)
+
+    @property
+    def _heading_rad(self) -> float:
+        """The heading at which the controller began, in the present frame of the estimator."""
+        return self._yaw_rad + self.frame.heading_change_rad
+
+
+def _between(last: EstimatedState, now: EstimatedState, share: float) -> EstimatedState:
+    """Return the estimate on the line from the last one to now, after a share of the way."""
+    turned_rad = wrapped(now.attitude_rad - last.attitude_rad)
+    return EstimatedState(
+        last.time_s + share * (now.time_s - last.time_s),
+        last.position_m + share * (now.position_m - last.position_m),
+        last.velocity_m_s + share * (now.velocity_m_s - last.velocity_m_s),
+        last.attitude_rad + share * turned_rad,
+    )

@@ -1,0 +1,117 @@
+"""Read a DataFlash log of ArduPilot's copter (.bin), with the reader of the optional package pymavlink.
+
+Its angles are in degrees, with the signs and the frame of this project. The thrust is the throttle of CTUN
+over that of hover, which is learnt in flight, times g: thrust over mass.
+"""
+
+import contextlib
+import io
+import shlex
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.errors import echo
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import LogError
+from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
+from mambo_sil.model.identify.signals import DEGREE, THRUST, FlightLog, Signal
+
+ATTITUDE, MOTION, THROTTLE = "ATT", "XKF1", "CTUN"
+_ANGLES: Final = {
+    "roll_command_rad": "DesRoll",
+    "pitch_command_rad": "DesPitch",
+    "roll_rad": "Roll",
+    "pitch_rad": "Pitch",
+    "yaw_rad": "Yaw",
+}
+_MOTION: Final = {"x_m": "PN", "y_m": "PE", "z_m": "PD", "vx_m_s": "VN", "vy_m_s": "VE"}
+_BEGINS: Final = b"\xa3\x95\x80"
+"""The definition of a message, which comes first."""
+_CLOCK: Final = "TimeUS"
+_FASTER: Final = "log attitude fast (LOG_BITMASK: add 1, ATTITUDE_FAST)"
+
+Columns = dict[str, FloatArray]
+
+
+def read_dataflash(path: Path) -> FlightLog:
+    """Read commanded and measured angles, motion and thrust.
+
+    Raises LogError for a file that is no DataFlash log or lacks a message, and if pymavlink is not installed.
+    """
+    name = echo(str(path))
+    messages = _messages(path)
+    attitude = messages.get(ATTITUDE)
+    if attitude is None:
+        raise LogError((f"{name}: has no {ATTITUDE}; it is no DataFlash log of a copter, or {_FASTER}",))
+    signals = {}
+    for signal, field in _ANGLES.items():
+        values = DEGREE * attitude[field]
+        values = np.unwrap(values) if signal == "yaw_rad" else values
+        signals[signal] = _signal(attitude, values, f"deg*{ATTITUDE}.{field}")
+    if (motion := messages.get(MOTION)) is not None:
+        for signal, field in _MOTION.items():
+            signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
+    if (throttle := messages.get(THROTTLE)) is not None:
+        hover = float(np.median(throttle["ThH"]))
+        thrust_m_s2 = GRAVITY_M_S2 / hover * throttle["ThO"]
+        signals[THRUST] = _signal(throttle, thrust_m_s2, f"g*{THROTTLE}.ThO/{THROTTLE}.ThH")
+    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
+
+
+def _messages(path: Path) -> dict[str, Columns]:
+    """Return the columns of each kind of message; of the motion those of the first estimator."""
+    name = echo(str(path))
+    try:
+        from pymavlink.DFReader import DFReader_binary  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        install = shlex.join([sys.executable, "-m", "pip", "install", "pymavlink"])
+        raise LogError((f"{name}: reading DataFlash needs pymavlink; install it: {install}",)) from None
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
+        with path.open("rb") as file:
+            begins = file.read(len(_BEGINS))
+        if begins != _BEGINS:
+            raise LogError((f"{name}: is no DataFlash log: it begins otherwise",))
+        with _quiet():
+            reader: Any = DFReader_binary(str(path))
+    except OSError as error:
+        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+    except LogError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the parser
+        raise LogError((f"{name}: is no DataFlash log: {echo(str(error))}",)) from error
+    with contextlib.closing(reader.filehandle), contextlib.closing(reader.data_map), _quiet():
+        return _columns(reader)
+
+
+def _columns(reader: Any) -> dict[str, Columns]:
+    wanted = {
+        ATTITUDE: (_CLOCK, *_ANGLES.values()),
+        MOTION: (_CLOCK, *_MOTION.values()),
+        THROTTLE: (_CLOCK, "ThO", "ThH"),
+    }
+    found: dict[str, list[list[float]]] = {}
+    while (message := reader.recv_match(type=list(wanted))) is not None:
+        kind = message.get_type()
+        if kind != MOTION or getattr(message, "C", 0) == 0:
+            row = [float(getattr(message, field, np.nan)) for field in wanted[kind]]
+            found.setdefault(kind, []).append(row)
+    return {kind: dict(zip(wanted[kind], np.array(rows).T, strict=True)) for kind, rows in found.items()}
+
+
+@contextlib.contextmanager
+def _quiet() -> Any:
+    """Keep the reader from printing what it thinks of a file."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        yield
+
+
+def _signal(message: Columns, values: FloatArray, column: str) -> Signal:
+    """Return the finite values of a field over the time stamps, in microseconds."""
+    there = np.isfinite(values)
+    return Signal(1e-6 * message[_CLOCK][there], values[there], column)

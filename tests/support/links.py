@@ -1,0 +1,63 @@
+"""Pilots of a simulated autopilot."""
+
+from functools import lru_cache
+from pathlib import Path
+
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.model import Settings
+from mambo_sil.api.api_controller import Controller
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.link.links import SimulatedLink
+from mambo_sil.link.pilot import Pilot
+from mambo_sil.link.records import STACKS
+from mambo_sil.link.simulated import Condition, SimulatedAutopilot
+from mambo_sil.link.steering import Update
+from mambo_sil.model.derive.derived_settings import controller_text
+
+DRONE = """
+[body]
+mass_kg = 1.0
+drag_1_s = 0.5
+[attitude]
+kind = "first_order"
+rate_hz = 100
+roll = { gain = 1.0, lag_s = 0.12, dead_time_s = 0.04 }
+pitch = { gain = 1.0, lag_s = 0.12, dead_time_s = 0.04 }
+[thrust]
+gain = 1.0
+lag_s = 0.05
+dead_time_s = 0.01
+"""
+"""A drone of 1 kg whose ticks are the periods of the controller, so that flights are quick."""
+
+
+@lru_cache
+def drone() -> VehicleFile:
+    """Return the drone."""
+    return vehicle_toml.parse(DRONE, "drone", "drone.toml")
+
+
+def write_drone(folder: Path) -> None:
+    """Write drone.toml, and the controller.toml that `design` derives from it."""
+    (folder / "drone.toml").write_text(DRONE, "utf-8")
+    (folder / "controller.toml").write_text(controller_text(drone(), "drone.toml"), "utf-8")
+
+
+def controller(vehicle: VehicleFile | None = None) -> Controller:
+    """Return a new controller with the settings that `design` derives for a drone, or that of these tests."""
+    return Controller(_settings(vehicle or drone()))
+
+
+@lru_cache
+def _settings(vehicle: VehicleFile) -> Settings:
+    return controller_toml.parse(controller_text(vehicle, "drone"), "controller.toml")
+
+
+def simulated(
+    stack: str, condition: Condition | None = None
+) -> tuple[Pilot, SimulatedAutopilot, list[Update]]:
+    """Return a pilot, its autopilot, and the steps of the flight."""
+    updates: list[Update] = []
+    link = SimulatedLink(STACKS[stack], drone(), condition)
+    return Pilot(controller(), lambda: link, updates.append), link.autopilot, updates
