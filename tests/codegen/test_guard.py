@@ -126,12 +126,11 @@ def test_without_a_measured_position_the_estimate_follows_less() -> None:
     assert not controller.memory.is_coarse.any()
 
 
-def test_a_budget_less_than_a_swing_is_refused() -> None:
-    """Less than twice the tilt limit; and with a 1-norm there is no guard."""
-    with pytest.raises(
-        InvalidSettingsError, match=r"guard\.tilt_rad = 0\.9 must be at least 1\.0, twice limits"
-    ):
-        with_option(GUARDED, "guard.tilt_rad", 0.9)
+def test_a_budget_holds_a_swing_at_least() -> None:
+    """Twice the tilt limit, if the setting says less; and with a 1-norm there is no guard."""
+    found = Quadratic(with_option(GUARDED, "guard.tilt_rad", 0.1)).guard
+    assert found is not None
+    assert found.tilt_rad == 2 * GUARDED.limits.tilt_rad
     with pytest.raises(InvalidSettingsError, match=r'must be "quadratic" with \[guard\]'):
         parse("[guard]\n", "controller.toml")
 

@@ -34,7 +34,6 @@ COMPANIONS: dict[str, Values] = {
     "optimizer.step_max_rad = 1e-6": {"optimizer.initial_step_rad": 1e-6},
     "optimizer.step_min_rad = 1": {"optimizer.initial_step_rad": 1, "optimizer.step_max_rad": 1},
     "ranges.thrust_acceleration_min_m_s2 = 100": {"ranges.thrust_acceleration_max_m_s2": 1000},
-    "guard.tilt_rad = 0.02": {"limits.tilt_rad": 0.01},
 }
 """What other keys must say before one may stand at its bound."""
 

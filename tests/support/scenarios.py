@@ -301,7 +301,14 @@ def drones() -> st.SearchStrategy[VehicleFile]:
         st.sampled_from([vehicle_toml.load(name) for name in vehicle_toml.names()]),
         st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors, rotors=mixers),
         st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors),
-        st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors, thrust=response),
+        st.builds(
+            changed,
+            st.just(FLOWN),
+            attitude=firsts,
+            sensors=sensors,
+            thrust=response,
+            altitude=st.just({"thrust_max_n": 3.0}),
+        ),
     )
 
 

@@ -14,11 +14,11 @@ class Guard(SettingsSection):
         1.5,
         ge=0.02,
         le=10,
-        description="How much roll and pitch commands may vary at once, in radians; at least twice the tilt "
-        "limit, a swing from one end to the other, and better three times.",
+        description="How much roll and pitch commands may vary at once, in radians; twice the tilt limit, "
+        "a swing from one end to the other, if this is less.",
     )
     tilt_rad_s: Number = Field(
-        3.0,
+        6.0,
         ge=0.1,
         le=1000,
         description="How much they may vary for long, in radians per second. A mixer that serves attitude "
@@ -31,7 +31,7 @@ class Guard(SettingsSection):
         description="How much the thrust over mass may vary at once, in metres per second squared.",
     )
     thrust_m_s3: Annotated[Number, WITH_HEIGHT] = Field(
-        50.0,
+        100.0,
         ge=0.1,
         le=100000,
         description="How much it may vary for long, in metres per second cubed.",

@@ -291,7 +291,7 @@ def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> Non
     chosen = subject(QUADRATIC, tmp_path)
     found = check(chosen)
     assert found.outcome is CheckOutcome.PASSED, found.evidence
-    documented = (DOCS / "data" / "faults.md").read_text("utf-8")
+    documented = (DOCS / "faults.md").read_text("utf-8")
     assert words((chosen.folder / "faults.md").read_text("utf-8")) == words(documented)
 
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
 
 
@@ -28,16 +27,8 @@ def guard_constants(settings: Sections) -> GuardConstants | None:
         return None
     gain = settings.height.thrust_gain if settings.height else 1.0
     return GuardConstants(
-        tilt_rad=guard.tilt_rad,
+        tilt_rad=max(guard.tilt_rad, 2 * settings.limits.tilt_rad),
         tilt_growth_rad=guard.tilt_rad_s * period_s,
         thrust_m_s2=guard.thrust_m_s2 / gain,
         thrust_growth_m_s2=guard.thrust_m_s3 * period_s / gain,
     )
-
-
-def refusals(settings: Sections) -> list[Refusal]:
-    """Return why a controller cannot have the guard of `settings`."""
-    least_rad = 2 * settings.limits.tilt_rad
-    if settings.guard is None or settings.guard.tilt_rad >= least_rad:
-        return []
-    return [Refusal("guard", "tilt_rad", f"must be at least {least_rad!r}, twice limits.tilt_rad")]

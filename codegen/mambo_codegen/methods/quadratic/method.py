@@ -12,7 +12,6 @@ from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
-from mambo_codegen.methods.quadratic.guard_constants import refusals as guard_refusals
 from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
@@ -66,7 +65,7 @@ class Quadratic(QuadraticConstants, Method):
     def refusals(self) -> list[Refusal]:
         """Return why a controller with a quadratic cost cannot have the settings."""
         settings = self.settings
-        refused = law.refusals(settings) or height_refusals(settings) or guard_refusals(settings)
+        refused = law.refusals(settings) or height_refusals(settings)
         return refused or (formats.refusals(settings) if settings.code.scalar == "fixed" else [])
 
     def reference_controller(self, n: int = 1) -> QuadraticController:

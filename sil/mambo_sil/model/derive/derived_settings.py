@@ -50,7 +50,7 @@ LEAST_LAG_S, LONGEST_LAG_S = 0.03, 0.5
 THRUST_MIN_M_S2, THRUST_SHARE = 2.9, 0.95
 LEAST_THRUST_MAX_M_S2, MOST_THRUST_MAX_M_S2 = 10.8, 100.0
 """Bounds of height.thrust_max_m_s2."""
-TILT_SWINGS, TILT_SWINGS_1_S, THRUST_SWINGS_1_S = 3.0, 6.0, 4.0
+TILT_SWINGS, TILT_SWINGS_1_S, THRUST_SWINGS_1_S = 3.0, 12.0, 8.0
 """What a guard lets vary at once and in a second, over the tilt limit and over the range of the thrust."""
 DESCENT_M_S, DESCENT_S = 1.5, 0.265
 """Default of height.descent_m_s; and speed that is surely braked, over the acceleration upwards."""
