@@ -9,6 +9,7 @@ from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
+from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import SCALARS
@@ -139,3 +140,21 @@ def test_without_the_section_there_is_no_guard() -> None:
     """The preset has none, and its reference says so."""
     with pytest.raises(ValueError, match="the settings have no guard"):
         Quadratic(quadratic_settings()).reference_controller().set_position_measured(np.array([True]))
+
+
+def test_the_noise_of_a_target_has_these_constants() -> None:
+    """16 times q counts at most, in m/step^2; a reversal is a mean over 0.5 s; the share falls to a quarter."""
+    slow = with_option(GUARDED, "horizon.update_period_s", 0.02)
+    for settings, period_s in ((GUARDED, 0.01), (slow, 0.02)):
+        tracker = Quadratic(settings).tracker
+        assert tracker is not None
+        assert tracker.noise is not None
+        most = 16 * Q_M_S2 * period_s**2
+        assert tracker.noise.limit_m_step2 == pytest.approx(most, rel=1e-12)
+        assert tracker.noise.steps2_per_m == pytest.approx(1 / most, rel=1e-12)
+        assert tracker.noise.share == pytest.approx(period_s / 0.5, rel=1e-12)
+    slowest = Quadratic(with_option(GUARDED, "horizon.update_period_s", 0.1)).tracker
+    assert slowest is not None
+    assert slowest.noise is not None
+    assert slowest.noise.share == pytest.approx(0.2, rel=1e-12)
+    assert (MOST_NOISE, LEAST_CHANGE, MOST_COUNTED) == (16, 0.25, 1 / 64)
