@@ -143,7 +143,7 @@ def test_without_the_section_there_is_no_guard() -> None:
 
 
 def test_the_noise_of_a_target_has_these_constants() -> None:
-    """16 times q counts at most, in m/step^2; a reversal is a mean over 0.5 s; the share falls to a quarter."""
+    """16 times q counts at most; a reversal is a mean over 0.5 s; the share falls to a quarter at most."""
     slow = with_option(GUARDED, "horizon.update_period_s", 0.02)
     for settings, period_s in ((GUARDED, 0.01), (slow, 0.02)):
         tracker = Quadratic(settings).tracker

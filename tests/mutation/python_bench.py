@@ -64,7 +64,10 @@ ROOMS: Final = {
         source=("sil/mambo_sil/flight/fences.py",),
         tests=("tests/flight/test_fences.py", "tests/flight/test_fence_metrics.py"),
     ),
-    "tracker": Room((f"{_METHODS}/tracker_constants.py",), (f"{_CONSTANTS}/test_tracker_constants.py",)),
+    "tracker": Room(
+        source=(f"{_METHODS}/tracker_constants.py",),
+        tests=(f"{_CONSTANTS}/test_tracker_constants.py", "tests/codegen/test_guard.py"),
+    ),
     "limits": Room(
         source=(f"{_METHODS}/limits_constants.py",),
         tests=(f"{_CONSTANTS}/test_limits_constants.py", "tests/codegen/test_limits.py"),

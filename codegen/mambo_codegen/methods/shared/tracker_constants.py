@@ -121,5 +121,5 @@ def _target_noise(settings: Sections, step_s: float) -> TargetNoise | None:
     return TargetNoise(
         limit_m_step2=limit_m_step2,
         steps2_per_m=1 / limit_m_step2,
-        share=min(settings.horizon.update_period_s / NOISE_MEMORY_S, 1.0),
+        share=min(settings.horizon.update_period_s, NOISE_MEMORY_S) / NOISE_MEMORY_S,
     )
