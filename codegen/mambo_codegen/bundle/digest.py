@@ -250,15 +250,21 @@ def _episode_digests(method: Method, episodes: Words) -> Words:
     controller = method.reference_controller(len(episodes))
     digests = np.zeros_like(episodes)
     for inputs in episode_inputs(method, episodes):
-        for word in _words(method, controller.step(*inputs)):
-            digests = _fold(digests, word)
+        digests = step_digest(method, controller.step(*inputs), digests)
+    return digests
+
+
+def step_digest(method: Method, step: Step, digests: Words) -> Words:
+    """Fold every bit of the results of a step of n controllers into `digests` (n,)."""
+    for word in _words(method, step):
+        digests = _fold(digests, word)
     return digests
 
 
 def _words(method: Method, step: Step) -> Iterator[Words]:
     """Yield the outcome of a step as 32-bit words (n,); a 64-bit number gives its upper word first."""
     results = {one.name: one for one in method.results}
-    for name in method.digested:
+    for name in filter(results.__contains__, method.digested):
         values, quantities = getattr(step, name), results[name].quantities
         if not quantities:
             yield values.astype(np.uint32)

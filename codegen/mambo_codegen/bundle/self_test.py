@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_codegen.bundle.digest import step_digest
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.numbers.gravity import hover_thrust
@@ -14,25 +15,21 @@ from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.settings.model import Settings
 
 STEPS: Final = 24
-STEPS_WITH_HEIGHT: Final = 18
-"""Fewer, since a step has more numbers, and an AVR has them in its 8 KB of RAM."""
 _GOLDEN_RATIO: Final = 0.6180339887498949
 
 
 @dataclass(frozen=True)
 class SelfTestStep:
-    """One step: inputs and results.
+    """One step: its inputs as in `ReferenceController.step`, the thrust None with a height, and its status.
 
-    Inputs: state and target, as in `ReferenceController.step`, and thrust, None with a height. Results:
-    status, the numbers of nmpc_command_t and `Method.tested_numbers`.
+    digest: of all results that `Method.digested` names, of 32 bits.
     """
 
     state: tuple[float, ...]
     target: tuple[float, ...]
     thrust_acceleration_m_s2: float | None
     status: Status
-    command: tuple[float, ...]
-    others: tuple[float, ...]
+    digest: int
 
 
 @lru_cache(maxsize=64)
@@ -56,8 +53,7 @@ def self_test(settings: Settings) -> tuple[SelfTestStep, ...]:
             target=tuple(target),
             thrust_acceleration_m_s2=given,
             status=Status(int(made.status[0])),
-            command=method.command_of(made),
-            others=method.tested_numbers(made),
+            digest=int(step_digest(method, made, np.zeros(1, np.uint32))[0]),
         )
 
     ranges = settings.ranges
@@ -73,7 +69,7 @@ def self_test(settings: Settings) -> tuple[SelfTestStep, ...]:
     if tracker and measures:
         change_m_s = min(tracker.tested_input, speed_m_s / 8)
     refused = 6 if method.has_height else 7
-    for index in range(1, STEPS_WITH_HEIGHT if method.has_height else STEPS):
+    for index in range(1, STEPS):
         target = [_next(spread, scale) for scale in (position_m, position_m, change_m_s, change_m_s)]
         if measures:
             velocity_m_s = [v + change for v, change in zip(velocity_m_s, target[2:], strict=True)]

@@ -100,7 +100,7 @@ class Method(Constants):
     step_type:   the class of its steps.
     sub_blocks:  the chapters of nmpc.c in the order of a control step, with a word on each.
     setter:      the C function, less its prefix, that sets what only this method has.
-    digested:    the results of a step that the self-test digest covers, in its order.
+    digested:    the results of a step that the self-test digest covers, in its order, as far as there are.
     iterates:    whether it searches the moves by iterations over a horizon.
     unnamed:     sections and keys that the settings' digest leaves out at their defaults: what came later.
     """
@@ -149,19 +149,10 @@ class Method(Constants):
             }
         )
 
-    def command_of(self, step: Any) -> tuple[float, ...]:
-        """Return the numbers of nmpc_command_t that a step of one controller gives, in SI units."""
-        thrust = [step.thrust_m_s2[0].item()] if self.has_height else []
-        return (*step.command_rad[0].tolist(), *thrust)
-
     @property
     @abstractmethod
     def setter_quantities(self) -> tuple[str, ...]:
         """The quantities of the numbers that `setter` reads."""
-
-    @abstractmethod
-    def tested_numbers(self, step: Any) -> tuple[float, ...]:
-        """Return the numbers of a step that the self-test compares beside status and command."""
 
     @property
     @abstractmethod

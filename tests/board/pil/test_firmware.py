@@ -109,10 +109,8 @@ def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
     ],
 )
 def test_a_height_flies_bit_for_bit(board: str, scalar: str, acceleration: str, tmp_path: Path) -> None:
-    """On a course in space, from the floor; a Mega without a guard, with which its firmware starts again."""
+    """On a course in space, from the floor."""
     settings = height_settings(scalar, acceleration)
-    if board == "mega":
-        settings = settings.model_copy(update={"guard": None})
     (tmp_path / "height.toml").write_text(to_toml(settings), "utf-8")
     course = ("--trajectory", "take-off-and-landing", "--size-m", "1", "--vehicle", "crazyflie")
     with serial_line(build_firmware(settings, board, tmp_path / "pil")) as line:

@@ -88,10 +88,6 @@ class OneNorm(OneNormConstants, Method):
         """The quantities of the weights."""
         return WEIGHTS
 
-    def tested_numbers(self, step: OneNormStep) -> tuple[float, ...]:
-        """Return cost and gradient by the first move (2,)."""
-        return (float(step.cost[0]), *step.gradient[0, 0].tolist())
-
     @property
     def work(self) -> tuple[int, int]:
         """Predicted states times moves in each iteration, and iterations."""

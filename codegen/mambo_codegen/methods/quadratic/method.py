@@ -49,7 +49,10 @@ class Quadratic(QuadraticConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_command"
-    digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
+    digested: ClassVar[tuple[str, ...]] = (
+        *("status", "missed", "saturated", "stored"),
+        *("command_rad", "thrust_m_s2"),
+    )
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS, "height.thrust_gain")
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -89,10 +92,6 @@ class Quadratic(QuadraticConstants, Method):
     def setter_quantities(self) -> tuple[str, ...]:
         """The quantities of a command."""
         return self.command
-
-    def tested_numbers(self, step: QuadraticStep) -> tuple[float, ...]:
-        """Return all stored numbers."""
-        return tuple(step.stored[0].tolist())
 
     @property
     def work(self) -> tuple[int, int]:
@@ -145,7 +144,6 @@ class Quadratic(QuadraticConstants, Method):
             "most_noise": MOST_NOISE,
             "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),
-            "stored_quantities": self.stored,
             "row_quantities": ROW,
             "stored_limits": _stored_limits(self),
             "attitude_shares": [
