@@ -20,7 +20,7 @@ LONG = {
     ),
     *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
     *(f"how-to/{name}.md" for name in ("gymnasium", "rotorpy")),
-    *(f"how-to/{name}.md" for name in ("identify-binary", "regress", "replay", "report", "tune", "verify")),
+    *(f"how-to/{name}.md" for name in ("regress", "replay", "tune", "verify")),
 }
 """Pages whose commands take two seconds or more of an idle core."""
 ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")
@@ -33,11 +33,10 @@ TOOLS = {
 }
 """What the commands of a page need besides bash, make and a C compiler: tool and Debian package."""
 NOT_RUN = {
-    "how-to/arduino.md": ("needs arduino-cli",),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
     "how-to/crazyflow.md": ("it installs", "needs crazyflow and JAX"),
-    "how-to/espidf.md": ("needs ESP-IDF",),
+    "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
     "how-to/from-0.1-to-0.2.md": ("needs files of 0.1",),
     "how-to/gym-pybullet-drones.md": (
         "it installs",
@@ -45,14 +44,13 @@ NOT_RUN = {
     ),
     "how-to/gymnasium.md": ("it installs",),
     "how-to/identify.md": ("needs a Crazyflie",),
+    "how-to/libraries.md": ("needs arduino-cli", "needs PlatformIO", "needs ESP-IDF"),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
-    "how-to/measure.md": ("needs a board, or QEMU with its firmware",),
     "how-to/offboard.md": ("needs a Crazyflie",),
     "how-to/pil.md": (
         "needs a board; tests of their own fly it in QEMU",
         "needs a board; tests of their own fly it in QEMU",
     ),
-    "how-to/platformio.md": ("needs PlatformIO",),
     "how-to/release.md": (
         "takes hours where evidence is old",
         "it changes the version",

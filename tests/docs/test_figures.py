@@ -3,7 +3,7 @@
 A table between two markers is written by its command; a figure in a sentence is typed by hand, and stays
 when the command prints another one. So a sentence with such a figure has a row in `FIGURES`:
 
-    Figure("docs/how-to/arduino.md", r"preset `mambo` takes (.+?) % of its period", lambda: ...)
+    Figure("docs/how-to/libraries.md", r"preset `mambo` takes (.+?) % of its period", lambda: ...)
 
 - the file, from the root of the repository;
 - a pattern that occurs once in its text, in which each run of blanks and line ends is one blank; its one
@@ -134,8 +134,7 @@ FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
 CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
 OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compatibility.md"
 HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
-BOARDS, ARDUINO = "docs/evidence/boards.md", "docs/how-to/arduino.md"
-WORK = "docs/evidence/constant-work.md"
+BOARDS, LIBRARIES = "docs/evidence/boards.md", "docs/how-to/libraries.md"
 FIGURES = [
     Figure(BOARDS, r"float32 takes (\d+) instructions on an ARM926", lambda: instructions("mambo")),
     Figure(BOARDS, r"ARM926, and fixed point (\d+)", lambda: instructions("mambo", FIXED)),
@@ -145,11 +144,11 @@ FIGURES = [
     Figure(BOARDS, r"Cortex-M4F\*\*, (\d+ to \d+) us", lambda: step_us("crazyflie")),
     Figure(BOARDS, r"most of the Mega's (\d+) B", lambda: str(board("mega")["ram_bytes"])),
     Figure(BOARDS, r"in software: (\d+) times the instructions", times_in_float64),
-    Figure(ARDUINO, r"preset `mambo` takes (\S+) % of its period", lambda: period_percent("mega")),
-    Figure(ARDUINO, r"on a Teensy 4.1 (\S+) %", lambda: period_percent("teensy41")),
+    Figure(LIBRARIES, r"preset `mambo` takes (\S+) % of its period", lambda: period_percent("mega")),
+    Figure(LIBRARIES, r"on a Teensy 4.1 (\S+) %", lambda: period_percent("teensy41")),
     Figure("docs/how-to/own-firmware.md", r"on a Cortex-M4F: (.+?) \(modelled\)", lambda: size("crazyflie")),
-    Figure(WORK, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
-    Figure(WORK, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
+    Figure(BOARDS, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
+    Figure(BOARDS, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
     Figure("docs/evidence/benchmarks.md", r"(\d+) a step for `mambo`", lambda: instructions("crazyflie")),
     Figure(
         "docs/evidence/benchmarks.md",
