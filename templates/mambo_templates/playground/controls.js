@@ -68,6 +68,7 @@ class Controls {
       document.querySelector(`output[for="${dial.key}"]`).textContent = words;
     });
     this.rows.forEach((row, index) => { row.querySelector("input").checked = world.drones[index].shown; });
+    if (world.data.spatial) find("heights").parentElement.hidden = !world.target.swing;
     this.fenceButton();
     this.numbers();
   }
@@ -88,8 +89,8 @@ class Controls {
       row.querySelector(".bar").style.width = `${100 * Math.min(LOGARITHMIC_CM.share(100 * (means[index] || 0)), 1)}%`;
     });
     find("verdict").textContent = verdict(drones, means, history.length * this.world.data.period_s);
-    const limited = drones.filter((drone) => drone.limited), without = titles(drones.filter((drone) => !drone.limited));
-    const speeds = limited.map((drone) => `${drone.entry.title} ${drone.speedWords}`);
+    const without = titles(drones.filter((drone) => !drone.limited));
+    const speeds = drones.map((drone) => `${drone.entry.title} ${drone.lost ? "lost" : drone.speedWords}`);
     find("limits").textContent = [...speeds, ...(without ? [`without limits: ${without}`] : [])].join("; ");
   }
 

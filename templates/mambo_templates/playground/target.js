@@ -10,12 +10,13 @@ function atMost(length, [x, y]) {
 class Target {
   /* The curves are computed in the module of a drone. Its height swings about `height` by `swing`, in m. */
   constructor(drone, data) {
-    Object.assign(this, { drone, data, kind: "eight", goal: [0, 0], height: data.height_m, swing: 0 });
+    Object.assign(this, { drone, data, kind: "eight", goal: [0, 0], height: data.height_m, swing: 0, haste: 1, lead: 0 });
     this.now = new Float64Array(TARGET_COLUMNS);
   }
 
   /* Stands at its goal, or at the beginning of its curve. */
   begin() {
+    this.lead = 0;
     this.now.set([...this.goal, 0, 0, 0, 0]);
     this.at(0);
     if (this.kind !== "hand") this.goal = [this.now[0], this.now[1]];
@@ -25,12 +26,19 @@ class Target {
   at(time) {
     const { data, drone: { module, curve } } = this;
     if (this.kind !== "hand") {
-      module.calls[`playground_${this.kind}`](...data.curves[this.kind], time, curve);
+      const [size, rate] = data.curves[this.kind];
+      module.calls[`playground_${this.kind}`](size, rate * this.haste, time + this.lead, curve);
       this.now.set(module.at(curve, LEVEL_COLUMNS));
     }
     module.calls.playground_swing(this.height, this.swing, data.swing_rad_s, time, curve);
     this.now.set(module.at(curve, TARGET_COLUMNS - LEVEL_COLUMNS), LEVEL_COLUMNS);
     return this.now;
+  }
+
+  /* Follows its curve so many times as fast from a time on, from where it is. */
+  hasten(haste, time) {
+    this.lead = this.haste / haste * (time + this.lead) - time;
+    this.haste = haste;
   }
 
   /* Follows its goal for a period, if it is dragged. */

@@ -26,7 +26,7 @@ class World {
 
   begin() {
     Object.assign(this, { updates: 0, history: [], impulse: null, draw: normals(1) });
-    this.lift();
+    this.aim();
     this.target.begin();
     this.first = [...this.draw(3), ...new Float64Array(3 * this.data.ticks)];
     this.drones.forEach((drone) => { drone.losses = 0; this.start(drone); });
@@ -44,7 +44,7 @@ class World {
   /* Sets a slider. */
   turn(index, place) {
     this.dials[index] = place;
-    this.lift();
+    this.aim();
     this.drones.forEach((drone) => this.apply(drone, this.data.dials[index], place));
   }
 
@@ -54,8 +54,9 @@ class World {
     return this.data.dials[index].values[this.dials[index]];
   }
 
-  /* Gives the target the height that the sliders say, if there are any. */
-  lift() {
+  /* Gives the target the speed, and on a page with heights the height, that the sliders say. */
+  aim() {
+    this.target.hasten(this.value("speed"), this.time);
     if (this.data.spatial) Object.assign(this.target, { height: this.value("height"), swing: this.value("swing") });
   }
 

@@ -85,7 +85,7 @@ def test_what_flies_on_the_page_has_the_bits_of_a_simulated_flight(
     monkeypatch.chdir(tmp_path)
     command.run("design", "crazyflie", "-o", "height.toml")
     command.run("playground", "height.toml", "pd", "--vehicle", "crazyflie")
-    page = Page(tab, tmp_path / "play.html", DESK_PX, "#swing=0.3")
+    page = Page(tab, tmp_path / "play.html", DESK_PX)
     vehicle = Vehicle.of(vehicle_toml.preset("crazyflie"))
     flight = Flight(InSpace(Bernoulli(2.0, 0.5), Swing(0.3, 1.5)), duration_s=4.0, vehicle=vehicle)
     page.advance(4.01)
@@ -102,6 +102,7 @@ def follow_heights(page: Page) -> None:
     page.find("(page.world.enclose(null), page.world.target.drag(0, 0))")
     page.slide("height", 12)
     page.slide("swing", 3)
+    assert not page.find('document.getElementById("heights").parentElement.hidden')
     page.advance(6.0)
     heights = page.find("page.world.history.slice(-400).map((row) => row[3])")
     assert (min(heights), max(heights)) == (pytest.approx(1.7, abs=1e-3), pytest.approx(2.3, abs=1e-3))
@@ -109,8 +110,9 @@ def follow_heights(page: Page) -> None:
     stock = page.find("page.world.history.slice(-400).map((row) => row[3] - stateOf(row, 1)[2])")
     assert np.abs(swung).max() < 0.02
     assert np.abs(stock).max() > 0.1
-    assert "height=2&swing=0.3" in page.find("location.hash")
+    assert "height=2" in page.find("location.hash")
     page.slide("swing", 0)
+    assert page.find('document.getElementById("heights").parentElement.hidden')
     page.slide("height", 22)
     page.advance(6.0)
     assert page.find("stateOf(page.world.history.at(-1), 0)[2]") == pytest.approx(2.5, abs=0.02)
@@ -135,6 +137,23 @@ def test_a_flipped_byte_is_not_the_same_bits(
     assert "Not the same bits" in str(tab.find('document.getElementById("proof").textContent'))
     marks = tab.find('[...document.querySelectorAll(".here")].map((cell) => cell.textContent[0])')
     assert marks == ["✗" if index == drone else "✓" for index in range(4)]
+
+
+def test_a_curve_is_hastened_from_where_the_target_is(page: Page) -> None:
+    """Slider and fragment; with twice the rate it moves twice as fast, through the same places."""
+    page.advance(3.0)
+    before = page.find("[...page.world.target.now]")
+    page.slide("speed", 6)
+    page.find("page.world.target.at(page.world.target.lead && page.world.time - page.world.data.period_s)")
+    after = page.find("[...page.world.target.now]")
+    period_s = page.find("page.world.data.period_s")
+    moved = np.array(after[:2]) - before[:2]
+    assert np.abs(moved).max() <= 2 * period_s * np.hypot(*before[2:4]) + 1e-9
+    assert np.hypot(*after[2:4]) == pytest.approx(2 * np.hypot(*before[2:4]), rel=0.02)
+    assert "speed=2" in page.find("location.hash")
+    page.find("page.world.begin()")
+    curve = Bernoulli(2.0, 1.0)
+    assert page.find("[...page.world.target.at(1.0).slice(0, 4)]") == curve.target([1.0])[0].tolist()
 
 
 def test_the_curves_are_those_of_the_simulation(page: Page) -> None:

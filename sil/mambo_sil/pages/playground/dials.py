@@ -15,10 +15,13 @@ from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.flight.engine.records import flight_records
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
+from mambo_sil.pages.playground.bit_proof import SWING_M
 
 _WIND: Final = ("gust_mean_m_s", "gust_sigma_m_s", "gust_decay", "gust_x", "gust_roots")
 _HEIGHTS_M: Final = tuple(number / 10.0 for number in range(8, 31))
 _SWINGS_M: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+_SPEEDS: Final = (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0)
+_TIMES: Final = "\N{MULTIPLICATION SIGN}"
 _FACTORS: Final = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 
 
@@ -51,7 +54,7 @@ def dials(flight: Flight) -> list[Dial]:
     windy, heading = Disturbances(steps), Disturbances(0.0, np.radians(degrees))
     noisy, lagging = replace(sensors, noise_scale=steps), replace(vehicle, motor_lag_s=lags_s)
     direction = "Wind direction (0\N{DEGREE SIGN} right, 90\N{DEGREE SIGN} down)"
-    noise, times = "Sensor noise (motion capture)", "\N{MULTIPLICATION SIGN}"
+    noise = "Sensor noise (motion capture)"
     own = int(np.searchsorted(lags_s, own_s))
 
     def members(count: int, names: Sequence[str], **changes: Any) -> dict[str, list[Any]]:
@@ -72,7 +75,7 @@ def dials(flight: Flight) -> list[Dial]:
             *("towards", direction, "\N{DEGREE SIGN}", degrees.tolist(), 6),
             members(len(degrees), ("gust_heading",), disturbances=heading),
         ),
-        Dial("noise", noise, times, steps.tolist(), 0, members(len(steps), ("noise",), sensors=noisy)),
+        Dial("noise", noise, _TIMES, steps.tolist(), 0, members(len(steps), ("noise",), sensors=noisy)),
     ]
     if not isinstance(vehicle.drone.attitude, FirstOrderAttitude):
         lags_ms = [round(float(1000.0 * lag_s), 6) for lag_s in lags_s]
@@ -81,12 +84,19 @@ def dials(flight: Flight) -> list[Dial]:
     return found
 
 
-def height_dials() -> list[Dial]:
-    """Return the sliders of the target's height, which change no record."""
-    return [
-        Dial("height", "Height of the target", "m", list(_HEIGHTS_M), _HEIGHTS_M.index(HOVER_HEIGHT_M), {}),
-        Dial("swing", "Swing of its height (\N{PLUS-MINUS SIGN})", "m", list(_SWINGS_M), 0, {}),
-    ]
+def target_dials(*, spatial: bool) -> list[Dial]:
+    """Return the sliders of the target, its speed and, if `spatial`, its height; they change no record."""
+    speed = Dial("speed", "Speed of the curve", _TIMES, list(_SPEEDS), _SPEEDS.index(1.0), {})
+    height = Dial(
+        "height", "Height of the target", "m", list(_HEIGHTS_M), _HEIGHTS_M.index(HOVER_HEIGHT_M), {}
+    )
+    swing = Dial(
+        *("swing", "Swing of its height (\N{PLUS-MINUS SIGN})", "m"),
+        list(_SWINGS_M),
+        _SWINGS_M.index(SWING_M),
+        {},
+    )
+    return [speed, height, swing] if spatial else [speed]
 
 
 def weight_dial(settings: Settings, title: str, drone: int) -> Dial:

@@ -18,7 +18,7 @@ from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import is_spatial
 from mambo_sil.pages.playground import bit_proof
-from mambo_sil.pages.playground.dials import Dial, dials, height_dials, weight_dial
+from mambo_sil.pages.playground.dials import Dial, dials, target_dials, weight_dial
 from mambo_sil.pages.playground.page_controllers import PageController
 from mambo_sil.pages.playground.wasm_build import module
 from mambo_sil.results.html_page import render_page
@@ -108,8 +108,8 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
         for number, one in enumerate(found)
         if isinstance(one.kind, Settings) and method_of(one.kind).weight_limits
     ]
-    heights = height_dials() if is_spatial(flight.trajectory) else []
-    return [*heights, *dials(bit_proof.calm(flight)), *weights]
+    course = target_dials(spatial=is_spatial(flight.trajectory))
+    return [*course, *dials(bit_proof.calm(flight)), *weights]
 
 
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
