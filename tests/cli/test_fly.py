@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -52,7 +53,24 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert tuple(rows[0]) == CSV_COLUMNS
     assert len(rows) == len(trace.time_s) == 201
     assert (out / "flight.png").read_bytes().startswith(b"\x89PNG")
-    assert "<svg" in (out / "flight.svg").read_text()
+    drawn = (out / "flight.svg").read_text()
+    assert "bernoulli, 2 m, 0.5 rad/s, 2 s, no wind" in drawn
+    assert "in the first 10 s" not in drawn
+
+
+def test_the_axis_of_the_error_is_for_what_follows_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The picture says how large the error was before; its title says what flies where."""
+    monkeypatch.chdir(tmp_path)
+    run("fly", "--duration-s", "12", "--wind", "gusts", "-o", "out")
+    drawn = Path("out/flight.svg").read_text("utf-8")
+    assert "NMPC, mambo on mambo<" in drawn
+    assert "s, wind 7.72 m/s<" in drawn
+    (found,) = re.findall(r"up to (\S+) m in the first 10 s", drawn)
+    assert float(found) == pytest.approx(
+        json.loads(Path("out/summary.json").read_text())["metrics"]["max_error_m"], rel=0.01
+    )
 
 
 @pytest.mark.long

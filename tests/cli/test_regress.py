@@ -61,6 +61,9 @@ def test_a_suite_passes_and_leaves_its_results(passed: Path) -> None:
     assert [flight["checks"][0]["holds"] for flight in summary["flights"]] == [True] * 5
     assert ElementTree.parse(out / "junit.xml").getroot().get("tests") == "5"
     assert (out / "regress.png").read_bytes().startswith(b"\x89PNG")
+    drawn = (out / "regress.svg").read_text("utf-8")
+    assert ">\N{LESS-THAN OR EQUAL TO} 0.01<" in drawn
+    assert ">\N{GREATER-THAN OR EQUAL TO} 100<" in drawn
 
 
 @pytest.mark.long

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from mambo_sil.flight.animation import animate
 from mambo_sil.flight.fences import Walls, nears_limit
-from mambo_sil.flight.metrics import horizontal_error_m, horizontal_speed_m_s
+from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, horizontal_speed_m_s
 from mambo_sil.flight.traces import Trace
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.pictures import inline, save
-from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, INK, TARGET, THIN, style
+from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, INK, QUIET, TARGET, THIN, style
 
 _LEVEL: Final = {"y (east), m": 1.9, "error, m": 1.0, "roll, rad": 1.0, "pitch, rad": 1.0}
 _SPATIAL: Final = {
@@ -88,8 +89,7 @@ def _draw_column(
     path.set(xlabel="x (north), m", aspect="equal")
     if heights:
         _draw_heights(heights, trace, walls)
-    error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
-    error.set_ylim(0, None)
+    _draw_error(error, trace)
     for axis, axes in enumerate(angles):
         axes.plot(
             trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=BROAD, label="command"
@@ -98,6 +98,18 @@ def _draw_column(
     angles[-1].set_xlabel("time, s")
     if walls is not None:
         _draw_walls(path, walls)
+
+
+def _draw_error(axes: Axes, trace: Trace) -> None:
+    """Draw the horizontal error of the first flight over time; its axis is for what follows the transient."""
+    error_m, started = horizontal_error_m(trace)[:, 0], trace.time_s >= TRANSIENT_S
+    axes.plot(trace.time_s, error_m, color=FLOWN)
+    axes.set_ylim(0, None)
+    most_m, later_m = np.nanmax(error_m), np.nanmax(error_m, where=started, initial=0.0)
+    if 2 * later_m < most_m and later_m > 0:
+        axes.set_ylim(0, 1.4 * later_m)
+        words = f"up to {digits(most_m)} m in the first {TRANSIENT_S:g} s"
+        axes.text(0.99, 0.97, words, transform=axes.transAxes, ha="right", va="top", color=QUIET)
 
 
 def _draw_speed(axes: Axes, trace: Trace, limit_m_s: float) -> None:

@@ -127,6 +127,15 @@ class FlySummary(FlightSummary):
     start: str
     duration_s: float
 
+    @property
+    def title(self) -> str:
+        """Say in two lines what flies, and where."""
+        return flight_title(self._flier, self)
+
+    @property
+    def _flier(self) -> str:
+        return PD_TITLES.get(self.controller, f"NMPC, {echo(str(self.source))}")
+
     def section(self, folder: Path) -> Section:
         """Return the section of the report on this flight; raises TraceError."""
         facts, bad = {}, []
@@ -139,7 +148,7 @@ class FlySummary(FlightSummary):
 
     def _flown_section(self, folder: Path, facts: dict[str, str], bad: list[str]) -> Section:
         """Return the section with the parameters of the flight, further facts and what is wrong."""
-        name = PD_TITLES.get(self.controller, f"NMPC, {self.source}")
+        name = self._flier
         parameters = {
             **_course(self),
             "controller": _controller(self, f" of {self.source}"),
@@ -183,6 +192,12 @@ def _controller(summary: FlightSummary, source: str = "") -> str:
     """Return the controller's name, with its settings if it has any: a PD has none."""
     name, settings = summary.controller, summary.settings
     return name if settings is None or name in PD_TITLES else f"{name}, settings {settings[:16]}{source}"
+
+
+def flight_title(name: str, flown: FlySummary | Scenario) -> str:
+    """Return the title of a picture, in two lines: what flies on which drone; curve and wind."""
+    wind = f"wind {flown.wind_speed_m_s:.3g} m/s" if flown.wind_speed_m_s else "no wind"
+    return f"{name} on {echo(flown.vehicle.name)}\n{echo(_course(flown)['trajectory'])}, {wind}"
 
 
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import math
 import re
 from pathlib import Path
 from typing import Final
@@ -25,11 +26,18 @@ _VARIABLES: Final = {
 
 
 class PlainLogFormatter(LogFormatter):
-    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02."""
+    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02.
+
+    At `least` and `most`, edges of the axis, stands what lies beyond, too; the labels say so.
+    """
+
+    def __init__(self, least: float = -math.inf, most: float = math.inf) -> None:
+        super().__init__()
+        self._signs = {least: "\N{LESS-THAN OR EQUAL TO} ", most: "\N{GREATER-THAN OR EQUAL TO} "}
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """Return the label of the tick at `x`, empty for one that has none."""
-        return f"{x:g}" if super().__call__(x, pos) else ""
+        return f"{self._signs.get(x, '')}{x:g}" if super().__call__(x, pos) else ""
 
 
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:

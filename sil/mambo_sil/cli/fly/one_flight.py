@@ -70,11 +70,11 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
             same_bits = trace.same_bits(simulate(flight, _controller(runner, settings, flight)))
         if settings.height is not None and runner.controller not in PD_TITLES:
             trace = trace.in_space()
-        write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         limited = None if runner.controller in PD_TITLES else Scenario()
         fields |= judge(trace, settings, drone, limited) | {"same_bits_as_host": same_bits}
         summary = FlySummary(**fields)
+        write_flight(trace, summary, settings, output, folder)
         summary.write(folder)
     finish(summary, flight_text(summary), output, written(output))
 
@@ -166,13 +166,12 @@ def written(output: Output) -> tuple[str, ...]:
     return TRACE_FILES if output.no_pictures else FLIGHT_FILES
 
 
-def write_flight(trace: Trace, runner: Runner, settings: Settings, output: Output, folder: Path) -> None:
+def write_flight(trace: Trace, summary: FlySummary, settings: Settings, output: Output, folder: Path) -> None:
     """Write the files of `written`."""
     write_trace(trace, folder)
     if not output.no_pictures:
-        title = PD_TITLES.get(runner.controller, f"NMPC, {echo(named_source(runner))}")
-        limit_m_s = 0.0 if runner.controller in PD_TITLES else settings.limits.speed_m_s
-        draw_flight(trace, title, folder, walls_m(settings), limit_m_s)
+        limit_m_s = 0.0 if summary.controller in PD_TITLES else settings.limits.speed_m_s
+        draw_flight(trace, summary.title, folder, walls_m(settings), limit_m_s)
 
 
 def write_trace(trace: Trace, folder: Path) -> None:

@@ -66,7 +66,6 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
             controller = (TimedController if runner.real_time else BoardController)(settings, board)
             with progress_bar("flying") as progress:
                 trace = simulate(flight, controller, progress)
-        write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         fields |= judge(trace, settings, drone, Scenario()) | board_fields(board, controller)
         fields |= {"baud": runner.baud or BAUD} | _emulated(settings, board.greeting.board)
@@ -79,6 +78,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
                 "same_bits_as_host": not (first_difference or controller.different) and same_digest,
             }
         )
+        write_flight(trace, summary, settings, output, folder)
         summary.write(folder)
     finish(summary, board_text(summary), output, written(output))
 

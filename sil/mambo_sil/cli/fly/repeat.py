@@ -12,7 +12,7 @@ from mambo_sil.flight.controllers.inner_steps import WatchedController, write_in
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import fenced, walls_m
-from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
+from mambo_sil.flight.flight_report import RepeatSummary, flight_text, flight_title, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, flight_of, read_record
@@ -43,7 +43,8 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
         if not output.no_pictures:
             limits = record.settings.limits
             walls = walls_m(record.settings, record.scenario.fence_m)
-            draw_flight(trace, file.name, folder, walls, limits.speed_m_s)
+            title = flight_title(file.name, record.scenario)
+            draw_flight(trace, title, folder, walls, limits.speed_m_s)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256

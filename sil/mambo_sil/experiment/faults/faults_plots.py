@@ -32,7 +32,7 @@ def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:
         errors.axvline(STRAY_M, color=QUIET, linewidth=THIN)
         errors.set(xscale="log", xlabel=f"largest error, m (line: {STRAY_M:g} m)", yticks=range(len(faults)))
         errors.set_xlim(left=_LEAST_M)
-        errors.xaxis.set_major_formatter(PlainLogFormatter())
+        errors.xaxis.set_major_formatter(PlainLogFormatter(_LEAST_M))
         errors.set_yticklabels(faults, parse_math=False)
         errors.set_ylim(len(faults) - 0.5, -0.5)
         figure.legend(loc="outside upper center", ncols=len(COURSES))

@@ -46,12 +46,13 @@ def _limits_figure(flights: Sequence[FlightResult]) -> Figure:
             [share for share, _ in dots],
             [row for _, row in dots],
             alpha=0.6,
+            clip_on=False,
             **look.dots,
             label=f"{label}: {len(dots)}",
         )
     axes.axvline(1.0, color=QUIET, linewidth=THIN)
     axes.set(xscale="log", xlim=_SHOWN, xlabel="metric over its limit", yticks=range(len(rows)))
-    axes.xaxis.set_major_formatter(PlainLogFormatter())
+    axes.xaxis.set_major_formatter(PlainLogFormatter(*_SHOWN))
     axes.set_yticklabels(rows, parse_math=False)
     axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
