@@ -17,15 +17,19 @@ from mkdocs.structure.pages import Page
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # where plain `mkdocs` has the folder of this file only
 
+from docs.pages.c_page import c_part
 from docs.pages.command_page import command_part
 from docs.pages.python_page import python_part
 from docs.pages.settings_page import controller_part, vehicle_part
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
 
 ROOT: Final = Path(__file__).parents[2]
 
 PARTS: Final = {
     "reference/settings.md": controller_part,
     "reference/vehicle-toml.md": vehicle_part,
+    "reference/c-api.md": c_part,
     "reference/command-line.md": command_part,
     "reference/python-api.md": python_part,
 }
@@ -95,7 +99,13 @@ def _typeset(formula: re.Match[str]) -> str:
 
 
 def on_post_build(config: MkDocsConfig) -> None:
-    """Write the playground that its page shows; raises PluginError if its commands refuse."""
+    """Write the C of the presets, and the playground that its page shows; raises PluginError."""
+    for name in presets.names():
+        files = render(presets.preset(name), with_digest=False)
+        place = Path(config.site_dir, "c", name)
+        place.mkdir(parents=True, exist_ok=True)
+        for file in ("nmpc.h", "nmpc.c"):
+            (place / file).write_text(files[file], "utf-8")
     if _has_compilers():
         with TemporaryDirectory() as folder:
             derived = f"{folder}/three-axes.toml"

@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from mambo_codegen.settings import presets
 from tests.support.tools import require, require_module
 
 ROOT = Path(__file__).parents[2]
+DECLARED = re.compile(r"^\w[^;{}/\n]*?\b(nmpc_\w+)\(", re.MULTILINE)
+"""A function of a header."""
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,22 @@ def test_it_has_the_pages_that_the_code_writes(site: Path) -> None:
     assert re.findall(r'<h2 id="([\w-]+)"', commands)[:4] == ["init", "doctor", "playground", "presets"]
     python = (site / "reference" / "python-api.html").read_text("utf-8")
     assert [name for name in names if f'.{name}"' not in python] == []
+
+
+@pytest.mark.long
+def test_the_functions_of_the_c_stand_on_their_page_and_in_its_source(site: Path) -> None:
+    """With the comments of the header; and the C of each preset can be read."""
+    page = (site / "reference" / "c-api.html").read_text("utf-8")
+    headers = [(site / "c" / name / "nmpc.h").read_text("utf-8") for name in presets.names()]
+    declared = {name for header in headers for name in DECLARED.findall(header)}
+    assert {"nmpc_step", "nmpc_set_limits", "nmpc_has_converged"} <= declared
+    source = (ROOT / "docs" / "reference" / "c-api.md").read_text("utf-8")
+    assert [name for name in declared if name not in page or f"`{name}`" not in source] == []
+    assert "Forget everything, and take level attitude for the last command." in page
+    assert "outside the manual" not in page
+    links = re.findall(r'href="\.\./(c/[^"]+)"', page)
+    assert len(links) == 2 * len(presets.names())
+    assert [link for link in links if not (site / link).is_file()] == []
 
 
 @pytest.mark.long
