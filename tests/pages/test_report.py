@@ -76,6 +76,7 @@ SEEN = {
     ),
     "diff": ("limits.tilt_rad", "vehicle mambo", "B: ", "105", "Tilt limit"),
     "fly --app": ("✗", "1 of 2 bounds BROKEN", "1.05", "&lt;= 0.25", "console: NMPC: &lt;img", "<svg role"),
+    "pilot": ("✗", "simulated autopilot PX4", "5.2 cm in the plane", "0.490; MPC_THR_HOVER says 0.500"),
     "tune": ("trial 3 of 4: 2.5 cm in the mean, the base 5 cm", "cost.response_time_s 0.1", "1 of 8"),
     "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --repeat", "IAE, m s"),
 }

@@ -50,6 +50,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace, write_npz
+from mambo_sil.link.pilot_report import PilotSummary
 from mambo_sil.model.identify.curves import Curves, curves_csv
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion
@@ -414,6 +415,32 @@ def tune_folder(folder: Path) -> None:
     ).write(folder)
 
 
+def pilot_folder(folder: Path) -> None:
+    """Write a flight over a link that the pilot's switch ended, without its log."""
+    PilotSummary(
+        source=HOSTILE,
+        settings="0123",
+        link="udp:127.0.0.1:14540",
+        autopilot="PX4",
+        simulated=True,
+        end=f"the mode is {HOSTILE}",
+        good=False,
+        trajectory="eight",
+        set_points=1000,
+        flown_s=10.0,
+        interval_s=(0.01, 0.011),
+        horizontal_rms_m=0.052,
+        vertical_rms_m=0.013,
+        command_rms_rad_s=0.2,
+        hover_parameter="MPC_THR_HOVER",
+        hover_thrust=0.5,
+        mean_thrust=0.49,
+        jumps=1,
+        pauses=0,
+        refused=0,
+    ).write(folder)
+
+
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "repeat": repeat_folder,
@@ -430,5 +457,6 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "diff": diff_folder,
     "fly --app": app_folder,
     "tune": tune_folder,
+    "pilot": pilot_folder,
 }
 """A folder of every command."""

@@ -1,13 +1,14 @@
 """The record of a flight over a link: how it ended, how near it stayed, what it learnt."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, Self
 
 import numpy as np
 
 from mambo_sil.link.life_cycle import LifeCycle
 from mambo_sil.link.steering import Update
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number, PageTable, ReportedSummary, Section, plain_section
 from mambo_sil.results.terminal import sentence, table
 
 LOG: Final = "flight.csv"
@@ -15,7 +16,7 @@ SETTLES_S: Final = 5.0
 """Time after the take-over from which on errors count."""
 
 
-class PilotSummary(Summary):
+class PilotSummary(ReportedSummary):
     """A flight over a link; errors are of the estimate, in m."""
 
     command = "pilot"
@@ -44,6 +45,17 @@ class PilotSummary(Summary):
     jumps: int
     pauses: int
     refused: int
+
+    def section(self, folder: Path, /) -> Section:
+        """Return the section of the report on this flight."""
+        drone = "a simulated" if self.simulated else "an"
+        return plain_section(
+            f"{self.source} over {self.link}, {drone} autopilot {self.autopilot or 'that was never heard'}",
+            self.good,
+            self.end,
+            [PageTable(("measure", "value"), _rows(self), {1})] if self.set_points else [],
+            missing=[] if (folder / LOG).is_file() else [LOG],
+        )
 
     @classmethod
     def of(cls, life: LifeCycle, updates: Sequence[Update], **named: object) -> Self:
@@ -99,18 +111,22 @@ def pilot_text(summary: PilotSummary) -> str:
     """Return the record in words."""
     lines = [sentence(summary.end)]
     if summary.set_points:
-        median_s, most_s = summary.interval_s
-        rms_cm = 100.0 * summary.horizontal_rms_m, 100.0 * summary.vertical_rms_m
-        rows = [
-            ("set-points", f"{summary.set_points} in {summary.flown_s:.1f} s"),
-            ("interval", f"{1e3 * median_s:.0f} ms, 95 % within {1e3 * most_s:.0f} ms"),
-            ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
-            ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
-            (
-                "thrust of hover",
-                f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",
-            ),
-            ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
-        ]
-        lines += ["", *table((), rows, (0, 1))]
+        lines += ["", *table((), _rows(summary), (0, 1))]
     return "\n".join(lines)
+
+
+def _rows(summary: PilotSummary) -> list[tuple[str, str]]:
+    """Return what is told of a flight, name and value."""
+    median_s, most_s = summary.interval_s
+    rms_cm = 100.0 * summary.horizontal_rms_m, 100.0 * summary.vertical_rms_m
+    return [
+        ("set-points", f"{summary.set_points} in {summary.flown_s:.1f} s"),
+        ("interval", f"{1e3 * median_s:.0f} ms, 95 % within {1e3 * most_s:.0f} ms"),
+        ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
+        ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
+        (
+            "thrust of hover",
+            f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",
+        ),
+        ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
+    ]

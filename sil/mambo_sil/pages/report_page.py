@@ -22,6 +22,7 @@ from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedSummary
 from mambo_sil.experiment.table2.table2 import Table2Summary
 from mambo_sil.flight.flight_report import FlySummary, RepeatSummary
+from mambo_sil.link.pilot_report import PilotSummary
 from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.replay.replay_report import LogReplaySummary
 from mambo_sil.model.tune.tuning_report import TuneSummary
@@ -48,6 +49,7 @@ RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     DiffSummary,
     DeskSummary,
     TuneSummary,
+    PilotSummary,
 )
 """The summaries that a result folder may have; its key "command" says which."""
 
