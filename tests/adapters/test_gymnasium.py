@@ -48,7 +48,7 @@ def test_a_policy_that_aims_at_the_curve_follows_it() -> None:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("vehicle", ["crazyflie", "crazyflie-l250"])
+@pytest.mark.parametrize("vehicle", ["crazyflie", "crazyflie-flown"])
 def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
     """By the thrust of the C, of a drone without [height] by an altitude loop, as where the policy tilts."""
     for action in ("target", "attitude"):

@@ -74,7 +74,7 @@ def states(worlds: int, drones: int) -> dict[str, Any]:
     "controller",
     [
         pytest.param(
-            lambda: Controller.from_vehicle("crazyflie-l250", 6, height="pid", age_s=0.0), id="loop"
+            lambda: Controller.from_vehicle("crazyflie-flown", 6, height="pid", age_s=0.0), id="loop"
         ),
         pytest.param(lambda: Controller.from_vehicle("crazyflie", 6, age_s=0.0), id="axis"),
     ],

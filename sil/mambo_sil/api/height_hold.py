@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.settings.model import Settings
+from mambo_sil.api.height_hint import HeightHint
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
@@ -17,7 +18,9 @@ class HeightHold:
 
     def __init__(self, name: AltitudeName, drone: VehicleFile, settings: Settings, n: int) -> None:
         self.n, self._drone, ranges = n, drone, settings.ranges
-        self._loop = AltitudeLoop(AltitudeLaw(name), drone, n, settings.horizon.update_period_s)
+        period_s = settings.horizon.update_period_s
+        self._loop = AltitudeLoop(AltitudeLaw(name), drone, n, period_s)
+        self._hint = None if name == "pid" else HeightHint(drone, n, period_s)
         self._bounds = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
         self._thrust_m_s2 = np.empty(n)
         self.reset(np.ones(n, np.bool_))
@@ -30,7 +33,12 @@ class HeightHold:
         )
 
     def step(self, state: DroneState, target: TargetState) -> FloatArray:
-        """Return the thrust over mass (n,), in the range that the controller accepts; both records have z."""
+        """Return the thrust over mass (n,), in the range that the controller accepts; both records have z.
+
+        Warns once of a drone that rests beside its target, if the loop has no integral.
+        """
+        if self._hint is not None:
+            self._hint.watch(state, target)
         position, velocity, euler = (
             values.reshape(self.n, 3).T
             for values in (state.position_m, state.velocity_m_s, state.attitude_rad)

@@ -197,6 +197,7 @@ def design(
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.model.derive.derived_settings import controller_text
+    from mambo_sil.model.derive.missing_height import missing_height
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
@@ -206,6 +207,8 @@ def design(
     if write_file(text, output, force=force):
         name = echo(str(output))
         typer.echo(f"wrote {name}; next: mambo-nmpc fly {name}", err=True)
+    if settings.height is None:
+        typer.echo(sentence(missing_height(drone)), err=True)
     if not _print_judgement(settings, drone):
         raise typer.Exit(1)
 
