@@ -3,6 +3,7 @@
 import copy
 import pickle
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,17 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     )
 
 
+def test_another_update_period_changes_the_delay_of_the_thrust() -> None:
+    """By half as much: a command holds for a period."""
+    quick = Controller.from_vehicle("crazyflie", update_period_s=1.0 / 120.0)
+    assert quick.update_period_s == 1.0 / 120.0
+    assert DERIVED.height is not None
+    assert quick.settings.height is not None
+    assert DERIVED.height.delay_s - quick.settings.height.delay_s == pytest.approx((0.01 - 1.0 / 120.0) / 2.0)
+    flat = Controller.from_preset("crazyflie", update_period_s=0.02)
+    assert flat.settings == with_option(presets.load("crazyflie"), "horizon.update_period_s", 0.02)
+
+
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("options", "message"),
@@ -117,6 +129,8 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
         ({"descent_m_s": 20.0}, r"descent_m_s = 20\.0 must"),
         ({"ceiling_m": True}, "ceiling_m = True must be no truth value"),
         ({"height": "firm"}, 'height = "firm" must be "stock" or "feedforward" or "pid"'),
+        ({"update_period_s": 0.0}, r"update_period_s = 0\.0 must lie in"),
+        ({"update_period_s": "slow"}, 'update_period_s = "slow" must be a number'),
         ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "acceleration"'),
     ],
 )
@@ -147,7 +161,7 @@ def test_what_does_not_fit_together_is_refused() -> None:
             Controller.from_preset("crazyflie", **{name: value})
     with pytest.raises(ArgumentError, match="height = 'pid' must have a vehicle beside it"):
         Controller.from_preset("crazyflie", height="pid")
-    with pytest.raises(ArgumentError, match=r"vehicle = 3 must be the path of a vehicle\.toml, or one of cr"):
+    with pytest.raises(ArgumentError, match=r"vehicle = 3 must be the path of a vehicle\.toml, or one of c"):
         Controller.from_vehicle(3)  # type: ignore[arg-type]
     with pytest.raises(ArgumentError, match=r"attitude_thrust needs settings with \[height\]"):
         Controller.from_preset("crazyflie").step(aloft(), goal()).attitude_thrust("NED")
@@ -304,17 +318,23 @@ def test_no_number_leaves_thrust_and_heading_as_they_are() -> None:
 
 
 def test_a_wrong_mass_leaves_no_error_of_height_with_pid() -> None:
-    """On a point mass of 1.2 times the weight, which the stock loop lets sag."""
+    """On a point mass of 1.2 times the weight, which the stock loop lets sag, with a warning that says so."""
     left = {}
-    names: tuple[AltitudeName, ...] = ("stock", "pid")
-    for name in names:
+    names: tuple[tuple[AltitudeName, AbstractContextManager[object]], ...] = (
+        ("stock", pytest.warns(UserWarning, match="131 mm below its target: it has 20 % less thrust")),
+        ("pid", nullcontext()),
+    )
+    for name, said in names:
         pilot = stock(name)
         z, climb = 1.0, 0.0
-        for _ in range(700):
-            state = DroneState.in_frame("NWU", [0.0, 0.0, z], [0.0, 0.0, climb], [0.0, 0.0, 0.0])
-            thrust = pilot.step(state, TargetState.in_frame("NWU", [0.0, 0.0, 1.0], [0.0] * 3)).thrust_m_s2
-            climb += 0.01 * (float(thrust or 0.0) / 1.2 - GRAVITY_M_S2)
-            z += 0.01 * climb
+        with said:
+            for _ in range(700):
+                state = DroneState.in_frame("NWU", [0.0, 0.0, z], [0.0, 0.0, climb], [0.0, 0.0, 0.0])
+                thrust = pilot.step(
+                    state, TargetState.in_frame("NWU", [0.0, 0.0, 1.0], [0.0] * 3)
+                ).thrust_m_s2
+                climb += 0.01 * (float(thrust or 0.0) / 1.2 - GRAVITY_M_S2)
+                z += 0.01 * climb
         left[name] = abs(z - 1.0)
     assert left["stock"] > 0.1
     assert left["pid"] < 0.01

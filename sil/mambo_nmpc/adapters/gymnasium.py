@@ -54,8 +54,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         require_number("reach_m", reach_m, 0.1, LOST_M)
         require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
         self._action, self._curve = action, curve(trajectory, size_m, rate_rad_s)
-        given: ControllerOptions = {"age_s": 0.0, **options}
-        self._controller = Controller.from_vehicle(vehicle, **given)
+        self._controller = Controller.from_vehicle(vehicle, sensors="true", **options)
         self._drone = SimulatedDrone(vehicle_toml.load(vehicle), self._controller.update_period_s)
         self._limits = self._controller.settings.limits
         self._scale = self._limits.tilt_rad if action == "attitude" else reach_m

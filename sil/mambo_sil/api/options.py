@@ -33,6 +33,9 @@ class ControllerOptions(TypedDict, total=False):
     """Largest speed upwards (`height.climb_m_s`), with `[height]`."""
     descent_m_s: float
     """Largest speed downwards (`height.descent_m_s`), with `[height]`."""
+    update_period_s: float
+    """Time from one step to the next (`horizon.update_period_s`), 1 / 120 in a world of 240 Hz, say; with
+    `[height]` the delay of the thrust changes by half as much."""
     height: AltitudeName
     """The altitude loop that commands the thrust where the settings have no `[height]`: "stock",
     "feedforward" or "pid"."""
@@ -48,8 +51,11 @@ KEYS: Final = {
     "ceiling_m": "limits.fence.ceiling_m",
     "climb_m_s": "height.climb_m_s",
     "descent_m_s": "height.descent_m_s",
+    "update_period_s": "horizon.update_period_s",
 }
 """Keys of a controller.toml by the name of the argument."""
+LONGEST_THRUST_DELAY_S: Final = 0.1
+"""Bound of `height.delay_s`."""
 WALLS: Final = tuple(f"limits.fence.{wall}" for wall in ("x_min_m", "x_max_m", "y_min_m", "y_max_m"))
 
 
@@ -73,6 +79,8 @@ def with_options(settings: Settings, options: ControllerOptions) -> Settings:
         return settings
     if "tilt_rad" in options and "braking_m_s2" not in options:
         values[KEYS["braking_m_s2"]] = _braking(settings, options["tilt_rad"])
+    if "update_period_s" in options and settings.height is not None:
+        values["height.delay_s"] = _thrust_delay_s(settings, options["update_period_s"])
     document: dict[str, Any] = settings.model_dump()
     for key, value in values.items():
         document = controller_toml.with_value(document, key, value)
@@ -88,6 +96,15 @@ def _braking(settings: Settings, tilt_rad: object) -> float:
     if not isinstance(tilt_rad, int | float) or not 0.0 < tilt_rad < limits.tilt_rad:
         return limits.braking_m_s2
     return limits.braking_m_s2 * tilt_rad / limits.tilt_rad
+
+
+def _thrust_delay_s(settings: Settings, period_s: object) -> float:
+    """Return the delay of the thrust with another update period, half of which it holds."""
+    assert settings.height is not None
+    if not isinstance(period_s, int | float):
+        return settings.height.delay_s  # the wrong period is reported
+    longer_s = period_s - settings.horizon.update_period_s
+    return min(max(settings.height.delay_s + longer_s / 2.0, 0.0), LONGEST_THRUST_DELAY_S)
 
 
 def _in_arguments(text: str) -> str:

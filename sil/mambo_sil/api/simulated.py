@@ -3,6 +3,7 @@
 import numpy as np
 
 from mambo_sil.api.states import DroneState
+from mambo_sil.arguments import require
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
@@ -22,7 +23,10 @@ class SimulatedDrone:
 
     def __init__(self, drone: VehicleFile, update_period_s: float) -> None:
         self.drone, self._vehicle = drone, Vehicle.of(drone)
-        self._ticks = round(update_period_s / drone.step_s)
+        ticks = update_period_s / drone.step_s
+        whole = round(ticks) >= 1 and abs(ticks - round(ticks)) < 1e-6
+        require(whole, "update_period_s", update_period_s, f"be a multiple of {drone.step_s:g}, a tick")
+        self._ticks = round(ticks)
         self.place(np.array([0.0, 0.0, -1.0]))
 
     def place(self, position_m: FloatArray) -> None:
