@@ -12,6 +12,11 @@ from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.results.number_format import three_digits
 
 PRESETS: Final = ("mambo", "crazyflie")
+DRONES: Final = (
+    *("crazyflie", "crazyflie-brushless", "crazyflie-flown", "crazyflie-l250"),
+    *("generic", "mambo"),
+)
+"""Drones that are real, and `generic`; not those that only a simulator has."""
 _KEYS: Final = ("gain_up", "gain_down", "phase_deg", "delay_s", "sensitivity")
 _ALIKE: Final = 5e-3
 """Axes whose figures differ by a smaller share are one row."""
@@ -20,7 +25,7 @@ _ALIKE: Final = 5e-3
 def _cases() -> list[tuple[str, str, str]]:
     """Return preset, drone and sensors of each command: the true state, and the sensors of a campaign."""
     found: list[tuple[str, str, str]] = []
-    for drone in vehicle_toml.names():
+    for drone in DRONES:
         sensors = SENSORS_OF[vehicle_toml.preset(drone).sensors.kind][-1]
         found += [(preset, drone, seen) for preset in PRESETS for seen in dict.fromkeys(("true", sensors))]
     return found
