@@ -304,7 +304,7 @@ ITEMS: Final = (
     Item(
         name="adapters",
         commands=(f"python -m benchmarks.simulators.adapters {RESULTS}/adapters/flights",),
-        controllers=("design crazyflie", "design crazyflie-l250"),
+        controllers=("design crazyflie --sensors true", "design crazyflie-l250 --sensors true"),
         paths=(
             *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
             *("benchmarks/simulators/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),

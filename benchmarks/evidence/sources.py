@@ -37,10 +37,11 @@ def plain_c(source: str) -> str:
 
 
 def _settings(source: str) -> Settings:
-    """Return the settings of a preset, a file, or `design DRONE`."""
+    """Return the settings of a preset, a file, or `design DRONE [--sensors KIND]`."""
     if source.startswith(_DESIGN):
-        drone = source.removeprefix(_DESIGN)
-        return parse(controller_text(vehicle_toml.load(drone), drone), source)
+        name, _, sensors = source.removeprefix(_DESIGN).partition(" --sensors ")
+        drone = vehicle_toml.load(name)
+        return parse(controller_text(drone.with_sensors(sensors) if sensors else drone, name), source)
     return presets.load(source if source in presets.names() else str(ROOT / source))
 
 
@@ -48,7 +49,7 @@ def _settings(source: str) -> Settings:
 def generated(controller: str) -> str:
     """Return update period and C of settings, without their names.
 
-    `controller` is a preset, a file, or `design DRONE`, with or without `--scalar TYPE`.
+    `controller` is a preset, a file, or `design DRONE [--sensors KIND]`, with or without `--scalar TYPE`.
     """
     source, _, scalar = controller.partition(" --scalar ")
     settings = _settings(source)

@@ -33,7 +33,7 @@ Path3d = tuple[FloatArray, FloatArray, FloatArray]
 def in_crazyflow() -> Path3d:
     """Fly a circle from the ground."""
     sim = Sim(n_worlds=4, n_drones=1, drone="cf2x_L250")
-    controller = Controller.from_vehicle("crazyflie-l250", n=4, height="feedforward", age_s=0.0)
+    controller = Controller.from_vehicle("crazyflie-l250", n=4, sensors="true")
     curve = Circle(1.0, 1.5)
     attach(sim, controller, curve, height_m=1.0)
     times_s, places = np.asarray(STEP_S * np.arange(1000), np.float64), []
@@ -45,7 +45,7 @@ def in_crazyflow() -> Path3d:
 
 def in_rotorpy() -> Path3d:
     """Fly RotorPy's circle from the ground."""
-    controller = Controller.from_vehicle("crazyflie", age_s=0.0)
+    controller = Controller.from_vehicle("crazyflie", sensors="true")
     flight = Environment(
         Multirotor(quad_params, control_abstraction="cmd_ctatt"),
         RotorpyController(controller, quad_params["mass"]),

@@ -1,8 +1,9 @@
 """What adapters give to simulators that CI does not install, and what is said where one is missing.
 
-crazyflow (JAX is large) and gym-pybullet-drones (not on PyPI) have stand-ins with the names and signatures of
-crazyflow 0.4.0 and of gym-pybullet-drones' DSLPIDControl. Checked are what the adapter reads, the shapes,
-frames and units of what it returns, and that it refuses what does not fit; how the simulators behave is not.
+crazyflow (JAX is large), gym-pybullet-drones (not on PyPI) and PyFlyt (wants NumPy 1) have stand-ins with the
+names and signatures of crazyflow 0.4.0, of gym-pybullet-drones' DSLPIDControl and of PyFlyt's QuadX. Checked
+are what the adapter reads, the shapes, frames and units of what it returns, and that it refuses what does not
+fit; the simulators themselves are flown in `benchmarks/simulators`.
 """
 
 import importlib
@@ -19,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from mambo_nmpc import ArgumentError, Controller, MamboNmpcError
 from mambo_nmpc.adapters.crazyflow import CrazyflowPilot, attach
 from mambo_nmpc.adapters.gym_pybullet_drones import pybullet_control
+from mambo_nmpc.adapters.pyflyt import pyflyt_controller
 from mambo_nmpc.curves import curve
 
 MASS_KG: Final = 0.0328
@@ -31,24 +33,21 @@ def test_adapters_import_no_simulator() -> None:
     """But that for Gymnasium, whose class of environments is one of its own."""
     script = (
         "import sys, mambo_nmpc.adapters.crazyflow, mambo_nmpc.adapters.rotorpy, "
-        "mambo_nmpc.adapters.gym_pybullet_drones; print(*sys.modules)"
+        "mambo_nmpc.adapters.gym_pybullet_drones, mambo_nmpc.adapters.pyflyt; print(*sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    found = {"jax", "crazyflow", "rotorpy", "gymnasium", "gym_pybullet_drones"} & set(done.stdout.split())
+    simulators = {"jax", "crazyflow", "rotorpy", "gymnasium", "gym_pybullet_drones", "PyFlyt"}
+    found = simulators & set(done.stdout.split())
     assert not found
 
 
 def test_a_missing_package_is_named_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
     """By an error that is an ImportError, and one of ours."""
-    for name in ("jax", "gymnasium", "gym_pybullet_drones"):
+    for name in ("gymnasium", "gym_pybullet_drones"):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delitem(sys.modules, "mambo_nmpc.adapters.gymnasium", raising=False)
     controller = Controller.from_vehicle("crazyflie")
     for call, command in (
-        (
-            lambda: attach(simulation(1, 1), controller, curve("hover")),
-            "pip install crazyflow jax jaxlib",
-        ),
         (lambda: pybullet_control("cf2x", controller), r"pip install git\+https://github.com/utiasDSL/gym"),
         (lambda: importlib.import_module("mambo_nmpc.adapters.gymnasium"), "pip install gymnasium"),
     ):
@@ -114,6 +113,69 @@ def test_a_crazyflow_simulation_that_does_not_fit_is_refused() -> None:
         CrazyflowPilot(simulation(2, 2), controller, curve("hover"), height_m=1.0, yaw_rad=0.0)
     with pytest.raises(ArgumentError, match=r"sim\.freq = 250 must be a multiple of 100 Hz"):
         CrazyflowPilot(simulation(1, 2, 250), controller, curve("hover"), height_m=1.0, yaw_rad=0.0)
+
+
+class Simulation:
+    """The parts of a `crazyflow.sim.Sim` that `attach` uses: each step counts, and records the command."""
+
+    n_worlds, n_drones, freq = 2, 1, 500
+
+    def __init__(self) -> None:
+        params = SimpleNamespace(mass=np.array([MASS_KG]))
+        names = {"position": "pos", "quaternion": "quat", "velocity": "vel"}
+        seen = SimpleNamespace(**{names[name]: part for name, part in states(2, 1).items()})
+        core = SimpleNamespace(steps=np.zeros((2, 1), np.int32))
+        self.data = SimpleNamespace(params=params, states=seen, core=core)
+        self.log: list[Any] = []
+
+    def attitude_control(self, command: Any) -> None:
+        """Record a command."""
+        self.log.append(command)
+
+    def step(self, n_steps: int = 1) -> None:
+        """Count steps."""
+        self.log.append(n_steps)
+        self.data.core.steps = self.data.core.steps + n_steps
+
+
+def test_attached_drones_are_commanded_when_it_is_due() -> None:
+    """Every five steps of 500 Hz, however the simulation is stepped, by what `measure` returns."""
+    sim, asked = Simulation(), []
+
+    def measure(position: Any, quaternion: Any, velocity: Any) -> tuple[Any, Any, Any]:
+        asked.append(position)
+        left_of_it = position + np.array([0.0, 0.6, 0.0], np.float32)
+        return left_of_it, quaternion, velocity
+
+    attach(sim, Controller.from_vehicle("crazyflie", 2, sensors="true"), curve("hover"), measure=measure)
+    sim.step(7)
+    sim.step(3)
+    sim.step()
+    assert [each for each in sim.log if isinstance(each, int)] == [5, 2, 3, 1]
+    commands = [each for each in sim.log if not isinstance(each, int)]
+    assert len(commands) == len(asked) == 3
+    assert (commands[0][..., 0] > 0.0).all()  # rolls to the right
+
+
+def test_drones_have_headings_masses_and_curves_of_their_own() -> None:
+    """The heading and the mass may change in flight; a world's second drone has its own curve."""
+    controller = Controller.from_vehicle("crazyflie", 4, sensors="true")
+    curves = [curve("hover"), curve("step", -3.0)]
+    headings = np.array([[0.2, 0.0], [0.0, -0.2]])
+    pilot = CrazyflowPilot(simulation(2, 2), controller, curves, yaw_rad=headings)
+    steps = np.full((2, 1), 3000)
+    first = pilot.command(steps, **states(2, 2))
+    np.testing.assert_allclose(first[..., 2], [[0.04, 0.0], [0.0, -0.04]], atol=1e-6)
+    assert (first[:, 1, 1] < -0.1).all()  # nose up, towards a target behind
+    assert (np.abs(first[:, 0, 1]) < 0.01).all()
+    pilot.mass_kg = np.array([[MASS_KG, 2.0 * MASS_KG], [MASS_KG, MASS_KG]])
+    pilot.yaw_rad = 0.1
+    controller.reset()
+    then = pilot.command(steps, **states(2, 2))
+    np.testing.assert_allclose(then[..., 3] / first[..., 3], [[1.0, 2.0], [1.0, 1.0]], rtol=1e-6)
+    np.testing.assert_allclose(then[..., 2], 0.04, rtol=1e-6)
+    with pytest.raises(ArgumentError, match="trajectory: has 3 curves; a world has 2 drones"):
+        CrazyflowPilot(simulation(2, 2), controller, [curve("hover")] * 3)
 
 
 class DSLPIDControl:
@@ -193,3 +255,54 @@ def test_a_base_control_refuses_what_does_not_fit() -> None:
         control.computeControl(0.02, here, LEVEL, rest, here)
     with pytest.raises(ArgumentError, match="controller: was made for 2 drones; a BaseControl flies one"):
         pybullet_control("cf2x", Controller.from_vehicle("crazyflie", 2))
+
+
+def quad_x(control_hz: int = 120, touching: bool = False) -> Any:
+    """Return what the adapter reads of PyFlyt's `QuadX` of 27 g and 2 N."""
+    bodies = SimpleNamespace(
+        getDynamicsInfo=lambda _, __: (0.027,), getContactPoints=lambda _: ((1,),) if touching else ()
+    )
+    motors = SimpleNamespace(thrust_coef=np.full((4, 1), 3.16e-10), max_rpm=np.full(4, 39778.0))
+    return SimpleNamespace(Id=1, control_period=1.0 / control_hz, p=bodies, motors=motors)
+
+
+def test_a_quadx_gets_rates_and_a_throttle() -> None:
+    """Towards the target, from a velocity in the body; the thrust goes with the square of the throttle."""
+    law = pyflyt_controller(quad_x(), Controller.from_vehicle("cf2x-pyflyt", sensors="true"))()
+    yaw_rad = 0.5 * np.pi
+    at_rest = np.array([[0.0] * 3, [0.0, 0.0, yaw_rad], [0.0] * 3, [0.0, 0.0, 1.0]])
+    hover = np.array([0.0, 0.0, yaw_rad, 1.0])
+    calm = law.step(at_rest, hover)
+    np.testing.assert_allclose(calm[:3], 0.0, atol=1e-6)
+    assert 2.0 * calm[3] ** 2 == pytest.approx(0.027 * 9.81 / 1.47, rel=1e-3)  # of vehicle cf2x-pyflyt
+    law.reset()
+    left = law.step(at_rest, np.array([-1.0, 0.0, yaw_rad, 1.0]))  # to its left, as it looks along y
+    assert left[0] < -1.0
+    assert abs(left[1]) < 0.01
+    law.reset()
+    follows = law.step(at_rest, np.array([*hover, 0.0, 1.0, 0.0]))  # the target goes ahead
+    assert follows[1] > 0.5  # nose down
+    law.reset()
+    moving = at_rest.copy()
+    moving[2] = 1.0, 0.0, 0.0  # ahead in the body, which is y of the world
+    roll_rad_s, pitch_rad_s, *_ = law.step(moving, np.array([*hover, 0.0, 1.0, 0.0]))
+    assert abs(roll_rad_s) < 1e-6
+    assert 0.0 < pitch_rad_s < 0.1  # against the drag
+
+
+@pytest.mark.parametrize(("touching", "idle"), [(True, True), (False, False)])
+def test_a_quadx_on_the_floor_idles(touching: bool, idle: bool) -> None:
+    """By the contacts that PyBullet reports."""
+    law = pyflyt_controller(quad_x(touching=touching), Controller.from_vehicle("cf2x-pyflyt"))()
+    state = np.array([[0.0] * 3] * 3 + [[0.0, 0.0, 0.01]])
+    assert (2.0 * law.step(state, np.array([0.0, 0.0, 0.0, 0.01]))[3] ** 2 < 0.1) == idle
+
+
+def test_a_quadx_that_does_not_fit_is_refused() -> None:
+    """Another frequency, with the option that helps; several drones."""
+    rule = r"control_period = 0\.01 must be 0\.00833333, .*: make it with update_period_s=0\.01"
+    with pytest.raises(ArgumentError, match=rule):
+        pyflyt_controller(quad_x(100), Controller.from_vehicle("cf2x-pyflyt"))
+    pyflyt_controller(quad_x(100), Controller.from_vehicle("cf2x-pyflyt", update_period_s=0.01))
+    with pytest.raises(ArgumentError, match="was made for 2 drones; a ControlClass flies one"):
+        pyflyt_controller(quad_x(), Controller.from_vehicle("cf2x-pyflyt", 2))

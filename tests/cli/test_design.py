@@ -32,7 +32,9 @@ def test_it_writes_a_file_that_flies() -> None:
     wrote, *height, flown, roll, pitch = said.splitlines()
     assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml"
     height_text = unwrapped("\n".join(height))
-    assert height_text.startswith("height: not in the settings, since the thrust is not known; by its altitude")
+    assert height_text.startswith(
+        "height: not in the settings, since the thrust is not known; by its altitude"
+    )
     assert flown == "flown for 10 s: stays at its target (true state)"
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")

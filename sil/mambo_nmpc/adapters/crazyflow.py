@@ -1,28 +1,44 @@
 """crazyflow: the generated C flies all drones of a simulation, which has attitude control.
 
-`attach` puts it into the compiled step of the simulation, before the attitude controller.
+`attach` lets it command the drones whenever the simulation steps.
 """
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.adapters import packages
 from mambo_nmpc.adapters.contact import touches_floor
 from mambo_nmpc.curves import Trajectory, sample
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import attitude_of_quaternion
+from mambo_sil.api.frames import attitude_of_quaternion, yaw_to_ned
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import require
 from mambo_sil.errors import ArgumentError
 
+States = tuple[Any, Any, Any]
+"""Positions (worlds, drones, 3), quaternions (worlds, drones, 4) and velocities, as in `sim.data.states`."""
+
 
 class CrazyflowPilot:
-    """Controllers for the drones of a simulation, which follow a curve; each starts afresh with its world."""
+    """Controllers for the drones of a simulation, which follow curves; each starts afresh with its world.
+
+    trajectory: one curve for all drones, or one for each drone of a world.
+    height_m:   height of curves that have none.
+    yaw_rad:    heading of the targets, one for all or (worlds, drones); may be changed between commands.
+
+    `mass_kg`, which may be changed too, scales the thrust: at first the masses of the simulation.
+    """
 
     def __init__(
-        self, sim: Any, controller: Controller, trajectory: Trajectory, *, height_m: float, yaw_rad: float
+        self,
+        sim: Any,
+        controller: Controller,
+        trajectory: Trajectory | Sequence[Trajectory],
+        *,
+        height_m: float = 1.0,
+        yaw_rad: ArrayLike = 0.0,
     ) -> None:
         drones, ticks = sim.n_worlds * sim.n_drones, sim.freq * controller.update_period_s
         if controller.n != drones:
@@ -33,9 +49,14 @@ class CrazyflowPilot:
         require(whole, "sim.freq", sim.freq, f"be a multiple of {1.0 / controller.update_period_s:g} Hz")
         self.ticks = round(ticks)
         """Steps of the simulation from one command to the next."""
-        self._controller, self._trajectory = controller, trajectory
-        self._height_m, self._yaw_rad, self._freq_hz = height_m, yaw_rad, sim.freq
-        self._mass_kg = float(np.ravel(np.asarray(sim.data.params.mass))[0])
+        curves = trajectory if isinstance(trajectory, Sequence) else [trajectory]
+        if len(curves) not in (1, sim.n_drones):
+            raise ArgumentError(f"trajectory: has {len(curves)} curves; a world has {sim.n_drones} drones")
+        self._batch = sim.n_worlds, sim.n_drones
+        self._controller, self._curves, self._freq_hz = controller, curves, sim.freq
+        self._height_m, self.yaw_rad = height_m, yaw_rad
+        mass_kg = np.asarray(sim.data.params.mass, np.float64)
+        self.mass_kg: ArrayLike = mass_kg.reshape(mass_kg.shape[:2] if mass_kg.size > 1 else ())
 
     def command(self, steps: Any, position: Any, quaternion: Any, velocity: Any) -> NDArray[np.float32]:
         """Return roll, pitch, yaw in rad and thrust in N (worlds, drones, 4), for `Sim.attitude_control`.
@@ -43,45 +64,65 @@ class CrazyflowPilot:
         steps:                          of each world since its reset (worlds, 1), `sim.data.core.steps`.
         position, quaternion, velocity: (worlds, drones, 3 or 4), as in `sim.data.states`.
         """
-        batch = np.shape(position)[:2]
-        step = np.asarray(steps).reshape(batch[0], 1)
-        begun = np.broadcast_to(step < self.ticks, batch)
+        step = np.asarray(steps).reshape(self._batch[0])
+        begun = step < self.ticks
         if begun.any():
-            self._controller.reset(which=begun)
-        now = sample(self._trajectory, step / self._freq_hz, "NWU", height_m=self._height_m)
-        position_m, velocity_m_s, acceleration_m_s2 = (np.broadcast_to(part, (*batch, 3)) for part in now)
-        goal = TargetState.in_frame("NWU", position_m, velocity_m_s, acceleration_m_s2, self._yaw_rad)
+            self._controller.reset(which=np.broadcast_to(begun[:, np.newaxis], self._batch))
         seen = np.asarray(position), np.asarray(velocity), attitude_of_quaternion(np.asarray(quaternion))
         state = DroneState.in_frame("NWU", *seen, touches_floor(*seen[:2]))
-        outcome = self._controller.step(state, goal)
-        return outcome.attitude_thrust("NWU", mass_kg=self._mass_kg).astype(np.float32)
+        outcome = self._controller.step(state, self._target(step))
+        command = outcome.attitude_thrust("NWU")
+        command[..., 3] *= np.asarray(self.mass_kg, np.float64)
+        return command.astype(np.float32)
+
+    def _target(self, step: NDArray[Any]) -> TargetState:
+        """Return where the drones shall be after steps (worlds,)."""
+        ages = step[:1] if (step == step[0]).all() else step  # worlds of one age: sampled once
+        times_s = ages[:, np.newaxis] / self._freq_hz
+        points = [sample(curve, times_s, height_m=self._height_m) for curve in self._curves]
+        position_m, velocity_m_s, acceleration_m_s2 = (
+            np.broadcast_to(np.concatenate(part, axis=1), (*self._batch, 3))
+            for part in zip(*points, strict=True)
+        )
+        yaw_rad = np.broadcast_to(yaw_to_ned("NWU", self.yaw_rad), self._batch)
+        return TargetState(position_m, velocity_m_s, acceleration_m_s2, yaw_rad)
 
 
 def attach(
-    sim: Any, controller: Controller, trajectory: Trajectory, *, height_m: float = 1.0, yaw_rad: float = 0.0
-) -> None:
-    """Let a controller, made with `height`, fly all drones of a simulation along a curve from now on.
+    sim: Any,
+    controller: Controller,
+    trajectory: Trajectory | Sequence[Trajectory],
+    *,
+    height_m: float = 1.0,
+    yaw_rad: ArrayLike = 0.0,
+    measure: Callable[[Any, Any, Any], States] | None = None,
+) -> CrazyflowPilot:
+    """Let a controller that commands the thrust fly all drones of a simulation along curves from now on.
 
-    The simulation has attitude control, a frequency that is a multiple of the controller's, and one step of
-    all worlds at a time. Raises ArgumentError if they do not fit, PackageError without JAX.
+    trajectory, yaw_rad: as for `CrazyflowPilot`, which is returned: there a heading is changed in flight.
+    measure:             returns what the drones measure of positions, quaternions and velocities, arrays as
+                         in `sim.data.states`, at every command; without it they know them.
+
+    The simulation has attitude control and a frequency that is a multiple of the controller's. Its `step`
+    then commands the drones before the steps in which that is due, by the age of the first world. Raises
+    ArgumentError if they do not fit.
     """
-    jax = packages.load("jax", "pip install crazyflow jax jaxlib")
-    callbacks = packages.load("jax.experimental", "pip install crazyflow jax jaxlib")
     pilot = CrazyflowPilot(sim, controller, trajectory, height_m=height_m, yaw_rad=yaw_rad)
-    staged = sim.data.controls.attitude.staged_cmd
-    shape = jax.ShapeDtypeStruct(staged.shape, np.float32)
+    advance = type(sim).step
 
-    def fly(data: Any) -> Any:
-        seen = data.core.steps, data.states.pos, data.states.quat, data.states.vel
-        attitude = data.controls.attitude
-        command = jax.lax.cond(
-            data.core.steps[0, 0] % pilot.ticks == 0,
-            lambda: callbacks.io_callback(pilot.command, shape, *seen).astype(staged.dtype),
-            lambda: attitude.staged_cmd,
-        )
-        controls = data.controls.replace(attitude=attitude.replace(staged_cmd=command))
-        return data.replace(controls=controls)
+    def step(n_steps: int = 1) -> None:
+        """Simulate all drones in all worlds for n time steps, and command them."""
+        while n_steps > 0:
+            steps = np.asarray(sim.data.core.steps)
+            past = int(steps[0, 0]) % pilot.ticks
+            if past == 0:
+                seen = sim.data.states.pos, sim.data.states.quat, sim.data.states.vel
+                if measure is not None:
+                    seen = measure(*map(np.asarray, seen))
+                sim.attitude_control(pilot.command(steps, *seen))
+            count = min(n_steps, pilot.ticks - past)
+            advance(sim, count)
+            n_steps -= count
 
-    sim.step_pipeline["mambo_nmpc"] = fly
-    sim.step_pipeline.move_to_end("mambo_nmpc", last=False)
-    sim.build_step_fn()
+    sim.step = step
+    return pilot

@@ -50,7 +50,8 @@ def pybullet_control(drone_model: Any, controller: Controller) -> Any:
             """Return thrust (PWM), attitude (intrinsic X-Y-Z, rad) and position error (m)."""
             if abs(control_timestep - controller.update_period_s) > 1e-6:
                 rule = f"be {controller.update_period_s:g}, the update period of the controller"
-                raise ArgumentError(f"control_timestep = {control_timestep!r} must {rule}")
+                fix = f"make it with update_period_s={control_timestep!r}"
+                raise ArgumentError(f"control_timestep = {control_timestep!r} must {rule}: {fix}")
             length_m, offset_m = map(self._getURDFParameter, ("length", "collision_z_offset"))
             contact = touches_floor(cur_pos, cur_vel, length_m / 2.0 - offset_m)
             state = DroneState.in_frame("NWU", cur_pos, cur_vel, attitude_of_quaternion(cur_quat), contact)
