@@ -1,8 +1,8 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
 Not in the list are figures that take longer, and those that need another machine or package. `simulators` and
-`adapters` need crazyflow and RotorPy; any value of the environment variable SIMULATORS says that they are
-installed.
+`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` needs PyFlyt, which wants NumPy 1. Any
+value of the environment variables SIMULATORS and PYFLYT says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,15 +37,13 @@ from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause,
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
-from benchmarks.evidence.simulator_pictures import draw_simulators
+from benchmarks.evidence.simulator_pictures import DRAWN, draw_simulators
 from benchmarks.evidence.simulator_tables import (
     SIMULATORS,
-    aims,
+    every_controller,
+    read_pyflyt,
     read_simulators,
     summary,
-    through_noise,
-    unrest,
-    with_truth,
 )
 from benchmarks.evidence.tables import (
     CONTROLLERS,
@@ -320,26 +318,29 @@ ITEMS: Final = (
         commands=tuple(
             f"python -m benchmarks.simulators {name} {RESULTS}/simulators/{name}" for name in SIMULATORS
         ),
-        controllers=("crazyflie", *(f"design crazyflie{kind}" for kind in ("", "-l250", "-brushless"))),
+        controllers=(
+            "crazyflie",
+            *(f"design crazyflie{kind}" for kind in ("", "-l250", "-brushless")),
+            *("design hummingbird", "design x500"),
+        ),
         paths=(
-            *(
-                "sil/mambo_sil/api",
-                "sil/mambo_sil/flight/altitude_loops.py",
-                "sil/mambo_sil/flight/controllers",
-            ),
+            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
             *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
             *("benchmarks/simulators", f"{_HERE}/simulator_pictures.py", _STYLE),
         ),
         read=read_simulators,
-        tables={
-            "simulators-noise": through_noise,
-            "simulators-truth": with_truth,
-            "simulators-summary": summary,
-            "simulators-aims": aims,
-            "simulators-unrest": unrest,
-        },
-        pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in SIMULATORS},
+        tables={"simulators-summary": summary, "simulators-all": every_controller},
+        pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in DRAWN},
         draw=draw_simulators,
         variable="SIMULATORS",
+    ),
+    Item(
+        name="pyflyt",
+        commands=(f"python -m benchmarks.simulators pyflyt {RESULTS}/pyflyt/pyflyt",),
+        controllers=("design cf2x-pyflyt --sensors true",),
+        paths=("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "benchmarks/simulators"),
+        read=read_pyflyt,
+        tables={"pyflyt-summary": summary, "pyflyt-all": every_controller},
+        variable="PYFLYT",
     ),
 )

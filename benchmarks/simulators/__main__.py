@@ -1,8 +1,8 @@
-"""Fly in crazyflow or in RotorPy; write figures and paths to a folder. Takes 20 minutes each.
+"""Fly in a simulator of others; write figures and paths to a folder. Takes 5 to 20 minutes.
 
-    python -m benchmarks.simulators crazyflow|rotorpy FOLDER
+    python -m benchmarks.simulators crazyflow|rotorpy|pybullet|pyflyt FOLDER
 
-wants extra `crazyflow`, or `rotorpy`.
+wants that simulator.
 """
 
 import importlib

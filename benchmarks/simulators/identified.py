@@ -1,4 +1,4 @@
-"""A log flown in a simulator of others, the drone that `identify` finds in it, and the settings for it."""
+"""A log flown in a simulator of others, and the drone that `identify` finds in it."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,11 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.identify.identify_report import vehicle_text
 from mambo_sil.model.identify.manoeuvre import DURATION_S, reference_m
@@ -33,10 +30,10 @@ LogRow = Sequence[float]
 
 
 def manoeuvre(height_m: float) -> FloatArray:
-    """Return the targets (k, 10) of the manoeuvre of `identify`, in NWU, every 10 ms."""
+    """Return the targets (k, 9) of the manoeuvre of `identify`, in NWU, every 10 ms."""
     times_s = np.asarray(STEP_S * np.arange(round(DURATION_S / STEP_S) + 1), np.float64)
     north_m, east_m = reference_m(times_s)
-    targets = np.zeros((len(times_s), 10))
+    targets = np.zeros((len(times_s), 9))
     for axis, values in enumerate((north_m, -east_m)):
         targets[:, axis] = values
         targets[:, 3 + axis] = np.gradient(values, STEP_S)
@@ -44,10 +41,11 @@ def manoeuvre(height_m: float) -> FloatArray:
     return targets
 
 
-def identified(rows: Sequence[LogRow], path: Path, mass_kg: float) -> tuple[str, Settings]:
-    """Return the vehicle.toml of a log, with the sensors, and the settings that `design` derives from it.
+def identified(rows: Sequence[LogRow], path: Path, mass_kg: float, known: VehicleFile) -> str:
+    """Return the vehicle.toml of a log with the sensors, and with what the log does not show of a known one.
 
-    Writes the log to `path`. Raises ValueError if the log is not good enough.
+    That is its altitude loop, and the response of its thrust if the log does not show it. Writes the log to
+    `path`. Raises ValueError if the log is not good enough.
     """
     lines = [",".join(COLUMNS), *(",".join(f"{value:.7g}" for value in row) for row in rows)]
     path.write_text("\n".join(lines) + "\n", "utf-8")
@@ -55,11 +53,12 @@ def identified(rows: Sequence[LogRow], path: Path, mass_kg: float) -> tuple[str,
     summary, _ = identify(logs, left_out)
     if not summary.good:
         raise ValueError(f"{path}: {summary.verdicts}")
-    text = vehicle_text(summary, mass_kg) + SENSORS
-    return text, identified_settings(text)
-
-
-def identified_settings(text: str) -> Settings:
-    """Return the settings that `design` derives from a vehicle.toml."""
-    drone = vehicle_toml.parse(text, "identified", "identified")
-    return controller_toml.parse(controller_text(drone, "identified"), "identified")
+    assert known.thrust is not None
+    text = vehicle_text(summary, mass_kg)
+    sections = {"altitude": known.altitude.model_dump(), "thrust": known.thrust.model_dump()}
+    lines = [text, SENSORS]
+    for name, keys in sections.items():
+        if f"[{name}]" in text:
+            continue
+        lines += [f"[{name}]", *(f"{key} = {value}" for key, value in keys.items()), ""]
+    return "\n".join(lines)
