@@ -1,4 +1,4 @@
-"""Flights of RotorPy's Crazyflie and Hummingbird in steps of 10 ms: its `SE3Control`, tuned too, and ours.
+"""Flights of RotorPy's Hummingbird in steps of 10 ms: its `SE3Control`, as shipped and tuned, and ours.
 
 `SE3Control` (Lee, Leok and McClamroch 2010) commands motor speeds and knows the true body rates; ours
 commands attitude and thrust through `cmd_ctatt`, whose gains are those of `SE3Control`.
@@ -7,13 +7,14 @@ commands attitude and thrust through `cmd_ctatt`, whose gains are those of `SE3C
 import importlib
 import sys
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
 from rotorpy.controllers.quadrotor_control import SE3Control
-from rotorpy.vehicles import crazyflie_params, hummingbird_params
+from rotorpy.vehicles.hummingbird_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
 from scipy.spatial.transform import Rotation
 
@@ -25,19 +26,16 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
-PARAMETERS: Final = {
-    "crazyflie": crazyflie_params.quad_params,
-    "hummingbird": hummingbird_params.quad_params,
-}
-"""By the vehicle of ours."""
+HUMMINGBIRD: Final = vehicle_toml.preset("hummingbird")
+MASS_KG: Final = float(quad_params["mass"])
+SEEDS: Final = (101, 102)
 MEAN_WIND_M_S, GUSTS_M_S, WIND_HEIGHT_M = (2.0, 1.0, 0.0), (1.0, 1.0, 0.5), 2.0
 
 
-def noise(vehicle: str) -> MocapSensors:
-    """Return the motion capture of a vehicle."""
-    sensors = vehicle_toml.preset(vehicle).sensors
-    assert isinstance(sensors, MocapSensors)
-    return sensors
+def noise() -> MocapSensors:
+    """Return the motion capture of the vehicle."""
+    assert isinstance(HUMMINGBIRD.sensors, MocapSensors)
+    return HUMMINGBIRD.sensors
 
 
 def dryden_wind(seed: int) -> Any:
@@ -56,26 +54,23 @@ class RotorpyDrone:
 
     period_s = STEP_S
 
-    def __init__(self, vehicle: str, factors: FloatArray | None = None, *, windy: bool = False) -> None:
-        self._vehicle, self._factors, self._windy = vehicle, factors, windy
-        self._parameters = PARAMETERS[vehicle]
-        self._mass_kg = float(self._parameters["mass"])
+    def __init__(self, factors: FloatArray | None = None, *, windy: bool = False) -> None:
+        self._factors, self._windy = factors, windy
         abstraction = "cmd_ctatt" if factors is None else "cmd_motor_speeds"
-        self._body = Multirotor(self._parameters, control_abstraction=abstraction)
+        self._body = Multirotor(quad_params, control_abstraction=abstraction)
         self._pilot: SimulatorPilot | None = None
 
     def begin(self, position_m: FloatArray, seed: int | None) -> None:
         """Let a drone hover, with a new controller and a new wind."""
-        hover_rad_s = float(np.sqrt(self._mass_kg * 9.81 / (4.0 * self._parameters["k_eta"])))
+        hover_rad_s = float(np.sqrt(MASS_KG * 9.81 / (4.0 * quad_params["k_eta"])))
         rest = {name: np.zeros(3) for name in ("v", "w", "wind")}
         upright = {"q": np.array([0.0, 0.0, 0.0, 1.0]), "rotor_speeds": np.full(4, hover_rad_s)}
         self._state: dict[str, Any] = {"x": np.array(position_m), **rest, **upright}
         self._time_s, self._wind = 0.0, dryden_wind(seed or 0) if self._windy else None
         if self._factors is None:
-            made = Designed(vehicle_toml.preset(self._vehicle))
-            self._pilot = made.pilot(1, self._mass_kg, noisy=seed is not None)
+            self._pilot = Designed(HUMMINGBIRD).pilot(1, MASS_KG, noisy=seed is not None)
             return
-        self._law = law = SE3Control(self._parameters)
+        self._law = law = SE3Control(quad_params)
         level, up, slow_level, slow_up, angle, rate = self._factors
         law.kp_pos = law.kp_pos * np.array([level, level, up])
         law.kd_pos = law.kd_pos * np.array([slow_level, slow_level, slow_up])
@@ -90,7 +85,7 @@ class RotorpyDrone:
     def advance(self, seen: Sight, target: FloatArray, force_m_s2: FloatArray) -> None:
         """Fly for one period."""
         control = self._own(seen, target) if self._pilot is None else self._ours(self._pilot, seen, target)
-        self._body.weight = self._mass_kg * (np.array([0.0, 0.0, -self._body.g]) + force_m_s2)
+        self._body.weight = MASS_KG * (np.array([0.0, 0.0, -self._body.g]) + force_m_s2)
         if self._wind is not None:
             self._state["wind"] = np.asarray(self._wind.update(self._time_s, self._state["x"]), np.float64)
         self._state = self._body.step(self._state, control, STEP_S)
@@ -111,19 +106,18 @@ class RotorpyDrone:
 
 
 def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
-    """Yield title, scores and paths of each drone; of the Hummingbird the eight in wind, too."""
-    for vehicle in PARAMETERS:
-        best, factors = search(lambda tried, one=vehicle: RotorpyDrone(one, tried), 6, noise(vehicle))
-        (folder / f"{vehicle}-found.txt").write_text(f"{factors}\n", "utf-8")
-        contestants = {
-            "SE3Control": lambda one=vehicle: RotorpyDrone(one, np.ones(6)),
-            "SE3Control, tuned": lambda best=best: best,
-            "ours, by the page": lambda one=vehicle: RotorpyDrone(one),
-        }
-        found = next(measure(f"RotorPy, {vehicle}", contestants, noise(vehicle), seeds=(101, 102)))
-        for who, made in contestants.items():
-            windy = made()
-            windy._windy = True
-            flights = [fly_alone(windy, MISSIONS["eight"], seed, noise(vehicle)) for seed in (101, 102)]
-            found[1][who]["wind"] = [MISSIONS["eight"].scores(flown)[0] for flown in flights]
-        yield found
+    """Yield title, scores and paths; of each the eight in wind, too."""
+    _, factors = search(RotorpyDrone, 6, noise())
+    (folder / "found.txt").write_text(f"{factors}\n", "utf-8")
+    gains = {
+        "SE3Control": np.ones(6),
+        "SE3Control, tuned": np.array(factors),
+        "ours, by the page": None,
+    }
+    contestants = {who: partial(RotorpyDrone, own) for who, own in gains.items()}
+    ((title, figures, paths),) = measure("RotorPy, Hummingbird", contestants, noise(), SEEDS)
+    for who, own in gains.items():
+        eight, windy = MISSIONS["eight"], RotorpyDrone(own, windy=True)
+        flights = [fly_alone(windy, eight, seed, noise()) for seed in SEEDS]
+        figures[who]["wind"] = [eight.scores(flown)[0] for flown in flights]
+    yield title, figures, paths

@@ -16,6 +16,7 @@ A figure in a console block of a tutorial or a how-to needs no row: `test_consol
 
 import json
 import re
+import statistics
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +24,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from benchmarks.evidence.simulator_tables import PAGE
 
 ROOT = Path(__file__).parents[2]
 
@@ -102,10 +105,9 @@ def without_limits(figure: str) -> float:
     return float(one[figure].partition(", ")[2])
 
 
-def in_crazyflow(controller: str) -> str:
-    """Return the RMS error on the eight with noise of crazyflow's cf2x_L250, fitted to flights, in mm."""
-    found = figures("simulators")["cf2x_L250, fitted"][controller]["eight"]["noise"]
-    return shown(sorted(found)[len(found) // 2])
+def in_simulator(drone: str, controller: str) -> str:
+    """Return the median RMS distance on the eight with noise in a simulator of others, in mm."""
+    return shown(statistics.median(figures("simulators")[drone][controller]["eight"]))
 
 
 def in_firmware(curve: str, controller: str) -> str:
@@ -132,6 +134,7 @@ def frozen() -> str:
 
 FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
 CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
+X500, PYBULLET = "hb_x500, fitted", "gym-pybullet-drones, cf2x"
 OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compatibility.md"
 HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
 BOARDS, LIBRARIES = "docs/evidence/boards.md", "docs/how-to/libraries.md"
@@ -198,13 +201,10 @@ FIGURES = [
         r"in the firmware, (\S+ to \S+) cm",
         lambda: f"{in_firmware('circle', 'design')} to {in_firmware('circle', 'lee')}",
     ),
-    Figure("README.md", r"RMS error (\S+) mm after", lambda: in_crazyflow("ours, `identify`, then `design`")),
-    Figure("README.md", r"(\S+) mm with preset", lambda: in_crazyflow("ours, preset `crazyflie`")),
-    Figure(
-        "README.md",
-        r"(\S+) mm with Mellinger",
-        lambda: in_crazyflow("Mellinger with it, planned starts and steps"),
-    ),
+    Figure("README.md", r"2.3 kg in crazyflow (\S+) mm,", lambda: in_simulator(X500, PAGE)),
+    Figure("README.md", r"controller, tuned, (\S+) mm;", lambda: in_simulator(X500, "Mellinger, tuned")),
+    Figure("README.md", r"gym-pybullet-drones (\S+) mm,", lambda: in_simulator(PYBULLET, PAGE)),
+    Figure("README.md", r"its own, tuned, (\S+) mm", lambda: in_simulator(PYBULLET, "DSLPIDControl, tuned")),
     Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
     Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("space")["pd"])),
     Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
