@@ -40,8 +40,9 @@ def noise() -> MocapSensors:
 
 def dryden_wind(seed: int) -> Any:
     """Return RotorPy's Dryden wind; its module names PyTorch, which this wind does not use."""
-    missing = ModuleType("torch")
-    missing.Tensor = np.ndarray  # type: ignore[attr-defined] # it names the type
+    missing: Any = ModuleType("torch")
+    missing.tensor, missing.Tensor, missing.device = np.array, np.ndarray, str
+    missing.float32 = missing.float64 = missing.double = float
     sys.modules.setdefault("torch", missing)
     winds: Any = importlib.import_module("rotorpy.wind.dryden_winds")
     np.random.seed(seed)  # noqa: NPY002 - RotorPy draws from there

@@ -33,6 +33,10 @@ TOOLS = {
 }
 """What the commands of a page need besides bash, make and a C compiler: tool and Debian package."""
 NOT_RUN = {
+    "how-to/betaflight.md": (
+        "it installs, and builds for two minutes",
+        "needs the SITL, and a machine with an idle core",
+    ),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
     "how-to/crazyflow.md": ("it installs", "needs crazyflow and JAX"),
@@ -57,6 +61,7 @@ NOT_RUN = {
         "needs the packages build and twine",
         "it changes the version",
     ),
+    "how-to/pyflyt.md": ("it installs", "needs PyFlyt"),
     "how-to/rotorpy.md": ("it installs",),
     "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),

@@ -41,7 +41,7 @@ def pyflyt_controller(drone: Any, controller: Controller, *, rate_gain_1_s: floa
     motors = drone.motors
     most_n = float(np.sum(np.ravel(motors.thrust_coef) * np.ravel(motors.max_rpm) ** 2))
 
-    class NmpcControl:
+    class PyflytControl:
         """A controller with the interface of `ControlClass`."""
 
         def __init__(self) -> None:
@@ -69,4 +69,4 @@ def pyflyt_controller(drone: Any, controller: Controller, *, rate_gain_1_s: floa
             throttle = math.sqrt(min(max(thrust_n / most_n, 0.0), 1.0))
             return np.array([*rates_rad_s, throttle])
 
-    return NmpcControl
+    return PyflytControl
