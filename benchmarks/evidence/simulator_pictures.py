@@ -38,5 +38,5 @@ def draw_simulators(results: Path) -> None:
                 xlabel="time, s", ylabel="distance to the target, mm", yscale="log", ylim=(0.2, 1000.0)
             )
             distance.yaxis.set_major_formatter(PlainLogFormatter())
-            distance.legend(loc="upper right", ncols=3)
+            distance.legend(loc="upper right", ncols=2)
             save(figure, results / f"simulators-{simulator}")
