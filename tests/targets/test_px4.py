@@ -8,7 +8,7 @@ import pytest
 
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.flight.trajectories import Bernoulli, Circle
+from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover
 from tests.support.command import run
 from tests.support.px4 import HOLD, MPC, POSITION, Px4Desk, build_px4, px4_settings, status_ulog
 
@@ -21,7 +21,7 @@ def module() -> Path:
     return build_px4(px4_settings())
 
 
-def follow(desk: Px4Desk, curve: Bernoulli | Circle, duration_s: float) -> FloatArray:
+def follow(desk: Px4Desk, curve: Bernoulli | Circle | Hover, duration_s: float) -> FloatArray:
     """Send a curve 100 times a second; return the distances to it (n,) in the plane."""
     desk.set("px4.trajectory", 1)
     distances = []
@@ -165,13 +165,51 @@ def test_a_silent_trajectory_gives_way_to_the_sticks(module: Path) -> None:
 
 
 def bump_deg(desk: Px4Desk, milliseconds: int) -> float:
-    """Return how far the attitude set-point goes from where it is in a second, in degrees."""
+    """Return how far the attitude set-point goes from where it is within a time, in degrees."""
     before = desk.angles_deg
     found: list[float] = []
     for _ in range(milliseconds):
         desk.run(1)
         found.append(float(np.abs(desk.angles_deg - before).max()))
     return max(found)
+
+
+JUMPS = {
+    "position": {"jump_x": 0.2, "jump_y": -0.2, "jump_z": -0.2},
+    "velocity": {"jump_vx": 0.3, "jump_vy": 0.2, "jump_vz": 0.1},
+    "heading": {"jump_heading": 0.3},
+}
+
+
+def jump(desk: Px4Desk, kind: str, sign: float = 1.0) -> None:
+    """Let the estimator jump."""
+    for name, value in JUMPS[kind].items():
+        desk.set(f"px4.{name}", sign * value)
+
+
+@pytest.mark.parametrize(("kind", "within_ms"), [("position", 100), ("velocity", 12), ("heading", 100)])
+def test_a_jump_of_the_estimator_moves_target_and_controller(kind: str, within_ms: int, module: Path) -> None:
+    """An estimate that was wrong becomes right: the attitude does not jump with it; then the drone stops."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed, wind_m_s=(2.0, 1.0))
+        jump(desk, kind, -1.0)
+        desk.select(MPC, 3000)
+        usual = bump_deg(desk, within_ms)
+        jump(desk, kind)
+        assert bump_deg(desk, within_ms) < usual + 1.0
+        desk.run(4000)
+        assert desk["mode"] == MPC
+        assert np.abs(desk.state.velocity_m_s).max() < 0.05
+
+
+def test_a_drone_glides_to_a_trajectory_whose_frame_has_jumped(module: Path) -> None:
+    """The set-points are of the new frame: the drone is there after some seconds, without a jump."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed).select(MPC, 500)
+        follow(desk, Hover(), 3.0)
+        desk.set("px4.jump_x", 0.2)
+        assert bump_deg(desk, 150) < 2.0
+        assert follow(desk, Hover(), 10.0)[-1] < 0.01
 
 
 FAULTS = {
@@ -226,7 +264,7 @@ def test_a_module_that_stops_takes_its_mode_away(module: Path) -> None:
 
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_a_log_of_the_mode_is_repeated_bit_for_bit(module: Path) -> None:
-    """With two take-overs, sticks, a trajectory and a landing."""
+    """With two take-overs, sticks, jumps of the estimator and a landing."""
     settings = px4_settings()
     desk = Px4Desk(module, wind_m_s=(2.0, -1.0)).select(MPC, 0)
     rows: list[dict[str, float]] = []
@@ -241,7 +279,10 @@ def test_a_log_of_the_mode_is_repeated_bit_for_bit(module: Path) -> None:
     fly(1000)
     desk.set("px4.sticks", 1)
     desk.set("px4.pitch", 0.7)
-    fly(1500)
+    fly(700)
+    for kind in JUMPS:
+        jump(desk, kind)
+        fly(300)
     desk.select(POSITION, 300).select(MPC, 0)
     desk.set("px4.pitch", 0.0)
     fly(1500)

@@ -155,6 +155,8 @@ static void estimate(const state_t &state)
 		jump_heading = 0;
 	}
 
+	for (int i = 0; i < 3; i++) { offset[i] += 0.001f * estimate_ms * offset_velocity[i]; }
+
 	at.x = state.position.x + offset[0];
 	at.y = -state.position.y + offset[1];
 	at.z = -state.position.z + offset[2];

@@ -20,6 +20,7 @@ from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
     LEVELLED,
+    SHIFT,
     START_THRUST,
     TAKE_OVERS,
     THRUST,
@@ -75,6 +76,9 @@ _STEPS: Final[dict[str, tuple[str, float]]] = {
     UPDATE: ("step", 1.0),
     TAKE_OVERS: ("take_overs", 1.0),
     START_THRUST: ("start_thrust", 1.0),
+    **{f"{SHIFT}_{k}": (f"shift[{k}]", 1.0) for k in range(3)},
+    **{f"{SHIFT}_{3 + k}": (f"velocity_shift[{k}]", 1.0) for k in range(3)},
+    f"{SHIFT}_6": ("heading_shift", 1.0),
 }
 _FASTER: Final = (
     "log at 50 Hz or more: SDLOG_PROFILE with high rate, or these lines, of topic and interval in ms, in "
