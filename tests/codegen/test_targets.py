@@ -71,8 +71,9 @@ def test_the_manual_has_a_page_for_every_target() -> None:
     assert set(re.findall(r"^\| \[`(\w+)`\]", manual, re.MULTILINE)) == TARGETS.keys()
     for name, target in TARGETS.items():
         preset = f"`{target.preset}`" if target.preset else "-"
-        assert re.search(rf"^\| \[`{name}`\]\({name}\.md\) \|.*\| {preset} \|", manual, re.MULTILINE)
-        page = (folder / f"{name}.md").read_text("utf-8")
+        row = re.search(rf"^\| \[`{name}`\]\(([\w.]+)[^)]*\) \|.*\| {preset} \|", manual, re.MULTILINE)
+        assert row
+        page = (folder / row[1]).read_text("utf-8")
         assert re.search(rf"mambo-nmpc generate (?:controller\.toml )?--for {name} -o ", page)
 
 
