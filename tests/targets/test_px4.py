@@ -236,6 +236,18 @@ def test_a_fault_gives_the_drone_back_to_hold_and_is_said_once(fault: str, modul
         assert desk["commands"] == 1.0
 
 
+def test_a_drone_without_a_global_position_is_given_back_to_position_mode(module: Path) -> None:
+    """PX4 refuses hold indoors; in the meantime it hears that the mode cannot run."""
+    desk = Px4Desk(module).select(MPC, 1000)
+    desk.set("px4.indoors", 1.0)
+    desk.set("px4.roll_error", 0.8)
+    desk.run(150)
+    assert desk["mode"] == MPC
+    desk.run(250)
+    assert (desk["mode"], desk["commands"]) == (POSITION, 2.0)
+    assert desk.console.count("tilted too far") == 1
+
+
 def test_parameters_hold_each_by_itself(module: Path) -> None:
     """A slower speed, a wall; a bad one sets its bit, and the others count."""
     desk = Px4Desk(module).select(MPC, 500)

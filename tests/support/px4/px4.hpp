@@ -218,7 +218,7 @@ struct vehicle_local_position_s {
 struct vehicle_attitude_s { hrt_abstime timestamp; float q[4]; };
 struct vehicle_attitude_setpoint_s { hrt_abstime timestamp; float q_d[4], thrust_body[3]; };
 struct vehicle_status_s {
-	static constexpr uint8_t ARMING_STATE_ARMED = 2, NAVIGATION_STATE_POSCTL = 2, NAVIGATION_STATE_AUTO_LOITER = 4, NAVIGATION_STATE_EXTERNAL1 = 23;
+	static constexpr uint8_t ARMING_STATE_ARMED = 2, NAVIGATION_STATE_POSCTL = 2, NAVIGATION_STATE_AUTO_LOITER = 4, NAVIGATION_STATE_AUTO_LAND = 18, NAVIGATION_STATE_EXTERNAL1 = 23;
 	hrt_abstime timestamp;
 	uint8_t arming_state, nav_state, system_id, component_id;
 };

@@ -28,7 +28,7 @@ float stored_parameters[static_cast<int>(px4::params::COUNT)];
 Parameter *first_parameter;
 
 // What the pilot of the desk sets
-static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops;
+static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops, is_indoors;
 static float hover = 0.6f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error;
 
 // What they find
@@ -45,7 +45,7 @@ static void *const PARAMETERS = stored_parameters;
 extern "C" const struct variable host_parameters[] = {
 	{ "group", "px4", nullptr },
 	BYTE("mode", &wanted_mode) BYTE("estimate_ms", &estimate_ms) BYTE("silent", &is_silent) BYTE("invalid", &is_invalid)
-	BYTE("sticks", &has_sticks) BYTE("trajectory", &has_trajectory) BYTE("slow_ms", &slow_ms) BYTE("stop", &stops)
+	BYTE("sticks", &has_sticks) BYTE("trajectory", &has_trajectory) BYTE("slow_ms", &slow_ms) BYTE("stop", &stops) BYTE("indoors", &is_indoors)
 	FLOAT("hover", &hover) FLOAT("roll", &sticks[0]) FLOAT("pitch", &sticks[1]) FLOAT("yaw", &sticks[2]) FLOAT("throttle", &sticks[3])
 	FLOAT("jump_x", &jump[0]) FLOAT("jump_y", &jump[1]) FLOAT("jump_z", &jump[2]) FLOAT("jump_heading", &jump_heading) FLOAT("roll_error", &roll_error)
 	FLOAT("jump_vx", &jump_velocity[0]) FLOAT("jump_vy", &jump_velocity[1]) FLOAT("jump_vz", &jump_velocity[2])
@@ -104,7 +104,11 @@ static void command()
 
 	if (obeyed != topic_vehicle_command.generation) {
 		obeyed = topic_vehicle_command.generation;
-		nav_state = last_wanted = wanted_mode = static_cast<uint8_t>(data_vehicle_command.param1);
+		const uint8_t asked = static_cast<uint8_t>(data_vehicle_command.param1);
+
+		if (!is_indoors || asked != vehicle_status_s::NAVIGATION_STATE_AUTO_LOITER) { // hold wants a global position
+			nav_state = last_wanted = wanted_mode = asked;
+		}
 	}
 
 	data_vehicle_status.nav_state = nav_state;
