@@ -377,6 +377,17 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     }
 }
 
+/* Turn a vector along x and y by the angle of which sine and cosine are given; or one along right and forward, which
+ * stays in the world, when the heading turns by that angle. */
+NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_t cosine)
+{
+    const nmpc_real_t first = vector[0];
+    const nmpc_real_t second = vector[1];
+
+    vector[0] = sine_product(first, cosine) - sine_product(second, sine);
+    vector[1] = sine_product(second, cosine) + sine_product(first, sine);
+}
+
 /* ---- Attitude model -------------------------------------------------------------------------------------------------
  *
  * How the drone accelerates in answer to the commands (not in the paper). Axes are those of the heading: 0 is right,
@@ -462,16 +473,6 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
     }
 }
 
-/* Turn the vector (right, forward) by the angle of which sine and cosine are given. */
-NMPC_INLINE void attitude_turn_vector(nmpc_real_t vector_m_step2[2], nmpc_real_t sine, nmpc_real_t cosine)
-{
-    const nmpc_real_t right = vector_m_step2[NMPC_RIGHT];
-    const nmpc_real_t forward = vector_m_step2[NMPC_FORWARD];
-
-    vector_m_step2[NMPC_RIGHT] = sine_product(right, cosine) - sine_product(forward, sine);
-    vector_m_step2[NMPC_FORWARD] = sine_product(forward, cosine) + sine_product(right, sine);
-}
-
 /* Turn the model to the heading with this sine and cosine. The drone yaws, and its tilt stays where it is in the world;
  * i, c and u are those of the attitude loops, which turn with the body. If a new command follows in this control step,
  * u turns too: the cost counts the change of the commanded acceleration in the world. A held command stays. */
@@ -483,9 +484,9 @@ NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
     const nmpc_real_t cosine_change =
         sine_sum(cosine, attitude->cosine, sine, attitude->sine);
 
-    attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
+    turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
     if (is_followed != 0) {
-        attitude_turn_vector(attitude->command_m_step2, sine_change, cosine_change);
+        turn_vector(attitude->command_m_step2, sine_change, cosine_change);
         attitude->command_m_step2[NMPC_RIGHT] =
             clamp(attitude->command_m_step2[NMPC_RIGHT], NMPC_ATTITUDE_LIMIT_M_STEP2);
         attitude->command_m_step2[NMPC_FORWARD] =
@@ -493,6 +494,17 @@ NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
     }
     attitude->sine = sine;
     attitude->cosine = cosine;
+}
+
+/* The frame has turned by the angle of which sine and cosine are given: the axes of the model belong to the body, which has
+ * not; they lie at another heading. */
+static void attitude_shift(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine)
+{
+    const nmpc_real_t sine_before = attitude->sine;
+    const nmpc_real_t cosine_before = attitude->cosine;
+
+    attitude->sine = clamp(sine_sum(sine_before, cosine, cosine_before, sine), NMPC_ONE);
+    attitude->cosine = clamp(sine_difference(cosine_before, cosine, sine_before, sine), NMPC_ONE);
 }
 
 /* Set `tilt_m_step2` to the accelerations, right and forward, of a measured attitude. */
@@ -641,6 +653,43 @@ NMPC_INLINE void observer_predict(nmpc_observer_t *observer, const nmpc_real_t t
     }
 }
 
+/* The frame has jumped, and the measured position and velocity with it. The acceleration that the tilt does not explain has
+ * not: d takes up what the change of v does to the drag. */
+static void observer_shift(nmpc_observer_t *observer, const nmpc_real_t position_change_m[],
+                           const nmpc_real_t velocity_change_m_s[])
+{
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t change_m_step = speed_product(NMPC_UPDATE_STEP_S, velocity_change_m_s[axis]);
+        const nmpc_real_t change_m = position_change_m[axis];
+
+        observer->position_m[axis] = clamp(observer->position_m[axis] + change_m, NMPC_ESTIMATED_POSITION_LIMIT_M);
+        observer->velocity_m_step[axis] =
+            clamp(observer->velocity_m_step[axis] + change_m_step, NMPC_VELOCITY_LIMIT_M_STEP);
+        observer->disturbance_m_step2[axis] =
+            clamp(observer->disturbance_m_step2[axis] + drag_product(NMPC_DRAG_1_STEP, change_m_step),
+                  NMPC_DISTURBANCE_LIMIT_M_STEP2);
+    }
+}
+
+/* The frame has turned: so does the acceleration that the tilt does not explain. */
+static void observer_turn(nmpc_observer_t *observer, nmpc_real_t sine, nmpc_real_t cosine)
+{
+    nmpc_real_t turned_m_step2[2];
+    int axis;
+
+    turned_m_step2[0] = observer_disturbance(observer, 0);
+    turned_m_step2[1] = observer_disturbance(observer, 1);
+    turn_vector(turned_m_step2, sine, cosine);
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t change_m_step2 = turned_m_step2[axis] - observer_disturbance(observer, axis);
+
+        observer->disturbance_m_step2[axis] =
+            clamp(observer->disturbance_m_step2[axis] + change_m_step2, NMPC_DISTURBANCE_LIMIT_M_STEP2);
+    }
+}
+
 /* Forget the estimates: position, velocity and disturbance are 0. */
 static void observer_clear(nmpc_observer_t *observer)
 {
@@ -677,6 +726,7 @@ static void observer_clear(nmpc_observer_t *observer)
 #define NMPC_TRACKER_GAIN 536870912 /* alpha */
 #define NMPC_TRACKER_REST 536870912 /* 1 - alpha */
 #define NMPC_TRACKER_JERK_GAIN 178956971 /* beta */
+#define NMPC_TARGET_BOUND_M_STEP2 39320788 /* of A_T, which no mean exceeds but by rounding */
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
 NMPC_SHARED void tracker_clear(nmpc_t *self)
@@ -728,6 +778,32 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
         tracker->velocity_m_s[axis] = velocity_m_s[axis];
     }
     self->has_target = 1U;
+}
+
+/* The frame has jumped: the target's velocity changes with it, and that is no acceleration. */
+static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[])
+{
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        tracker->velocity_m_s[axis] = clamp(tracker->velocity_m_s[axis] + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
+    }
+}
+
+/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one. */
+static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
+{
+    nmpc_tracker_t *const tracker = &self->tracker;
+    int axis;
+
+    turn_vector(tracker->acceleration_m_step2, sine, cosine);
+    turn_vector(tracker->jerk_m_step2_update, sine, cosine);
+    for (axis = 0; axis < 2; axis++) {
+        tracker->acceleration_m_step2[axis] = clamp(tracker->acceleration_m_step2[axis], NMPC_TARGET_BOUND_M_STEP2);
+        tracker->jerk_m_step2_update[axis] =
+            clamp(tracker->jerk_m_step2_update[axis], NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+    }
+    self->has_target = 0U;
 }
 
 /* ---- Optimizer ------------------------------------------------------------------------------------------------------
@@ -1588,6 +1664,31 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
     return NMPC_OK;
 }
 
+nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
+{
+    if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {
+        return NMPC_NULL_POINTER;
+    }
+    if ((is_good_point(position_change_m, velocity_change_m_s) == 0)
+        || (within(heading_change_rad, NMPC_YAW_RANGE_RAD) == 0)) {
+        return NMPC_BAD_SHIFT;
+    }
+
+    observer_shift(&self->observer, position_change_m, velocity_change_m_s);
+    tracker_shift(&self->tracker, velocity_change_m_s);
+    if (within(heading_change_rad, (nmpc_real_t)0) == 0) {
+        nmpc_real_t sine;
+        nmpc_real_t cosine;
+
+        sine_cosine(heading_change_rad, &sine, &cosine);
+        attitude_shift(&self->attitude, sine, cosine);
+        observer_turn(&self->observer, sine, cosine);
+        tracker_turn(self, sine, cosine);
+    }
+    return NMPC_OK;
+}
+
 nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
 {
     const nmpc_real_t turn_rad = 6588397;
@@ -1798,6 +1899,24 @@ nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *lim
     }
     fixed_limits.tilt_rad = quantize(limits->tilt_rad, NMPC_ANGLE_SCALE);
     return nmpc_set_limits(self, &fixed_limits);
+}
+
+nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2],
+                               const float velocity_change_m_s[2], float heading_change_rad)
+{
+    nmpc_real_t fixed_position_m[2];
+    nmpc_real_t fixed_velocity_m_s[2];
+    int axis;
+
+    if ((position_change_m == NULL) || (velocity_change_m_s == NULL)) {
+        return NMPC_NULL_POINTER;
+    }
+
+    for (axis = 0; axis < 2; axis++) {
+        fixed_position_m[axis] = quantize(position_change_m[axis], NMPC_POSITION_SCALE);
+        fixed_velocity_m_s[axis] = quantize(velocity_change_m_s[axis], NMPC_VELOCITY_SCALE);
+    }
+    return nmpc_shift(self, fixed_position_m, fixed_velocity_m_s, quantize(heading_change_rad, NMPC_YAW_SCALE));
 }
 
 float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad)

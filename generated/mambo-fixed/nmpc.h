@@ -168,7 +168,8 @@ typedef enum {
     NMPC_BAD_TARGET = 3,   /* the target is not finite or out of range */
     NMPC_BAD_THRUST = 4,   /* the thrust acceleration is not finite or out of range */
     NMPC_BAD_COMMAND = 6,  /* the command given to nmpc_reset() or nmpc_set_command() is not finite or out of range */
-    NMPC_BAD_LIMITS = 7    /* a limit is not finite or out of range */
+    NMPC_BAD_LIMITS = 7,   /* a limit is not finite or out of range */
+    NMPC_BAD_SHIFT = 8     /* a change given to nmpc_shift() is not finite or out of range */
 } nmpc_status_t;
 
 /* R_k: the measured state of the drone, in the world frame. Roll is positive right side down, pitch nose up, yaw
@@ -277,6 +278,22 @@ nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits);
  * `self` must not be null. */
 unsigned int nmpc_limits_active(const nmpc_t *self);
 
+/* Tell the controller that the frame of its states has jumped, as an estimator makes it jump that learns that it was
+ * wrong: a drone that has not moved is now measured farther by `position_change_m` along x and y, faster by
+ * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first one
+ * with a state in the new frame.
+ *
+ * The estimates move by the changes, and the disturbance and the target's acceleration turn with the heading; what belongs to the
+ * body stays: attitude model, last command.
+ * The limits stay where they are in the frame.
+ * Move the target by the same changes from the next step on, turned about the drone, and the command does not jump. A
+ * target that is left where it is in the frame is flown to like any other that has jumped.
+ *
+ * Returns NMPC_BAD_SHIFT, and changes nothing, if a change exceeds NMPC_POSITION_RANGE_M, NMPC_VELOCITY_RANGE_M_S or
+ * NMPC_YAW_RANGE_RAD, or is NaN. */
+nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad);
+
 /* Return the next set-point of a yaw loop on the shortest way from `previous_rad` to `wanted_rad`, at most
  * `most_change_rad` further, within +/- NMPC_YAW_RANGE_RAD. A yaw loop that is given a large step at once takes thrust
  * from roll, pitch and height. Returns `previous_rad` if another argument is NaN or out of range, or the change is not
@@ -373,14 +390,16 @@ typedef struct {
     float tilt_rad;
 } nmpc_float_limits_t;
 
-/* nmpc_step(), nmpc_reset(), nmpc_set_command(), nmpc_last_estimate() and nmpc_slew_heading() with floats, which are rounded to the
- * nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
+/* nmpc_step(), nmpc_reset(), nmpc_set_command(), nmpc_last_estimate(), nmpc_shift() and nmpc_slew_heading() with floats, which are rounded to
+ * the nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
  * outside of every range and so refused, as in nmpc.h. */
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate);
+nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2],
+                               const float velocity_change_m_s[2], float heading_change_rad);
 float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad);
 
 /* nmpc_default_limits() and nmpc_set_limits() with floats. */

@@ -796,6 +796,20 @@ int nmpc_is_saturated(const nmpc_t *self)
            || (reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
 }
 
+nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
+{
+    if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {
+        return NMPC_NULL_POINTER;
+    }
+    if ((is_good_point(position_change_m, velocity_change_m_s) == 0)
+        || (within(heading_change_rad, NMPC_YAW_RANGE_RAD) == 0)) {
+        return NMPC_BAD_SHIFT;
+    }
+
+    return NMPC_OK;
+}
+
 nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
 {
     const nmpc_real_t turn_rad = 6.2831855f;

@@ -135,7 +135,8 @@ typedef enum {
     NMPC_BAD_TARGET = 3,   /* the target is not finite or out of range */
     NMPC_BAD_THRUST = 4,   /* the thrust acceleration is not finite or out of range */
     NMPC_BAD_WEIGHT = 5,   /* a weight is not finite, negative or too large */
-    NMPC_BAD_COMMAND = 6   /* the command given to nmpc_reset() is not finite or out of range */
+    NMPC_BAD_COMMAND = 6,  /* the command given to nmpc_reset() is not finite or out of range */
+    NMPC_BAD_SHIFT = 8     /* a change given to nmpc_shift() is not finite or out of range */
 } nmpc_status_t;
 
 /* R_k: the measured state of the drone, in the world frame. Roll is positive right side down, pitch nose up, yaw
@@ -210,6 +211,20 @@ int nmpc_has_converged(const nmpc_t *self);
 /* 1 if the last command lies at the tilt limit, in roll or in pitch: the target may ask for more than the limit gives;
  * else 0. `self` must not be null. */
 int nmpc_is_saturated(const nmpc_t *self);
+
+/* Tell the controller that the frame of its states has jumped, as an estimator makes it jump that learns that it was
+ * wrong: a drone that has not moved is now measured farther by `position_change_m` along x and y, faster by
+ * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first one
+ * with a state in the new frame.
+ *
+ * Plan and last command belong to the body and stay, and nothing else is remembered: the call only checks the changes.
+ * Move the target by the same changes from the next step on, turned about the drone, and the command does not jump. A
+ * target that is left where it is in the frame is flown to like any other that has jumped.
+ *
+ * Returns NMPC_BAD_SHIFT, and changes nothing, if a change exceeds NMPC_POSITION_RANGE_M, NMPC_VELOCITY_RANGE_M_S or
+ * NMPC_YAW_RANGE_RAD, or is NaN. */
+nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad);
 
 /* Return the next set-point of a yaw loop on the shortest way from `previous_rad` to `wanted_rad`, at most
  * `most_change_rad` further, within +/- NMPC_YAW_RANGE_RAD. A yaw loop that is given a large step at once takes thrust

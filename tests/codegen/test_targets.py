@@ -7,22 +7,29 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.bundle.render import render, render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import TARGETS, FirmwareTarget
 from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
 from tests.support.command import run
+from tests.support.height_settings import height_settings
 
 LONGEST_PAGE = 105
 """Lines of a README that is one page."""
 
 
+def settings_of(target: FirmwareTarget) -> Settings:
+    """Return the settings of a target's preset, or of a drone whose height is flown."""
+    return height_settings() if target.preset is None else presets.preset(target.preset)
+
+
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", [name for name, target in TARGETS.items() if target.preset])
 def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_path: Path) -> None:
     """Without a source it has the target's preset; its own controller.toml makes it again; --check agrees."""
     folder = str(tmp_path / "out")
     run("generate", "--for", name, "-o", folder)
     settings = f"{folder}/controller.toml"
-    assert presets.load(settings) == presets.preset(TARGETS[name].preset)
+    assert presets.load(settings) == settings_of(TARGETS[name])
     assert run("generate", settings, "--for", name, "-o", folder)[0] == ""
     run("generate", "--for", name, "-o", folder, "--check")
     assert json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))["target"] == name
@@ -33,7 +40,7 @@ def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_pa
 def test_the_library_is_that_of_a_bundle_with_every_prefix(name: str) -> None:
     """What a target compiles is what the other tests prove; its own files carry the prefix too."""
     target = TARGETS[name]
-    settings = presets.preset(target.preset)
+    settings = settings_of(target)
     files, library = (
         render_target(settings, target, with_digest=False),
         render(settings, with_digest=False),
@@ -50,7 +57,7 @@ def test_the_library_is_that_of_a_bundle_with_every_prefix(name: str) -> None:
 def test_a_page_says_how_to_build_to_watch_and_to_go_back(name: str) -> None:
     """The README of a target is one page."""
     target = TARGETS[name]
-    text = render_target(presets.preset(target.preset), target, with_digest=False)["README.md"]
+    text = render_target(settings_of(target), target, with_digest=False)["README.md"]
     assert len(text.splitlines()) <= LONGEST_PAGE
     for heading in ("Build", "Watch", "Go back"):
         assert f"**{heading}.**" in text
@@ -63,8 +70,10 @@ def test_the_manual_has_a_page_for_every_target() -> None:
     manual = (folder / "firmware.md").read_text("utf-8")
     assert set(re.findall(r"^\| \[`(\w+)`\]", manual, re.MULTILINE)) == TARGETS.keys()
     for name, target in TARGETS.items():
-        assert re.search(rf"^\| \[`{name}`\]\({name}\.md\) \|.*\| `{target.preset}` \|", manual, re.MULTILINE)
-        page = (folder / f"{name}.md").read_text("utf-8")
+        preset = f"`{target.preset}`" if target.preset else "-"
+        row = re.search(rf"^\| \[`{name}`\]\(([\w.]+)[^)]*\) \|.*\| {preset} \|", manual, re.MULTILINE)
+        assert row
+        page = (folder / row[1]).read_text("utf-8")
         assert re.search(rf"mambo-nmpc generate (?:controller\.toml )?--for {name} -o ", page)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.cases import random_limits
+from mambo_sil.verify.cases import random_limits, random_shifts
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
 BAD_COMMANDS = (np.nan, np.inf, 4.0, -4.0)
@@ -93,6 +93,7 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
 
     With a height the delivered thrust is set in every eleventh step.
     Halfway it is reset. What else its method sets is set then, if it is weights, or in every seventh step.
+    In every 17th step the frame jumps.
     With limits, they change in every ninth step; with a guard, whether a position is measured, in every 13th.
     """
     rng = np.random.default_rng(seed)
@@ -112,6 +113,8 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
             found.setters.append(controller.set_command(command))
         if method.has_height and index % 11 == 10:
             found.setters.append(controller.set_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
+        if index % 17 == 4:
+            found.setters.append(controller.shift(random_shifts(controller.settings, len(command), rng)))
         if index % 13 == 6 and method.guard is not None:
             found.setters.append(controller.set_position_measured(rng.random(len(command)) < 0.5))
         if index % 9 == 8 and method.limiting is not None:

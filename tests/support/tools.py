@@ -19,6 +19,7 @@ CORES = {
     "mambo": "arm926",
     "rp2040": "cortex-m0",
     "crazyflie": "cortex-m4",
+    "stm32h743": "cortex-m7",
     "teensy41": "cortex-m7",
     "rv32": "rv32",
     "mega": "avr",

@@ -86,8 +86,12 @@ def render(settings: Settings, *, with_digest: bool = True) -> dict[str, str]:
 def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
     """Render the folder of `target`, {relative POSIX path: text}: the library and the target's own templates.
 
-    `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update period.
+    `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update
+    period, or wants a controller of another kind.
     """
+    target.refuse_level(
+        has_height=settings.height is not None, has_limits=method_of(settings).limiting is not None
+    )
     ticks = target.ticks_per_update(settings.horizon.update_period_s)
     bundle = render(settings, with_digest=with_digest)
     library = {

@@ -19,19 +19,32 @@ class FirmwareTarget:
     """Where a controller is used.
 
     name: as in `--for`, and of the folder of templates.
-    preset: the settings if the user names none.
+    preset: the settings if the user names none; None where no preset fits.
     source_folder: of nmpc.h and nmpc.c, with a slash at its end.
     opening: text before the text of nmpc.c.
     self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
+    flies_height: whether it wants roll, pitch and thrust from one controller, within limits.
     """
 
     name: str
-    preset: str
+    preset: str | None
     source_folder: str
     opening: str = ""
     self_test: bool = True
     tick_s: float | None = None
+    flies_height: bool = False
+
+    def refuse_level(self, *, has_height: bool, has_limits: bool) -> None:
+        """Raise InvalidSettingsError for settings without a section that the target needs."""
+        if self.flies_height and not (has_height and has_limits):
+            raise InvalidSettingsError(
+                (
+                    f"--for {self.name} wants settings with [height] and [limits], since its controller "
+                    "commands the thrust too: derive them from a drone with [thrust] or [rotors] "
+                    "(mambo-nmpc design)",
+                )
+            )
 
     def ticks_per_update(self, update_period_s: float) -> int:
         """Return the ticks of an update period, 1 without a tick; raises InvalidSettingsError."""
@@ -64,6 +77,7 @@ _TARGETS: Final = (
     FirmwareTarget("mambo", "mambo", "src/", self_test=False, tick_s=0.005),
     FirmwareTarget("pil", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),
+    FirmwareTarget("px4", None, "src/modules/mc_nmpc/", flies_height=True),
 )
 TARGETS: Final = {target.name: target for target in _TARGETS}
 """All targets by name."""
@@ -84,3 +98,14 @@ def find_target(name: str) -> FirmwareTarget:
         f"--for {echo(name)} is not a target{guess}; targets are {', '.join(TARGETS)}; without --for the "
         "bundle has a Makefile and fits any firmware"
     )
+
+
+def default_source(target: FirmwareTarget) -> str:
+    """Return the preset of a target; raises SourceNotFoundError if it has none."""
+    if target.preset is None:
+        raise SourceNotFoundError(
+            f"--for {target.name} has no preset, since no two of its drones are alike: describe yours, and "
+            "name its settings (mambo-nmpc design my-drone.toml -o controller.toml; mambo-nmpc generate "
+            f"controller.toml --for {target.name} -o {target.name})"
+        )
+    return target.preset

@@ -34,6 +34,8 @@
 #define NMPC_FUZZ_INIT 3U
 #define NMPC_FUZZ_SET_LIMITS 4U /* written as 2 with bit 6 */
 #define NMPC_FUZZ_SLEW_HEADING 6U /* written as 1 with bit 6 */
+#define NMPC_FUZZ_SHIFT 8U /* written as 0 with bit 7 */
+#define NMPC_FUZZ_AXES 2
 #define NMPC_FUZZ_NULL_SELF 1U
 #define NMPC_FUZZ_NULL_FIRST 2U
 #define NMPC_FUZZ_NULL_SECOND 4U
@@ -56,6 +58,9 @@ typedef struct {
     nmpc_real_t thrust_acceleration_m_s2;
     nmpc_command_t start;
     nmpc_real_t headings_rad[3]; /* previous, wanted, most change */
+    nmpc_real_t position_change_m[NMPC_FUZZ_AXES];
+    nmpc_real_t velocity_change_m_s[NMPC_FUZZ_AXES];
+    nmpc_real_t heading_change_rad;
     nmpc_limits_t limits;
 } nmpc_fuzz_call_t;
 
@@ -79,6 +84,12 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.target.velocity_m_s[0] = values[9];
     call.target.velocity_m_s[1] = values[10];
     call.thrust_acceleration_m_s2 = values[11];
+    (void)memcpy(call.position_change_m, &values[0], sizeof(call.position_change_m));
+    (void)memcpy(call.velocity_change_m_s, &values[NMPC_FUZZ_AXES], sizeof(call.velocity_change_m_s));
+    call.heading_change_rad = values[2 * NMPC_FUZZ_AXES];
+    if ((call.function == NMPC_FUZZ_STEP) && (((unsigned int)bytes[0] & 128U) != 0U)) {
+        call.function = NMPC_FUZZ_SHIFT;
+    }
     call.headings_rad[0] = values[0];
     call.headings_rad[1] = values[1];
     call.headings_rad[2] = values[2];
@@ -122,6 +133,10 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
         break;
     case NMPC_FUZZ_SET_LIMITS:
         status = nmpc_set_limits(self, no_first ? 0 : &call->limits);
+        break;
+    case NMPC_FUZZ_SHIFT:
+        status = nmpc_shift(self, no_first ? 0 : call->position_change_m, no_second ? 0 : call->velocity_change_m_s,
+                            call->heading_change_rad);
         break;
     case NMPC_FUZZ_SLEW_HEADING:
         command->roll_rad = nmpc_slew_heading(call->headings_rad[0], call->headings_rad[1], call->headings_rad[2]);
@@ -220,6 +235,13 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
     case NMPC_FUZZ_SET_LIMITS:
         status = nmpc_fuzz_promised_limits(&call->limits);
         break;
+    case NMPC_FUZZ_SHIFT:
+        pointers |= NMPC_FUZZ_NULL_SECOND;
+        if (!(nmpc_fuzz_is_good_point(call->position_change_m, call->velocity_change_m_s)
+              && nmpc_fuzz_lies_in(call->heading_change_rad, -NMPC_YAW_RANGE_RAD, NMPC_YAW_RANGE_RAD))) {
+            status = NMPC_BAD_SHIFT;
+        }
+        break;
     default:
         pointers = 0U;
         break;
@@ -281,7 +303,7 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     (void)memcpy(&before, self, sizeof(before));
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(self, call, &command) == promised);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(twin, &other, &twin_command) == promised);
-    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_LIMITS)) {
+    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_SHIFT) || (promised == NMPC_BAD_LIMITS)) {
         NMPC_FUZZ_REQUIRE(memcmp(&before, self, sizeof(before)) == 0);
         if (is_step && ((call->nulls & NMPC_FUZZ_NULL_COMMAND) == 0U)) {
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, has_self ? last->roll_rad : (nmpc_real_t)0));
@@ -303,6 +325,9 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     } else if (call->function == NMPC_FUZZ_SET_LIMITS) {
         last->roll_rad = nmpc_fuzz_limited(self, last->roll_rad);
         last->pitch_rad = nmpc_fuzz_limited(self, last->pitch_rad);
+    } else if (call->function == NMPC_FUZZ_SHIFT) {
+        NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(self->command_rad[0], before.command_rad[0]));
+        NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(self->command_rad[1], before.command_rad[1]));
     } else if (call->function == NMPC_FUZZ_SLEW_HEADING) {
         NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, twin_command.roll_rad));
         NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.roll_rad, -NMPC_YAW_RANGE_RAD, NMPC_YAW_RANGE_RAD));

@@ -6,7 +6,7 @@
  * the tilt limit.
  *
  * There are three proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
- * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_set_command() and nmpc_set_limits() refuse it and write nothing, and
+ * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_shift(), nmpc_set_command() and nmpc_set_limits() refuse it and write nothing, and
  * a step handles a state or a target with NaN as take_numbers() shows it for one with an infinity: nothing reads it.
  * turn_everywhere() proves for every heading what take_numbers() assumes of sine and cosine.
  *
@@ -21,6 +21,7 @@
 #endif
 
 #define INPUTS 12
+#define AXES 2
 #define TARGET 7 /* the first input that is not the state's */
 
 static volatile nmpc_real_t any_real;
@@ -149,6 +150,11 @@ static void slew_heading(void)
     /*@ assert heading_is_within_the_range: -range_rad <= next_rad <= range_rad; */
 }
 
+static void shift(nmpc_t *self, const nmpc_real_t input[INPUTS])
+{
+    (void)nmpc_shift(self, (any_int != 0) ? input : NULL, (any_int != 0) ? &input[AXES] : NULL, input[2 * AXES]);
+}
+
 static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
@@ -236,6 +242,9 @@ void take_numbers(void)
         case 4:
             set_limits(self, input);
             break;
+        case 7:
+            shift(self, input);
+            break;
         default:
             step(self, input);
             break;
@@ -279,6 +288,10 @@ void refuse_nan(void)
             status = nmpc_set_command(self, &command);
             /*@ assert set_command_refuses_nan: status != NMPC_OK; */
         }
+        if (which <= (2 * AXES)) {
+            status = nmpc_shift(self, input, &input[AXES], input[2 * AXES]);
+            /*@ assert shift_refuses_nan: status != NMPC_OK; */
+        }
         if (which < 7) {
             const nmpc_limits_t limits = limits_of(input);
 
@@ -291,6 +304,7 @@ void refuse_nan(void)
 
         /* The same together with a null pointer. */
         (void)nmpc_reset(NULL, &command);
+        (void)nmpc_shift(NULL, input, &input[AXES], input[2 * AXES]);
         (void)nmpc_set_command(NULL, &command);
         (void)nmpc_step(NULL, &state, &target, input[11], &command);
         (void)nmpc_step(self, NULL, &target, input[11], &command);

@@ -233,6 +233,34 @@ class Controller:
             raise ArgumentError("set_thrust needs settings with [height]")
         return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
 
+    def shift(
+        self,
+        position_change_m: ArrayLike,
+        velocity_change_m_s: ArrayLike | None = None,
+        heading_change_rad: ArrayLike = 0.0,
+    ) -> NDArray[np.int64]:
+        """Tell that the frame of the states has jumped, as when an estimator learns that it was wrong.
+
+        A drone that has not moved is now measured farther, faster and at another heading by these changes:
+        vectors (2,) or (3,), one for all, or (..., 2) or (..., 3), z down, which counts with `[height]` only;
+        no change of the velocity by default. Call it between two steps, and move the targets likewise, turned
+        about the drone: the commands do not jump. Limits stay in the frame. Returns a status (n,), not 0 with
+        NaN or out of range. Raises ArgumentError for other shapes, and without z where the height needs it.
+        """
+        position = self._changes("position_change_m", position_change_m)
+        velocity = np.zeros_like(position)
+        if velocity_change_m_s is not None:
+            velocity = self._changes("velocity_change_m_s", velocity_change_m_s)
+        heading = as_numbers("heading_change_rad", heading_change_rad)
+        if heading.ndim and heading.size != self.n:
+            raise ArgumentError(
+                f"heading_change_rad: has shape {heading.shape}; it must be () or {(self.n,)}"
+            )
+        heading = np.broadcast_to(heading.reshape(-1), self.n)
+        status = self._compiled.shift(np.column_stack([position, velocity, heading]))
+        self._heading.shift(np.where(status == 0, heading, 0.0))
+        return status
+
     def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
         """Tell whether a position is measured, as by cameras: one truth value for all or (...).
 
@@ -330,6 +358,20 @@ class Controller:
             require(left_out, "thrust_m_s2", thrust_m_s2, rule)
             return angles
         return np.column_stack([angles, self._thrusts(thrust_m_s2)])
+
+    def _changes(self, name: str, values: ArrayLike) -> FloatArray:
+        """Return changes (n, 2) of vectors, with `[height]` (n, 3), up; raises ArgumentError."""
+        array = as_numbers(name, values)
+        axes = array.shape[-1] if array.ndim else 0
+        if axes not in (2, 3) or (array.ndim > 1 and array.size != axes * self.n):
+            rule = f"it must be (2,), (3,), {(self.n, 2)} or {(self.n, 3)}"
+            raise ArgumentError(f"{name}: has shape {array.shape}; {rule}")
+        vectors = np.broadcast_to(array.reshape(-1, axes), (self.n, axes))
+        if not self._method.has_height:
+            return vectors[:, :2]
+        if axes == 2:
+            raise ArgumentError(f"{name}: has no z; the height wants x, y, z (..., 3)")
+        return vectors * (1.0, 1.0, -1.0)
 
     def _thrusts(self, thrust_m_s2: ArrayLike | None) -> FloatArray:
         """Return thrusts (n,) of one value, or of a batch; raises ArgumentError."""

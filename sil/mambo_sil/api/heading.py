@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.settings.limits import YAW_LIMIT_RAD
+from mambo_sil.api.frames import wrapped
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
 
@@ -28,6 +29,11 @@ class Heading:
     def reset(self, which: NDArray[np.bool_]) -> None:
         """Forget the headings of the drones in `which` (n,)."""
         self.yaw_rad = np.where(which, np.nan, self.yaw_rad)
+
+    def shift(self, change_rad: FloatArray) -> None:
+        """Change the set-points by `change_rad` (n,): the frame has turned."""
+        yaw_rad = self.yaw_rad + change_rad
+        self.yaw_rad = np.where(np.abs(yaw_rad) <= YAW_LIMIT_RAD, yaw_rad, wrapped(yaw_rad))
 
     def turn(self, measured_rad: FloatArray, wanted_rad: FloatArray | None) -> FloatArray:
         """Return the next headings (n,), towards the wanted ones if there are any."""

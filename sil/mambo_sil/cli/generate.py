@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_codegen.bundle.targets import TARGETS, complete_targets, find_target
+from mambo_codegen.bundle.targets import TARGETS, complete_targets, default_source, find_target
 from mambo_codegen.errors import DriftError, echo
 from mambo_sil.cli.command import (
     AsJson,
@@ -67,7 +67,7 @@ def generate(
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
     wanted = None if target is None else find_target(target)
     if source is None:
-        source = "mambo" if wanted is None else wanted.preset
+        source = "mambo" if wanted is None else default_source(wanted)
     settings = load(source, scalar)
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")

@@ -34,7 +34,7 @@ class LibrarySource:
 
     name:      first part of the library's file name, which its purpose determines.
     key:       whatever determines the files; its `repr` distinguishes it from every other key.
-    files:     returns the text of all files by path; every *.c is compiled. Called only to build.
+    files:     returns the text of all files by path; every *.c and *.cpp is compiled. Called only to build.
     flags:     flags of the compiler besides `LIBRARY_FLAGS`.
     libraries: flags that name libraries to link with.
     interface: declares the functions that Python calls.
@@ -71,7 +71,7 @@ def built_library(source: LibrarySource, toolchain: Toolchain) -> Path:
         for path, text in files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text, "utf-8")
-        units = sorted(path for path in files if path.endswith(".c"))
+        units = sorted(path for path in files if path.endswith((".c", ".cpp")))
         library = folder / f"{source.name}.so"
         toolchain.run([*_flags(source, toolchain), *units, "-o", library.name, *source.libraries], folder)
         if not library.is_file():

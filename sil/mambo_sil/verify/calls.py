@@ -49,6 +49,7 @@ class ApiFunction(IntEnum):
     SET_THRUST = 5
     SLEW_HEADING = 6
     SET_MEASURED = 7
+    SHIFT = 8
 
 
 _POINTERS: Final = {
@@ -60,16 +61,18 @@ _POINTERS: Final = {
     ApiFunction.SET_THRUST: NULL_SELF,
     ApiFunction.SLEW_HEADING: 0,
     ApiFunction.SET_MEASURED: NULL_SELF,
+    ApiFunction.SHIFT: NULL_SELF | NULL_FIRST | NULL_SECOND,
 }
 
-_OTHER_BIT: Final = 64
+_OTHER_BIT, _LAST_BIT = 64, 128
 _WRITTEN_AS: Final = {
+    ApiFunction.SHIFT: ApiFunction.STEP | _LAST_BIT,
     ApiFunction.SET_LIMITS: ApiFunction.SET_WEIGHTS | _OTHER_BIT,
     ApiFunction.SET_THRUST: ApiFunction.INIT | _OTHER_BIT,
     ApiFunction.SLEW_HEADING: ApiFunction.RESET | _OTHER_BIT,
     ApiFunction.SET_MEASURED: ApiFunction.STEP | _OTHER_BIT,
 }
-"""How functions are written for which two bits are too few."""
+"""How functions are written for which two bits are too few; of two that are written at once, the later."""
 
 
 def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
@@ -83,6 +86,7 @@ def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
         ApiFunction.SET_THRUST: THRUST,
         ApiFunction.SLEW_HEADING: ("yaw",) * 3,
         ApiFunction.SET_MEASURED: ("position",),
+        ApiFunction.SHIFT: method.shift,
     }
 
 
@@ -156,6 +160,7 @@ class _Runs:
                 ApiFunction.SET_THRUST: self._method.has_height,
                 ApiFunction.SLEW_HEADING: True,
                 ApiFunction.SET_MEASURED: self._method.guard is not None,
+                ApiFunction.SHIFT: True,
             }[function]
         }
         self._level: dict[str, Any] = {"command_rad": 0}
@@ -167,7 +172,8 @@ class _Runs:
         controller = self._controller
         function = now["call"] & 3
         for wanted, written in self._others.items():
-            function = np.where((now["call"] & (3 | _OTHER_BIT)) == written, np.uint8(wanted), function)
+            read = 3 | (written & ~3)
+            function = np.where((now["call"] & read) == written, np.uint8(wanted), function)
         nulls = (now["call"] >> 2) & 15
         null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
 
@@ -198,11 +204,12 @@ class _Runs:
                     ApiFunction.SET_MEASURED,
                     lambda values: controller.set_position_measured(values[:, 0] > 0),
                 )
+            shifts = call(ApiFunction.SHIFT, controller.shift)
             steps = call(ApiFunction.STEP, step)
             none, slewed = np.zeros_like(steps), self._slewed(now)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none, measured])
+        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none, measured, shifts])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)

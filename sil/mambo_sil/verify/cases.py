@@ -119,7 +119,9 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
             if method.has_height
             else []
         ),
-        *(calls(settings, ApiFunction.STEP, drawn) for drawn in steps[6:]),
+        calls(settings, ApiFunction.STEP, steps[6]),
+        calls(settings, ApiFunction.SHIFT, random_shifts(settings, n, rng)),
+        calls(settings, ApiFunction.STEP, steps[7]),
     ]
     return list(np.stack(columns, axis=1))
 
@@ -149,6 +151,17 @@ def _random_thrusts(settings: Settings, n: int, rng: np.random.Generator) -> Arr
     drawn = rng.uniform(-0.2, 1.02, (n, 1)) * most_m_s2
     drawn[::6, 0] = rng.choice([np.nan, np.inf, -np.inf, 1.1 * most_m_s2], len(drawn[::6]))
     return drawn
+
+
+def random_shifts(settings: Settings, n: int, rng: np.random.Generator) -> Array:
+    """Draw jumps of the frame (n, k), most of them small, some without a turn, some that are refused."""
+    quantities, ranges = method_of(settings).shift, settings.ranges
+    most = {"position": ranges.position_m, "velocity": ranges.velocity_m_s, "yaw": YAW_LIMIT_RAD}
+    shifts = rng.normal(0, 1, (n, len(quantities))) * 10.0 ** rng.uniform(-3, 0.5, (n, 1))
+    shifts[::4] = rng.uniform(-1.02, 1.02, shifts[::4].shape) * [most[name] for name in quantities]
+    shifts[1::4, -1] = 0.0
+    shifts[::9, rng.integers(len(quantities))] = rng.choice([np.nan, np.inf, -np.inf], len(shifts[::9]))
+    return shifts
 
 
 def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array:
@@ -214,6 +227,8 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         pairs.append((ApiFunction.SET_THRUST, THRUST, *_both(most_m_s2)))
         limits_m_s2 = height.command_m_s2[:1], height.command_m_s2[1:]
         pairs.append((ApiFunction.SET_THRUST, THRUST, *limits_m_s2))
+    ends = [largest[name] for name in method.shift]
+    pairs.append((ApiFunction.SHIFT, method.shift, *_both(*ends)))
     for function, names, lows, highs in pairs:
         for index, name in enumerate(names):
             for value in _around(settings, name, lows[index], highs[index]):
@@ -235,6 +250,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         (ApiFunction.RESET, NULL_SELF | NULL_FIRST),
         (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
         (ApiFunction.INIT, NULL_SELF),
+        (ApiFunction.SHIFT, NULL_SELF | NULL_FIRST | NULL_SECOND),
         *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
         *([(ApiFunction.SET_THRUST, NULL_SELF)] if method_of(settings).has_height else []),
         *([(ApiFunction.SET_MEASURED, NULL_SELF)] if method_of(settings).guard is not None else []),

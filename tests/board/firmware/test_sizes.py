@@ -22,6 +22,7 @@ int run(void) { room[start] = (char)table[start]; return start++; }
 """
 HELPERS = {
     "crazyflie": set(),
+    "stm32h743": set(),
     "teensy41": set(),
     "mambo": {"__mulsf3"},
     "rp2040": {"__aeabi_fmul"},

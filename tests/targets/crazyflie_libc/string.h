@@ -6,5 +6,6 @@
 
 int memcmp(const void *a, const void *b, size_t size);
 void *memcpy(void *to, const void *from, size_t size);
+char *strncpy(char *to, const char *from, size_t size);
 
 #endif

@@ -125,6 +125,22 @@ class OneNormController:
         self.memory = choose(good, self._held(clamp(given, self._tilt_limit())), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
+    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+        """Tell the controllers that their frames have jumped: `change` (n, 5).
+
+        The columns are changes of x and y (m), of the velocities (m/s), and of the heading (rad). Returns a
+        status (n,); a change that is not finite, or out of range, changes nothing.
+        """
+        jump, good = self._inputs.shift(change)
+        memory, motion = self.memory, self.memory.target
+        if self._tracker is not None:
+            motion = self._tracker.shift(motion, jump.velocity_m_s)
+            turned = self._tracker.turn(motion, *self._products.sine_cosine(jump.heading_rad))
+            motion = choose(jump.heading_rad != 0, turned, motion)
+        limits = self._limits.shift(memory.limits, jump.velocity_m_s)
+        self.memory = choose(good, replace(memory, target=motion, limits=limits), memory)
+        return np.where(good, Status.OK, Status.BAD_SHIFT)
+
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t.
 

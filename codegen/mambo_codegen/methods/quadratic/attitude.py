@@ -27,14 +27,6 @@ class AttitudeState:
     cosine: Real
 
 
-def rotate(products: QuadraticArithmetic, vector: Real, sine: Real, cosine: Real) -> Real:
-    """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
-    product, one, other = products.sine_product, vector[:, 0], vector[:, 1]
-    return np.stack(
-        [product(one, cosine) - product(other, sine), product(other, cosine) + product(one, sine)], axis=1
-    )
-
-
 class AttitudeModel:
     """The constants of the attitude model, in the scalar type of the controller."""
 
@@ -120,7 +112,7 @@ class AttitudeModel:
         by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
 
         def turned(vector: Real) -> Real:
-            return rotate(self._products, vector, by_sine, by_cosine)
+            return self._products.turn(vector, by_sine, by_cosine)
 
         command = clamp(turned(attitude.command), self._limit)
         return replace(
@@ -129,6 +121,15 @@ class AttitudeModel:
             command=np.where(is_followed[:, None], command, attitude.command),
             sine=sine,
             cosine=cosine,
+        )
+
+    def shift(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
+        """Turn the frame by the angles of sine and cosine (n,), and leave the axes of the body in it."""
+        before, products = (attitude.sine, attitude.cosine), self._products
+        return replace(
+            attitude,
+            sine=clamp(products.sine_sum(before[0], cosine, before[1], sine), self._one),
+            cosine=clamp(products.sine_difference(before[1], cosine, before[0], sine), self._one),
         )
 
     def measure(self, tilt_rad: Real, weight: Real | None = None) -> Real:

@@ -106,6 +106,17 @@ class QuadraticController:
         self.memory = replace(self.memory, is_coarse=np.logical_not(is_measured))
         return np.full(len(is_measured), Status.OK)
 
+    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+        """Tell the controllers that their frames have jumped: `change` (n, 5), with a height (n, 7).
+
+        The columns are changes of x and y (m), with a height of the height, up, too, as many of the
+        velocities (m/s), and that of the heading (rad). Returns a status (n,); a change that is not finite,
+        or out of range, changes nothing.
+        """
+        jump, good = self._inputs.shift(change)
+        self.memory = choose(good, self.parts.shift(self.memory, jump), self.memory)
+        return np.where(good, Status.OK, Status.BAD_SHIFT)
+
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; k is 7, or 11 with a height.
 

@@ -18,7 +18,7 @@ from mambo_codegen.methods.quadratic.height_constants import (
     ROW_STATES,
     HeightConstants,
 )
-from mambo_codegen.methods.shared.inputs import Rows, choose
+from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.math import Real, clamp, confine
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
@@ -286,6 +286,26 @@ class HeightAxis:
             height_m=clamp(state.height_m + products.position_change(mean), self._height_limit),
             velocity_m_step=clamp(velocity, self._velocity_limit),
         )
+
+    def shift(self, state: HeightState, jump: FrameShift) -> HeightState:
+        """Move the estimate with the frame."""
+        change_m, change = jump.position_m[:, 2], self._products.speed_product(jump.velocity_m_s[:, 2])
+        if self._age is not None:
+            change_m = change_m + self._products.aged_position(self._age, change)
+        return replace(
+            state,
+            height_m=clamp(state.height_m + change_m, self._height_limit),
+            velocity_m_step=clamp(state.velocity_m_step + change, self._velocity_limit),
+            target=self._tracker.shift(state.target, jump.velocity_m_s[:, 2:])
+            if self._tracker
+            else state.target,
+        )
+
+    def turn(self, state: HeightState) -> HeightState:
+        """Return the heights after turns of the frame, of which the target's next velocity is the first."""
+        if self._tracker is None:
+            return state
+        return replace(state, target=self._tracker.begin_again(state.target))
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:
         """Forget the targets of some controllers (n,)."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.height import HeightBounds, HeightState, Lift, unknown_height
-from mambo_codegen.methods.shared.inputs import Rows
+from mambo_codegen.methods.shared.inputs import FrameShift, Rows
 from mambo_codegen.methods.shared.math import Real
 
 
@@ -61,6 +61,15 @@ class NoHeight:
     def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Return zeros."""
         del on_ground
+        return state
+
+    def shift(self, state: HeightState, jump: FrameShift) -> HeightState:
+        """Return zeros."""
+        del jump
+        return state
+
+    def turn(self, state: HeightState) -> HeightState:
+        """Return zeros."""
         return state
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:

@@ -1,6 +1,6 @@
 """Observer: position, velocity and disturbance, by a Kalman filter with fixed gains."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.shared.inputs import Rows
+from mambo_codegen.methods.shared.inputs import FrameShift, Rows
 from mambo_codegen.methods.shared.math import Real, clamp
 
 
@@ -112,3 +112,26 @@ class KalmanObserver:
             ),
             disturbance_m_step2=estimate.disturbance_m_step2,
         )
+
+    def shift(self, estimate: Estimate, jump: FrameShift) -> Estimate:
+        """Move the estimate with the frame; what the tilt does not explain of the acceleration stays."""
+        change = self._products.speed_product(jump.velocity_m_s[:, 0:2])
+        position, disturbance = jump.position_m[:, 0:2], estimate.disturbance_m_step2
+        if self._age is not None:
+            position = position + self._products.aged_position(self._age, change)
+        if self._drag is not None:
+            drag = self._products.drag_product(self._drag, change)
+            disturbance = clamp(disturbance + drag, self._disturbance_limit)
+        return Estimate(
+            position_m=clamp(estimate.position_m + position, self._position_limit),
+            velocity_m_step=clamp(estimate.velocity_m_step + change, self._velocity_limit),
+            disturbance_m_step2=disturbance,
+        )
+
+    def turn(self, estimate: Estimate, sine: Real, cosine: Real) -> Estimate:
+        """Turn what the tilt does not explain by the angles of sine and cosine (n,)."""
+        rest = self.disturbance(estimate)
+        disturbance = self._products.turn(rest, sine, cosine)
+        if self._drag is not None:
+            disturbance = estimate.disturbance_m_step2 + (disturbance - rest)
+        return replace(estimate, disturbance_m_step2=clamp(disturbance, self._disturbance_limit))

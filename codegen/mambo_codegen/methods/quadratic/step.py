@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
-from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
+from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.guard import VariationBudget
 from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, HeightState, Lift
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
-from mambo_codegen.methods.shared.inputs import Rows, choose
+from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory, limits_law
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
@@ -133,6 +133,25 @@ class ControlStep:
             budget_rad=budget,
             is_coarse=memory.is_coarse,
         )
+
+    def shift(self, memory: QuadraticMemory, jump: FrameShift) -> QuadraticMemory:
+        """Return the memory after jumps of the frame."""
+        moved = replace(
+            memory,
+            estimate=self.observer.shift(memory.estimate, jump),
+            target=self.tracker.shift(memory.target, jump.velocity_m_s) if self.tracker else memory.target,
+            limits=self.limits.shift(memory.limits, jump.velocity_m_s),
+            height=self.height.shift(memory.height, jump),
+        )
+        sine, cosine = self.products.sine_cosine(jump.heading_rad)
+        turned = replace(
+            moved,
+            estimate=self.observer.turn(moved.estimate, sine, cosine),
+            attitude=self.model.shift(moved.attitude, sine, cosine),
+            height=self.height.turn(moved.height),
+            target=self.tracker.turn(moved.target, sine, cosine) if self.tracker else moved.target,
+        )
+        return choose(jump.heading_rad != 0, turned, moved)
 
     def _turn(self, attitude: AttitudeState, inputs: CheckedInputs, none_yet: Rows) -> AttitudeState:
         """Return the models after they have answered the last command, at the measured heading."""
@@ -266,8 +285,8 @@ class ControlStep:
 
     def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         """Return vectors (n, 2) along x and y from those along right and forward."""
-        return rotate(self.products, heading[:, ::-1], attitude.sine, attitude.cosine)
+        return self.products.turn(heading[:, ::-1], attitude.sine, attitude.cosine)
 
     def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
         """Return vectors (n, 2) along right and forward from those along x and y."""
-        return rotate(self.products, world[:, ::-1], attitude.sine, attitude.cosine)
+        return self.products.turn(world[:, ::-1], attitude.sine, attitude.cosine)

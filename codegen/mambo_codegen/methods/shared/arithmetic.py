@@ -68,6 +68,13 @@ class Arithmetic(Products):
         """Return value * sine, in the format of the value."""
         return self._nearest(value * sine, "sine")
 
+    def turn(self, vector: Real, sine: Real, cosine: Real) -> Real:
+        """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
+        product, one, other = self.sine_product, vector[:, 0], vector[:, 1]
+        return np.stack(
+            [product(one, cosine) - product(other, sine), product(other, cosine) + product(one, sine)], axis=1
+        )
+
     def target_product(self, factor: Any, value: Real) -> Real:
         """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
         return self._nearest(factor * value, "target_product")

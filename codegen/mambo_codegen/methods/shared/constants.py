@@ -106,6 +106,12 @@ class Constants(ABC):
         """The quantity of each number in nmpc_command_t, in their order."""
         return (*COMMAND, *THRUST) if self.has_height else COMMAND
 
+    @property
+    def shift(self) -> tuple[str, ...]:
+        """The quantity of each number that nmpc_shift reads, in their order."""
+        axes = 3 if self.has_height else 2
+        return (*["position"] * axes, *["velocity"] * axes, "yaw")
+
     @cached_property
     def numbers(self) -> Representation:
         """The scalar type of the C, and in fixed point the format of each quantity."""

@@ -1,7 +1,7 @@
 """Inputs of a control step: their numbers, their ranges, and the status that follows."""
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -30,6 +30,20 @@ class Status(IntEnum):
     BAD_WEIGHT = 5
     BAD_COMMAND = 6
     BAD_LIMITS = 7
+    BAD_SHIFT = 8
+
+
+@dataclass(frozen=True)
+class FrameShift:
+    """Jumps of the frames of n controllers, in the numbers of the C.
+
+    position_m, velocity_m_s: (n, 2) along x and y; (n, 3) with a height, up.
+    heading_rad: (n,)
+    """
+
+    position_m: Real
+    velocity_m_s: Real
+    heading_rad: Real
 
 
 class Inputs:
@@ -37,7 +51,7 @@ class Inputs:
 
     def __init__(self, constants: Constants) -> None:
         self._numbers, self._target = constants.numbers, constants.target
-        self._state, self._command = constants.state, constants.command
+        self._state, self._command, self._shift = constants.state, constants.command, constants.shift
         self._level_columns, self._has_height = len(constants.level_target), constants.has_height
         self.limits = constants.limits
 
@@ -108,6 +122,25 @@ class Inputs:
         angles = given[:, 0:2]
         good = within(angles, self.limits.attitude) & within(given[:, 2:], self.limits.thrust_most)
         return np.concatenate([clamp(angles, self.limits.tilt), given[:, 2:]], axis=1), good
+
+    def shift(self, change: ArrayLike) -> tuple["FrameShift", Rows]:
+        """Return jumps of the frame (n, k), and whether each is finite and within its range.
+
+        The columns are changes of x, y, with a height the height, then of their velocities, then the heading.
+        """
+        given = self.numbers(change, self._shift)
+        axes = len(self._shift) // 2
+        position, velocity, heading = given[:, :axes], given[:, axes : 2 * axes], given[:, 2 * axes :]
+        good = (
+            within(position, self.limits.position)
+            & within(velocity, self.limits.velocity)
+            & within(heading, self.limits.yaw)
+        )
+        zero = self._numbers.computed(0)
+        position, velocity, heading = (
+            np.where(good[:, None], part, zero) for part in (position, velocity, heading)
+        )
+        return FrameShift(position, velocity, heading[:, 0]), good
 
 
 def within(values: Real, limit: Any) -> Rows:

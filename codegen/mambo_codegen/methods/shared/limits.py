@@ -120,6 +120,11 @@ class NoLimits:
         del position, follows
         return memory, motion, target
 
+    def shift(self, memory: LimitsMemory, change_m_s: Real) -> LimitsMemory:
+        """Return the memory as it is."""
+        del change_m_s
+        return memory
+
     def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
         """Return no columns: there is no nmpc_bounds_t."""
         del memory, has_command
@@ -327,6 +332,16 @@ class LimitsLaw:
         was = before.active & ~ActiveLimit.HEIGHT
         ends = (was == ActiveLimit.BRAKING) & (after.active == 0) & self.is_slow(after.bounds, target)
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
+
+    def shift(self, memory: LimitsMemory, change_m_s: Real) -> LimitsMemory:
+        """Change the remembered velocities with the frame, by the first columns of `change_m_s`."""
+
+        def changed(velocity: Real) -> Real:
+            return clamp(velocity + change_m_s[:, 0:2], self._ranges.velocity)
+
+        if self.is_given:
+            memory = replace(memory, velocity_m_s=changed(memory.velocity_m_s))
+        return memory if self._turn is None else replace(memory, target_m_s=changed(memory.target_m_s))
 
     def is_slow(self, bounds: Bounds, target: Real) -> Rows:
         """Return whether targets move at half the speed at which braking ends or less, along x and y (n,)."""

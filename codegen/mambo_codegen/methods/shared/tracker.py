@@ -1,6 +1,6 @@
 """Target tracker: the target's acceleration and its rate, estimated by an alpha-beta filter."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,8 @@ class Tracker:
         """What the tracker reads of a target."""
         self._input_limit = constant(constants.input_limit, constants.input_quantity)
         self._factor = constant(constants.factor, "tracker")
+        self._bound = constant(constants.acceleration_bound_m_step2, "acceleration")
+        self._velocity_range = constant(constants.velocity_range_m_s, "velocity")
         self._jerk_limit = constant(constants.jerk_limit_m_step2_update, "acceleration")
         self._gain = constant(constants.gain, "sine")
         self._rest = constant(1 - constants.gain, "sine")
@@ -144,3 +146,24 @@ class Tracker:
             doubt=np.where(steady, noise[2], motion.doubt),
             is_known=np.ones_like(motion.is_known),
         )
+
+    def shift(self, motion: TargetMotion, change_m_s: Real) -> TargetMotion:
+        """Change the targets' velocities by the first columns of `change_m_s`, which is no acceleration."""
+        if self.is_given:
+            return motion
+        change = change_m_s[:, : motion.velocity_m_s.shape[1]]
+        return replace(motion, velocity_m_s=clamp(motion.velocity_m_s + change, self._velocity_range))
+
+    def turn(self, motion: TargetMotion, sine: Real, cosine: Real) -> TargetMotion:
+        """Turn the targets' accelerations (n, 2) by the angles of sine and cosine (n,)."""
+        turn = self._arithmetic.turn
+        turned = replace(
+            motion,
+            acceleration_m_step2=clamp(turn(motion.acceleration_m_step2, sine, cosine), self._bound),
+            jerk_m_step2_update=clamp(turn(motion.jerk_m_step2_update, sine, cosine), self._jerk_limit),
+        )
+        return self.begin_again(turned)
+
+    def begin_again(self, motion: TargetMotion) -> TargetMotion:
+        """Take the next velocities for the first ones; accelerations that are given go on."""
+        return motion if self.is_given else replace(motion, is_known=np.zeros_like(motion.is_known))

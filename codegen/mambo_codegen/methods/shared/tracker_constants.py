@@ -55,6 +55,7 @@ class TrackerConstants:
     jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
     gain, jerk_gain: alpha and beta.
     noise: that of the guard; None without one.
+    velocity_range_m_s: largest velocity of a target.
     """
 
     is_given: bool
@@ -65,6 +66,7 @@ class TrackerConstants:
     gain: float
     jerk_gain: float
     noise: TargetNoise | None
+    velocity_range_m_s: float
 
     @property
     def acceleration_bound_m_step2(self) -> float:
@@ -111,6 +113,7 @@ def tracker_constants(
         gain=gain,
         jerk_gain=gain * gain / (2 - gain),
         noise=_target_noise(settings, step_s),
+        velocity_range_m_s=ranges.velocity_m_s,
     )
 
 

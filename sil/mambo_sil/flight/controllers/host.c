@@ -15,11 +15,13 @@
 #ifdef NMPC_HAS_HEIGHT
 #define TARGET_NUMBERS (LEVEL_NUMBERS + (LEVEL_NUMBERS / 2))
 #define COMMAND_NUMBERS 3
+#define AXES 3
 #define LIMITS_NUMBERS 11
 #else
 typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
 #define TARGET_NUMBERS LEVEL_NUMBERS
 #define COMMAND_NUMBERS 2
+#define AXES 2
 #define LIMITS_NUMBERS 7
 #endif
 typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == TARGET_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
@@ -56,6 +58,18 @@ void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *wei
     }
 }
 #endif
+
+/* Changes of the position, of the velocity and of the heading, one after the other. */
+void nmpc_host_shift(nmpc_t *controllers, int n, const nmpc_real_t *change, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        const nmpc_real_t *const one = &change[i * ((2 * AXES) + 1)];
+
+        status[i] = (int)nmpc_shift(&controllers[i], one, &one[AXES], one[2 * AXES]);
+    }
+}
 
 #ifdef NMPC_HAS_HEIGHT
 void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2, int *status)

@@ -30,6 +30,9 @@ GROUNDED: Final = "grounded"
 """Whether the controller was told that the floor may carry the drone."""
 LEVELLED: Final = "levelled"
 """Whether its caller flew level instead of the tilt that it computed."""
+SHIFT: Final = "shift"
+"""By what the frame of a controller of the height jumped before the step: shift_0 .. shift_6, of position,
+velocity (each x, y, up) and heading."""
 OF_HEIGHTS: Final = (START_THRUST, GROUNDED, LEVELLED)
 UPDATE: Final = "update"
 """The number of the update that the row is of, counted modulo `UPDATES`."""

@@ -9,13 +9,26 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import THRUST, THRUST_COMMAND, FlightLog, Signal
+from mambo_sil.model.identify.signals import (
+    GROUNDED,
+    HEIGHT,
+    LEVELLED,
+    SHIFT,
+    START_THRUST,
+    TAKE_OVERS,
+    THRUST,
+    THRUST_COMMAND,
+    UPDATE,
+    FlightLog,
+    Signal,
+)
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
 TRAJECTORY: Final = "trajectory_setpoint"
@@ -34,6 +47,39 @@ _THRUST: Final = "thrust_body[2]"
 """Commanded thrust along z of the body, which points down."""
 _CLOCK: Final = "timestamp"
 HOVER: Final = "hover_thrust_estimate"
+STEPS: Final = "mc_nmpc_status"
+"""What the module of `generate --for px4` logs of each step; its heights are up."""
+_STEPS: Final[dict[str, tuple[str, float]]] = {
+    "x_m": ("position[0]", 1.0),
+    "y_m": ("position[1]", 1.0),
+    "vx_m_s": ("velocity[0]", 1.0),
+    "vy_m_s": ("velocity[1]", 1.0),
+    "roll_rad": ("roll", 1.0),
+    "pitch_rad": ("pitch", 1.0),
+    "yaw_rad": ("yaw", 1.0),
+    HEIGHT: ("height", -1.0),
+    "vz_m_s": ("climb", -1.0),
+    GROUNDED: ("grounded", 1.0),
+    "target_x_m": ("target_position[0]", 1.0),
+    "target_y_m": ("target_position[1]", 1.0),
+    "target_vx_m_s": ("target_velocity[0]", 1.0),
+    "target_vy_m_s": ("target_velocity[1]", 1.0),
+    "target_ax_m_s2": ("target_acceleration[0]", 1.0),
+    "target_ay_m_s2": ("target_acceleration[1]", 1.0),
+    "target_height_m": ("target_height", 1.0),
+    "target_climb_m_s": ("target_climb", 1.0),
+    "target_climb_acceleration_m_s2": ("target_climb_acceleration", 1.0),
+    "roll_command_rad": ("command_roll", 1.0),
+    "pitch_command_rad": ("command_pitch", 1.0),
+    THRUST: ("command_thrust", 1.0),
+    LEVELLED: ("level", 1.0),
+    UPDATE: ("step", 1.0),
+    TAKE_OVERS: ("take_overs", 1.0),
+    START_THRUST: ("start_thrust", 1.0),
+    **{f"{SHIFT}_{k}": (f"shift[{k}]", 1.0) for k in range(3)},
+    **{f"{SHIFT}_{3 + k}": (f"velocity_shift[{k}]", 1.0) for k in range(3)},
+    f"{SHIFT}_6": ("heading_shift", 1.0),
+}
 _FASTER: Final = (
     "log at 50 Hz or more: SDLOG_PROFILE with high rate, or these lines, of topic and interval in ms, in "
     "etc/logging/logger_topics.txt on the SD card: "
@@ -44,10 +90,19 @@ _FASTER: Final = (
 def read_ulog(path: Path) -> FlightLog:
     """Read commanded and measured angles, motion and target; PX4 has the frames of this project.
 
+    A log of the steps of our own flight mode is read in their place.
     Raises LogError for a file that is no ULog or lacks a topic, and if pyulog is not installed.
     """
     topics = _topics(path)
     name = echo(str(path))
+    steps = topics.get(STEPS, {})
+    if (flies := steps.get("active", np.zeros(0)) > 0.0).any():
+        return demand_one_clock(FlightLog(name, _steps(steps, flies)), _CLOCK, f"log {STEPS} 0")
+    return demand_one_clock(FlightLog(name, _signals(topics, name)), _CLOCK, _FASTER)
+
+
+def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[str, Signal]:
+    """Return the signals of PX4's own topics; raises LogError if some are missing or empty."""
     faults = [
         f"{name}: has no {topic}; log it (SDLOG_PROFILE, default set)"
         for topic in (SETPOINT, ATTITUDE)
@@ -75,7 +130,7 @@ def read_ulog(path: Path) -> FlightLog:
     empty = [signal for signal, each in signals.items() if not len(each.time_s)]
     if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
         raise LogError(tuple(faults))
-    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
+    return signals
 
 
 def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
@@ -90,7 +145,7 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
-            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER])
+            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, STEPS])
     except OSError as error:
         raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
     except Exception as error:  # whatever a damaged file makes of the parser
@@ -99,6 +154,15 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
         each.name: {field: np.asarray(values, np.float64) for field, values in each.data.items()}
         for each in log.data_list
         if each.multi_id == 0
+    }
+
+
+def _steps(steps: Mapping[str, FloatArray], flies: NDArray[np.bool_]) -> dict[str, Signal]:
+    """Return the signals of the steps that were flown, over the times of the estimates."""
+    time_s = 1e-6 * steps["timestamp_sample"][flies]
+    return {
+        signal: Signal(time_s, sign * steps[field][flies], f"{STEPS}.{field}")
+        for signal, (field, sign) in _STEPS.items()
     }
 
 

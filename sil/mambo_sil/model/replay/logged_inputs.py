@@ -21,6 +21,7 @@ from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
     LEVELLED,
+    SHIFT,
     START_THRUST,
     TAKE_OVERS,
     TARGET,
@@ -125,6 +126,8 @@ class LoggedInputs:
     thrust_m_s2: FloatArray
     start_m_s2: FloatArray
     """Thrust over mass (k,) at which the controller begins."""
+    shift: FloatArray
+    """Jumps of the frame before each update (k, 7), as `ReferenceController.shift` takes them."""
     levelled: NDArray[np.bool_]
     """Whether its caller flew level instead (k,)."""
     begins: NDArray[np.bool_]
@@ -185,6 +188,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         target=target,
         thrust_m_s2=thrust_m_s2,
         start_m_s2=start_m_s2,
+        shift=np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1),
         levelled=levelled,
         begins=begins,
         gaps=int(behind.sum()),

@@ -19,6 +19,8 @@ def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: F
     n, settings = len(states), controller.settings
     commands_thrust = settings.height is not None
     target = np.repeat(inputs.target[k : k + 1], n, axis=0)
+    if inputs.shift[k].any():
+        controller.shift(np.repeat(inputs.shift[k : k + 1], n, axis=0))
     done = controller.step(states, target, None if commands_thrust else np.repeat(inputs.thrust_m_s2[k], n))
     sent = np.repeat(inputs.command_rad[k : k + 1], n, axis=0)
     if inputs.levelled[k]:

@@ -1,0 +1,102 @@
+"""The module of `generate --for px4`, built as PX4 does for a Cortex-M7, with headers of our own."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from tests.support.bundles import place
+from tests.support.command import run
+from tests.support.height_settings import height_settings
+from tests.support.px4 import MODULE, px4_files, px4_settings
+from tests.support.shell import shell
+from tests.support.tools import require
+
+LIBC = Path(__file__).parent / "crazyflie_libc"
+CORE = ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16")
+ARM = (*CORE, "-Os", "-ffreestanding", f"-I{LIBC}")
+PX4_FLAGS = (
+    *(
+        "-fno-signed-zeros",
+        "-fno-trapping-math",
+        "-freciprocal-math",
+        "-fno-math-errno",
+        "-fmerge-all-constants",
+    ),
+    *("-fno-strict-aliasing", "-Wall", "-Wextra", "-Werror", "-Warray-bounds"),
+    *("-Wcast-align", "-Wdisabled-optimization", "-Wdouble-promotion", "-Wfloat-equal", "-Winit-self"),
+    *("-Wlogical-op", "-Wpointer-arith", "-Wshadow", "-Wuninitialized", "-Wunused-variable"),
+    *("-Wno-missing-field-initializers", "-Wno-unused-parameter"),
+)
+"""Flags that PX4 gives to all modules, as its cmake/px4_add_common_flags.cmake lists them."""
+LANGUAGES = {
+    ".c": ("arm-none-eabi-gcc", "-std=gnu11", "-Wstrict-prototypes"),
+    ".cpp": ("arm-none-eabi-g++", "-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"),
+}
+SUBJECTS = {
+    "design": px4_settings(),
+    "tracked": height_settings(),
+    "float64": height_settings("float64"),
+    "fixed": height_settings("fixed"),
+    "prefix": with_option(height_settings(), "code.prefix", "left"),
+}
+LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 10240, 8960
+
+
+def own_flags(name: str) -> list[str]:
+    """Return the flags in the module's CMakeLists.txt."""
+    text = render_target(SUBJECTS[name], TARGETS["px4"], with_digest=False)[f"{MODULE}CMakeLists.txt"]
+    return re.findall(r"^\t\t(-\S+)$", text, re.MULTILINE)
+
+
+def compiled(name: str, folder: Path, *flags: str) -> dict[str, Path]:
+    """Compile a subject as PX4 does; return the objects by the name of their source."""
+    for compiler, *_ in LANGUAGES.values():
+        require(compiler, "gcc-arm-none-eabi")
+    place(px4_files(SUBJECTS[name]), folder)
+    objects = {}
+    for source in sorted(path for path in folder.iterdir() if path.suffix in LANGUAGES):
+        objects[source.name] = folder / f"{source.name}.o"
+        line = (*LANGUAGES[source.suffix], *ARM, *PX4_FLAGS, *flags, f"-I{folder}/px4")
+        shell(*line, "-c", source, "-o", objects[source.name])
+    return objects
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_px4_s_flags_build_it_without_a_word_and_its_own_keep_the_bits(name: str, tmp_path: Path) -> None:
+    """Every warning is an error there; no product is fused with a sum, nor divided by a reciprocal."""
+    objects = compiled(name, tmp_path, *own_flags(name))
+    controller = f"{SUBJECTS[name].code.prefix}.c"
+    dump = require("arm-none-eabi-objdump", "binutils-arm-none-eabi")
+    assert not re.search(r"\tvfn?m[as]\.", shell(dump, "-d", objects[controller]))
+    if name == "design":
+        sizes = shell(require("arm-none-eabi-size", "binutils-arm-none-eabi"), *objects.values()).splitlines()
+        text = {line.rpartition("/")[2][:-2]: int(line.split()[0]) for line in sizes[1:]}
+        assert text[controller] < LARGEST_CONTROLLER_BYTES
+        assert sum(size for path, size in text.items() if path.endswith(".cpp")) < LARGEST_MODULE_BYTES
+
+
+def test_cmakelists_names_every_source_and_parameter() -> None:
+    """And PX4 takes names of at most 16 letters."""
+    files = render_target(SUBJECTS["prefix"], TARGETS["px4"], with_digest=False)
+    names = {path.removeprefix(MODULE) for path in files if path.startswith(MODULE)}
+    listed = re.findall(r"^\t\t([\w.]+\.(?:c|cpp|hpp))$", files[f"{MODULE}CMakeLists.txt"], re.MULTILINE)
+    assert {*listed} == {name for name in names if name.endswith((".c", ".cpp", ".hpp"))}
+    defined = re.findall(r"^        (\w+):$", files[f"{MODULE}module.yaml"], re.MULTILINE)
+    used = re.findall(r"params::(MC_NMPC_\w+)", files[f"{MODULE}mc_nmpc.hpp"])
+    assert defined == used
+    assert max(map(len, defined)) <= 16
+
+
+def test_settings_that_do_not_fly_the_height_are_refused(tmp_path: Path) -> None:
+    """PX4 wants the thrust with the attitude; there is no preset, since no two drones are alike."""
+    message = r"--for px4 wants settings with \[height\] and \[limits\]"
+    with pytest.raises(InvalidSettingsError, match=message):
+        render_target(presets.preset("mambo"), TARGETS["px4"])
+    assert "--for px4 has no preset" in run("generate", "--for", "px4", "-o", str(tmp_path), code=2)[1]
