@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
+from mambo_codegen.methods.quadratic.reciprocal import RECIPROCAL_ERROR
 from mambo_nmpc import ArgumentError, Controller
 from mambo_nmpc.adapters.rotorpy import RotorpyController
 from tests.support.tools import require_module

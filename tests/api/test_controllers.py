@@ -12,7 +12,7 @@ import pytest
 
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.quadratic.height_constants import RECIPROCAL_ERROR
+from mambo_codegen.methods.quadratic.reciprocal import RECIPROCAL_ERROR
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml, presets

@@ -17,9 +17,9 @@ from mambo_codegen.methods.quadratic.height_constants import (
     LEAST_WEIGHT,
     STEEPEST_RAD,
     HeightConstants,
-    Reciprocal,
 )
 from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.methods.quadratic.reciprocal import Reciprocal
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from tests.support.height import CRAZYFLIE

@@ -7,7 +7,7 @@ The model, the cost and the observer are those of right and forward, with the th
 where g + u is the commanded thrust over mass along the vertical. `height.c.j2` has the equations.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, LoopValues, attitude_solution
 from mambo_codegen.methods.quadratic.law import LawSolution, axis_law
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
+from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_small, reciprocal
 from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.height_section import Height
@@ -34,9 +35,6 @@ COSINE_TERMS: Final = 0.5, 0.0416
 STEEPEST_RAD: Final = 1.2
 """Beyond this angle the cosine is less than LEAST_COSINE."""
 
-RECIPROCAL_ERROR: Final = 3e-4
-"""Largest relative error of a reciprocal."""
-
 DESCENT_SHARE: Final = 0.7
 """A descent ends by at most this share of the largest acceleration upwards."""
 
@@ -45,22 +43,6 @@ FLOOR_MARGIN_M: Final = 0.02
 
 ROW_STATES: Final = ("e", "v", "w", "j", "a", "c", "u")
 """The states that a row multiplies: those of the law less the integral part, which a thrust does not have."""
-
-
-@dataclass(frozen=True)
-class Reciprocal:
-    """1/x from products: y = start - slope x, and `steps` of y (2 - x y), of which the last has `two` for 2.
-
-    The relative error of each step is the square of that before: at most `error` in the end, and of one sign.
-    `most` is more than any y.
-    """
-
-    start: float
-    slope: float
-    steps: int
-    two: float
-    error: float
-    most: float
 
 
 @dataclass(frozen=True)
@@ -156,8 +138,8 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         steps2_per_s2=1 / delivered_s2,
         command_m_s2=(*height.command_m_s2, GRAVITY_M_S2 / height.thrust_gain),
         most_m_s=(climb, descent),
-        thrust_inverse=_reciprocal(*shares),
-        weight_inverse=_never_too_small(_reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
+        thrust_inverse=reciprocal(*shares),
+        weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
         tracker=tracker_constants(settings, step_s, _jump_m_s2(height)),
     )
 
@@ -234,22 +216,3 @@ def _solution(settings: Sections, height: Height) -> LawSolution:
 def _law(settings: Sections, height: Height) -> NDArray[np.float64]:
     """Return the rows (moves, 7) of ROW_STATES."""
     return np.array(_solution(settings, height).rows)[:, [0, 1, 2, 3, 4, 6, 7]]
-
-
-def _reciprocal(low: float, high: float) -> Reciprocal:
-    """Return the reciprocal of numbers from `low` to `high` with the fewest steps.
-
-    Its line has the same error, 1 - x y, at both ends, and the opposite one in the middle.
-    """
-    middle = low + high
-    start = 2 / (((low * high) / middle) + (middle / 4))
-    error, steps = (start * middle / 4) - 1, 0
-    while error > RECIPROCAL_ERROR:
-        error, steps = error * error, steps + 1
-    return Reciprocal(start, start / middle, steps, 2.0, error, 1.01 / low)
-
-
-def _never_too_small(found: Reciprocal) -> Reciprocal:
-    """Return the reciprocal that errs upwards: the last step rounds up by more than the error."""
-    margin = found.error + 1e-5
-    return replace(found, two=2 + margin, error=margin)
