@@ -17,6 +17,7 @@ USED = {
     for norm, values in (("1-norm", LAGS), ("quadratic", QUADRATIC))
 }
 HEIGHT = {path for path in KEYS if path.startswith("height.")} | {
+    "model.tilt",
     "limits.fence.floor_m",
     "limits.fence.ceiling_m",
 }

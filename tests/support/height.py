@@ -4,6 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from mambo_codegen.methods.quadratic.thrust_vector_constants import MOST_TILT_RAD
 from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import ONE_MOVE, TWO_MOVES, case_values, settings_of
 from tests.support.strategies import Values
@@ -60,9 +61,33 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "guard.thrust_m_s2": 3.0,
         "guard.thrust_m_s3": 20.0,
     },
+    CRAZYFLIE
+    | {
+        "model.tilt": "exact",
+        "limits.tilt_rad": 0.7,
+        "model.roll_gain": 0.8,
+        "model.pitch_gain": 1.2,
+        "model.pitch_trim_rad": -0.03,
+        "target.acceleration": "tracked",
+        "limits.speed_m_s": 1.5,
+        "damping.pitch_rate_feedback_s": 0.02,
+        "guard.tilt_rad_s": 1.0,
+        "guard.thrust_m_s2": 3.0,
+        "guard.thrust_m_s3": 20.0,
+    },
+    CRAZYFLIE
+    | {
+        "model.tilt": "exact",
+        "limits.tilt_rad": 1.2,
+        "height.learn": "acceleration",
+        "height.learn_limit": 0.1,
+        "height.thrust_max_m_s2": 39.0,
+        "model.attitude": "measured",
+        "observer.outage_s": 0.05,
+    },
 )
 """One move and two, all that can be learnt, with and without tracker, limits, fence, age, feedback and
-guard; drones that deliver less than the commanded thrust, and more."""
+guard; drones that deliver less than the commanded thrust, and more; small angles and the thrust vector."""
 
 
 def height_case(index: int, scalar: str) -> Settings:
@@ -91,4 +116,7 @@ def _values(index: int) -> Values:
     }
     if rng.random() < 0.4:
         values |= {"limits.fence.floor_m": -1.0, "limits.fence.ceiling_m": float(rng.uniform(0, 3))}
+    most_gain = max(values.get("model.roll_gain", 1.0), values.get("model.pitch_gain", 1.0))
+    if rng.random() < 0.4 and values["limits.tilt_rad"] * most_gain <= MOST_TILT_RAD:
+        values |= {"model.tilt": "exact"}
     return values

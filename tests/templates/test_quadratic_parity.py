@@ -158,7 +158,7 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         lib.attitude_measure(blocks.pointer("nmpc_state_t", state), blocks.reals(measured))
         assert measured.tobytes() == model.measure(angles).tobytes()
         lib.attitude_change_command(its_model, *angles[0].tolist())
-        compare(attitude := model.change_command(attitude, angles))
+        compare(attitude := model.change_command(attitude, np.zeros_like(angles), angles))
         lib.attitude_set_command(its_model, *angles[0].tolist())
         compare(model.set_command(attitude, angles))
         lib.attitude_reset(its_model, *angles[0].tolist())

@@ -12,11 +12,11 @@ from mambo_sil.verify.calls import Outcomes, Tape, answers
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
 from tests.support import proven
-from tests.support.height import HEIGHT_CORNERS, height_case
+from tests.support.height import height_case
 from tests.support.subjects import Harm, played_fault, subject
 from tests.support.tools import require
 
-GUARDED = len(HEIGHT_CORNERS) - 1
+GUARDED = 5
 """The corner with a guard, limits, and a target whose acceleration is tracked."""
 FAULTS = {
     "a budget is never spent": Harm("nmpc.c", r"\*budget = \(rest[^;]*;", "*budget = allowed;"),

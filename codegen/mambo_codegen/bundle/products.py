@@ -28,6 +28,7 @@ _NAMES: Final = (
     *("squared", "step2_product", "step_product", "target_product", "thrust_product", "tilt_product"),
     *("to_factor", "to_move", "tracker_product", "tracking_cost", "tracking_gradient", "velocity_change"),
     *("velocity_correction", "velocity_product", "wide_product"),
+    *("angle_to_yaw", "factor_to_sine", "sine_to_angle", "slope_acceleration"),
 )
 """The functions of fixed point."""
 

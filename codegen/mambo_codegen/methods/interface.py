@@ -126,6 +126,7 @@ class Method(Constants):
         needs = (
             *(("tracker", self.tracker), ("guard", self.guard), ("height", self.has_height)),
             ("limits", self.limiting),
+            ("thrust_vector", self.has_thrust_vector),
             ("float", self.numbers.formats),
         )
         absent = {name for name, needed in needs if not needed}

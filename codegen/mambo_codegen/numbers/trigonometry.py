@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from math import factorial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -36,6 +36,22 @@ MINIMAX_COSINE: Final = {
     ),
 }
 """cos r = 1 + r^2 (c0 + c1 r^2 + ...), by the number of terms."""
+
+ARC_TANGENT_ERROR: Final = {"float32": 2.1e-7, "float64": 3.9e-8, "fixed": 5e-8}
+"""Largest absolute error of the arc tangent, rad, for tangents of at most 4; in fixed point with half a unit
+of the angle's format on top."""
+
+MINIMAX_ARC_TANGENT: Final = (
+    "0.9999993355783404881",
+    "-0.33329860784334521815",
+    "0.1994656565133223257",
+    "-0.13908629550156132947",
+    "0.096421973285621306206",
+    "-0.055912326777386903373",
+    "0.021862957881095706547",
+    "-0.004054567215229052131",
+)
+"""arctan x = x (c0 + c1 x^2 + ...) for |x| <= 1, with the least largest error, 3.75e-8."""
 
 _QUARTER_TURN: Final = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582")) / 2
 _TURN_BITS: Final = 10
@@ -90,6 +106,13 @@ def fixed_trigonometry(yaw_bits: int) -> FixedTrigonometry:
 
 def _fixed(coefficients: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(round(2**SINE_BITS * Fraction(coefficient)) for coefficient in coefficients)
+
+
+def arc_tangent(scalar: str) -> tuple[Any, ...]:
+    """Return the coefficients of the arc tangent as numbers of `scalar`; in fixed point of SINE_BITS."""
+    if scalar == "fixed":
+        return _fixed(MINIMAX_ARC_TANGENT)
+    return tuple(SCALARS[scalar](value) for value in _rounded(MINIMAX_ARC_TANGENT, scalar))
 
 
 def trigonometry(scalar: str) -> Trigonometry:

@@ -54,7 +54,8 @@ class Settings(Sections):
         """The values that the C depends on, by section.
 
         Without those that a method leaves out if they are the defaults: [target], the limits of speed,
-        braking and place, height.thrust_gain, and with a 1-norm cost.norm, model.thrust and [damping].
+        braking and place, height.thrust_gain, model.tilt, and with a 1-norm cost.norm, model.thrust and
+        [damping].
         """
         values = self.used_values
         for path in method_of(self).unnamed:
@@ -64,7 +65,7 @@ class Settings(Sections):
             if path in values:
                 del values[path]
             elif section in values:
-                del values[section][name]
+                values[section].pop(name, None)
         return values
 
     @property

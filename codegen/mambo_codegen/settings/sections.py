@@ -158,6 +158,12 @@ class Model(SettingsSection):
     drag_1_s: Annotated[Number, QUADRATIC] = Field(
         0.0, ge=0, le=5, description="Linear drag: deceleration over velocity, in 1/s."
     )
+    tilt: Annotated[Literal["small-angle", "exact"], QUADRATIC, WITH_HEIGHT] = Field(
+        "small-angle",
+        description='How a tilt accelerates the drone: "small-angle", in proportion to the angle, which is '
+        'good to about 0.4 rad; "exact", as the direction of the thrust says, and no more is asked of the '
+        "tilt than the largest thrust leaves beside the height. For tilt limits of more than 0.5 rad.",
+    )
     attitude: Annotated[Literal["measured", "predicted"], QUADRATIC] = Field(
         "measured",
         description='Attitude at the start of the prediction: "measured", or "predicted" from the past '

@@ -6,8 +6,9 @@ from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats
 from mambo_codegen.methods.quadratic.height_constants import STEEPEST_RAD
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
+from mambo_codegen.methods.quadratic.thrust_vector_constants import MOST_SLOPE
 from mambo_codegen.methods.shared.arithmetic import Arithmetic
-from mambo_codegen.methods.shared.math import Real
+from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS
 
 _ONE: Final = 2**SINE_BITS
@@ -22,6 +23,7 @@ class QuadraticArithmetic(Arithmetic):
         super().__init__(constants, formats.shifts if isinstance(formats, QuadraticFormats) else None)
         constant, period_s = self.numbers.constant, constants.settings.horizon.update_period_s
         self._update_period_s, self._steepest = constant(period_s, "step"), constant(STEEPEST_RAD, "angle")
+        self._most_slope = constant(MOST_SLOPE, "factor")
 
     def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         """Return a b - c d of sines and cosines."""
@@ -124,6 +126,31 @@ class QuadraticArithmetic(Arithmetic):
     def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
         """Return thrust over mass / T_s^2, m/s^2."""
         return self._nearest(per_s2 * thrust_m_step2, "thrust_product")
+
+    def slope_product(self, per_acceleration: Any, acceleration_m_step2: Real) -> Real:
+        """Return per_acceleration * acceleration, a slope of at most MOST_SLOPE."""
+        product = self._nearest(per_acceleration * acceleration_m_step2, "slope_product")
+        return clamp(product, self._most_slope)
+
+    def slope_acceleration(self, gain_m_step2: Any, slope: Real) -> Real:
+        """Return gain * slope, m/step^2."""
+        return self._nearest(gain_m_step2 * slope, "slope_acceleration")
+
+    def angle_product(self, factor: Any, angle_rad: Real) -> Real:
+        """Return factor * angle, rad."""
+        return self._nearest(angle_rad * factor, "factor_product")
+
+    def angle_to_yaw(self, angle_rad: Real) -> Real:
+        """Return an angle in the format of headings."""
+        return self._nearest(angle_rad, "angle_to_yaw")
+
+    def sine_to_angle(self, angle_rad: Real) -> Real:
+        """Return an angle in the format of sines as one of tilts."""
+        return self._nearest(angle_rad, "sine_to_angle")
+
+    def factor_to_sine(self, factor: Real) -> Real:
+        """Return a factor of at most 1 in the format of sines."""
+        return self._up(factor, "to_factor")
 
     def to_factor(self, cosine: Real) -> Real:
         """Return a cosine in the format of factors."""

@@ -1,12 +1,13 @@
 """Attitude model: how the drone accelerates in answer to the commands."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.thrust_vector import ThrustVector
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real, clamp
 
@@ -25,6 +26,10 @@ class AttitudeState:
     command: Real
     sine: Real
     cosine: Real
+
+
+AXES: Final = np.array([[True, False], [False, True]])
+"""Right and forward, as masks of a pair."""
 
 
 class AttitudeModel:
@@ -46,12 +51,15 @@ class AttitudeModel:
         self._command_rad = both(attitude.command_rad_step2_m, "command")
         self._trim = both(attitude.trim_rad, "angle")
         self._trim_command = both(attitude.trim_command_rad, "angle")
+        found = constants.thrust_vector
+        self.vector = ThrustVector(found, attitude, arithmetic) if found else None
+        """The direction of the thrust; None with small angles."""
         self._limit = constant(attitude.limit_m_step2, "acceleration")
         self._numbers = arithmetic.numbers
-        self.command_limit = self._admitted(
-            both(attitude.command_limit_m_step2, "move"), constants.limits.tilt
-        )
-        """The largest moves (2,), right and forward: no command for one exceeds the tilt limit."""
+        limit = both(attitude.command_limit_m_step2, "move")
+        self.command_limit = limit if found else self._admitted(limit, constants.limits.tilt)
+        """The largest moves (2,), right and forward: with small angles no command for one exceeds the tilt
+        limit."""
 
     def set_command(
         self, attitude: AttitudeState, command_rad: Real, weight: Real | None = None
@@ -60,23 +68,43 @@ class AttitudeModel:
 
         Here and below the accelerations of tilts count `weight` (n,) times as much, if there is one.
         """
+        if self.vector is not None:
+            given = self._commanded(self.vector, command_rad, weight)
+            return replace(attitude, command=clamp(given, self._limit))
         product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
         product = self.weighed(product, weight)
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
     def change_command(
-        self, attitude: AttitudeState, change_rad: Real, weight: Real | None = None
+        self, attitude: AttitudeState, before_rad: Real, after_rad: Real, weight: Real | None = None
     ) -> AttitudeState:
-        """Change the last commands by `change_rad` (n, 2), roll and pitch."""
+        """Change the last commands from `before_rad` to `after_rad` (n, 2), roll and pitch."""
+        if self.vector is not None:
+            before, after = (self._commanded(self.vector, rad, weight) for rad in (before_rad, after_rad))
+            return replace(attitude, command=clamp(attitude.command + (after - before), self._limit))
+        change_rad = after_rad - before_rad
         product = self.weighed(self._products.tilt_product(self._command_gain, change_rad), weight)
         change = np.stack([product[:, 0], -product[:, 1]], axis=1)
         return replace(attitude, command=clamp(attitude.command + change, self._limit))
 
+    def _commanded(self, vector: ThrustVector, command_rad: Real, weight: Real | None) -> Real:
+        """Return the accelerations (n, 2) of the attitude that commands (n, 2) lead to."""
+        _, slope = vector.of_command(command_rad)
+        return self.accelerations(slope, weight)
+
+    def accelerations(self, slope: Real, weight: Real | None) -> Real:
+        """Return the accelerations (n, 2), right and forward, of a thrust with slopes (n, 2)."""
+        return self.weighed(self._products.slope_acceleration(self._gain, slope), weight)
+
     def command_limit_at(self, tilt_rad: Real, generated_rad: Any) -> Real:
         """Return the largest moves (n, 2) at tilt limits (n,); those of the settings at `generated_rad`."""
-        product = self._products.tilt_product(
-            self._command_gain, tilt_rad[:, None] - np.abs(self._trim_command)
-        )
+        if self.vector is not None:
+            slope = self.vector.largest(tilt_rad[:, None] - np.abs(self._trim_command))
+            product = self._products.slope_acceleration(self._gain, slope)
+        else:
+            product = self._products.tilt_product(
+                self._command_gain, tilt_rad[:, None] - np.abs(self._trim_command)
+            )
         return np.where(
             tilt_rad[:, None] == generated_rad, self.command_limit, self._products.to_move(product)
         )
@@ -139,6 +167,8 @@ class AttitudeModel:
 
     def command_rad(self, command: Real) -> Real:
         """Return roll and pitch (n, 2) that stand for commands (n, 2), right and forward."""
+        if self.vector is not None:
+            return self.vector.command_rad(command)
         product = self._products.command_product(self._command_rad, command)
         roll, pitch = product[:, 0], -product[:, 1]
         if self._trim_command[0] != 0:
@@ -146,6 +176,22 @@ class AttitudeModel:
         if self._trim_command[1] != 0:
             pitch = self._trim_command[1] - product[:, 1]
         return np.stack([roll, pitch], axis=1)
+
+    def largest_commands(self, limit: Real, tilt_rad: Real) -> tuple[Real, Real]:
+        """Return the largest and the least roll and pitch (n, 2) of moves along one axis.
+
+        The moves are at most `limit` (n, 2); with the thrust vector the angles are at most tilt_rad (n,).
+        """
+        most, zero = self._products.move_acceleration(limit), np.zeros_like(limit)
+        both = [
+            np.stack(
+                [self.command_rad(np.where(axis, side, zero))[:, k] for k, axis in enumerate(AXES)], axis=1
+            )
+            for side in (most, -most)
+        ]
+        if self.vector is not None:
+            both = [clamp(side, tilt_rad[:, None]) for side in both]
+        return np.maximum(*both), np.minimum(*both)
 
     def _admitted(self, limit: Real, tilt_limit: Any) -> Real:
         """Lower move limits (2,) by the last digit until no command exceeds the tilt limit by rounding."""

@@ -19,6 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.kept import keep
+from mambo_codegen.methods.quadratic.thrust_vector_constants import (
+    has_thrust_vector,
+    most_slopes,
+    steepest_slope,
+)
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.sections import Damping, Model, Sections
 
@@ -77,7 +82,9 @@ def attitude_constants(settings: Sections) -> AttitudeConstants:
     loop_gains = np.array([model.roll_gain, model.pitch_gain])
     trim_rad = np.array([model.roll_trim_rad, model.pitch_trim_rad])
     tilt_rad = loop_gains * settings.limits.tilt_rad
-    largest = float(np.max(gain * (tilt_rad + np.abs(trim_rad))))
+    most, largest = tilt_rad - np.abs(trim_rad), float(np.max(gain * (tilt_rad + np.abs(trim_rad))))
+    if has_thrust_vector(settings):
+        most, largest = most_slopes(settings), gain * steepest_slope(settings)
     if settings.height is not None:
         largest *= MOST_WEIGHT
     return AttitudeConstants(
@@ -86,7 +93,7 @@ def attitude_constants(settings: Sections) -> AttitudeConstants:
         command_rad_step2_m=1 / (gain * loop_gains),
         trim_rad=trim_rad,
         trim_command_rad=trim_rad / loop_gains,
-        command_limit_m_step2=gain * (tilt_rad - np.abs(trim_rad)),
+        command_limit_m_step2=gain * most,
         tilt_row=np.array([row[0] for row in rows]),
         integral_row=np.array([row[1] for row in rows]),
         lagged_row=np.array([row[2][2:] for row in rows]),

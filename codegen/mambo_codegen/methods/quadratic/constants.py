@@ -8,6 +8,10 @@ from mambo_codegen.methods.quadratic.guard_constants import GuardConstants, guar
 from mambo_codegen.methods.quadratic.height_constants import HeightConstants, height_constants
 from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
+from mambo_codegen.methods.quadratic.thrust_vector_constants import (
+    ThrustVectorConstants,
+    thrust_vector_constants,
+)
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import LimitsConstants, stored_quantities
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
@@ -25,6 +29,11 @@ class QuadraticConstants(Constants):
     def attitude(self) -> AttitudeConstants:
         """The constants of the attitude model, in float64."""
         return attitude_constants(self.settings)
+
+    @cached_property
+    def thrust_vector(self) -> ThrustVectorConstants | None:
+        """The constants of the thrust vector, in float64; None with small angles."""
+        return thrust_vector_constants(self.settings, self.attitude.gain_m_step2_rad)
 
     @cached_property
     def observer(self) -> ObserverConstants:

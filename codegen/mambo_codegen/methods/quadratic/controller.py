@@ -75,8 +75,9 @@ class QuadraticController:
         given, good = self._command(command_rad)
         memory = self.memory
         height = self._height.set_command(memory.height, given[:, 2:])
-        change, weight = given[:, 0:2] - memory.command_rad, self._height.command_weight(height)
-        attitude = self._model.change_command(memory.attitude, change, weight)
+        attitude = self._model.change_command(
+            memory.attitude, memory.command_rad, given[:, 0:2], self._height.command_weight(height)
+        )
         new = replace(memory, command_rad=given[:, 0:2], attitude=attitude, height=height)
         self.memory = choose(good, new, memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
@@ -125,7 +126,7 @@ class QuadraticController:
         given, good = self._limits.read(limits)
         vertical = given[:, len(LIMITS) :]
         good = good & self._height.check_limits(vertical)
-        memory, new = self.memory, self._limited(given)
+        memory, new = self.memory, self._limited(np.where(good[:, None], given, self._limits.defaults))
         kept = memory.limits
         limited = replace(
             memory,
@@ -167,6 +168,7 @@ class QuadraticController:
     def _command(self, command: ArrayLike) -> tuple[Real, Rows]:
         """Return commands (n, 2) or (n, 3) within their limits, and whether each may be set."""
         given, good = self._inputs.command(command)
+        given = np.where(good[:, None], given, self._numbers.computed(0))
         angles = clamp(given[:, 0:2], self.memory.limits.bounds.tilt_rad[:, None])
         return np.column_stack([angles, self._height.limited(given[:, 2:])]), good
 
@@ -176,7 +178,7 @@ class QuadraticController:
         """Return the memory of controllers that hold commands (n, 2), with a height (n, 3)."""
         command_rad = command[:, 0:2]
         n, zeros = len(command_rad), np.zeros_like(command_rad)
-        height = self._height.steady(command[:, 2:], command_rad)
+        height = self._height.steady(command[:, 2:], self.parts.commanded_share(command_rad))
         return QuadraticMemory(
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self._model.steady(command_rad, self._height.command_weight(height)),
@@ -196,10 +198,9 @@ class QuadraticController:
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
-        limit, products = self.memory.limits.command_limit, self.parts.products
-        one, other = (self._model.command_rad(products.move_acceleration(moves)) for moves in (limit, -limit))
-        command = self.memory.command_rad
-        is_largest = (command >= np.maximum(one, other)) | (command <= np.minimum(one, other))
+        limits, command = self.memory.limits, self.memory.command_rad
+        most, least = self._model.largest_commands(limits.command_limit, limits.bounds.tilt_rad)
+        is_largest = (command >= most) | (command <= least)
         return np.asarray(np.any(is_largest, axis=1))
 
     @property

@@ -21,12 +21,19 @@ from mambo_codegen.methods.quadratic.guard_constants import guard_constants
 from mambo_codegen.methods.quadratic.height_constants import height_constants
 from mambo_codegen.methods.quadratic.height_formats import (
     learnt_m_s2,
+    spare_bound,
+    vector_shifts,
     vertical_bits,
     vertical_bounds,
     vertical_shifts,
 )
 from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
+from mambo_codegen.methods.quadratic.thrust_vector_constants import (
+    MOST_SLOPE,
+    has_thrust_vector,
+    thrust_vector_constants,
+)
 from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import tracker_constants
@@ -110,6 +117,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
     settings = Sections.model_construct(**dict(zip(_SECTIONS, sections, strict=True)))
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, height = law_constants(settings), height_constants(settings)
+    vector = thrust_vector_constants(settings, attitude.gain_m_step2_rad)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
     ranges = settings.ranges
@@ -142,7 +150,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "step": fractional_bits(period_s),
         "tracker": fractional_bits(tracker.factor) if tracker else 0,
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
-        "command": fractional_bits(*attitude.command_rad_step2_m),
+        "command": fractional_bits(*attitude.command_rad_step2_m, vector.slope_step2_m if vector else 0.0),
         "feedback": feedback_bits(feedback_steps(settings)),
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
@@ -175,7 +183,8 @@ def _formats(*sections: Any) -> QuadraticFormats:
     for name, source in zip(STATES, _inputs(bits), strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
     shifts |= _product_shifts(bits, tracker.input_quantity if tracker else "")
-    return QuadraticFormats(bits, shifts | (vertical_shifts(bits) if height else {}))
+    shifts |= vertical_shifts(bits) if height else {}
+    return QuadraticFormats(bits, shifts | (vector_shifts(bits) if vector else {}))
 
 
 def refusals(settings: Sections) -> list[Refusal]:
@@ -215,6 +224,9 @@ def _bounds(settings: Sections) -> _Bounds:
         height, observer_constants(settings), attitude_constants(settings), settings.ranges.position_m
     )
     names = ("position", "speed", "acceleration", "move", "thrust_m_s2", "angle")
+    gain = attitude_constants(settings).gain_m_step2_rad
+    if (vector := thrust_vector_constants(settings, gain)) is not None:
+        level = replace(level, acceleration=max(level.acceleration, spare_bound(vector, height)))
     return replace(
         level,
         states={name: max(bound, found.states.get(name, 0.0)) for name, bound in level.states.items()},
@@ -230,6 +242,8 @@ def _level_bounds(settings: Sections) -> _Bounds:
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
     reach_m, speed, limit = settings.ranges.position_m, observer.velocity_limit_m_step, attitude.limit_m_step2
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
+    if has_thrust_vector(settings):
+        tilted = attitude.gain_m_step2_rad * MOST_SLOPE
     tilted *= MOST_WEIGHT if settings.height else 1.0
     tilted, turned = max(tilted, limit), _TURN * limit
     target = tracker.acceleration_bound_m_step2 if tracker else 0.0

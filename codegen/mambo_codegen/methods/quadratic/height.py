@@ -18,6 +18,7 @@ from mambo_codegen.methods.quadratic.height_constants import (
     ROW_STATES,
     HeightConstants,
 )
+from mambo_codegen.methods.quadratic.thrust_vector import inverse, inverse_line
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.math import Real, clamp, confine
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
@@ -130,12 +131,14 @@ class HeightAxis:
         self._step2 = constant(found.step2_s2, "step2")
         self._steps2 = constant(found.steps2_per_s2, "thrust_per_step2")
         self._lines = {
-            name: (
-                *(constant(value, "factor") for value in (line.start, line.slope, line.two, 2.0)),
-                line.steps,
-            )
+            name: inverse_line(line, products)
             for name, line in (("thrust", found.thrust_inverse), ("weight", found.weight_inverse))
         }
+        self._spare: tuple[Any, list[Any], Any] | None = None
+        if vector := constants.thrust_vector:
+            chords = [[constant(value, "factor") for value in chord] for chord in vector.chords]
+            least = constant(vector.least_spare_m_step2, "acceleration")
+            self._spare = constant(vector.spare_m_step2, "acceleration"), chords, least
         self._least_speed = constant(SMALLEST_LIMIT, "velocity")
         self._most_speeds = np.array([constant(value, "velocity") for value in found.most_m_s])
 
@@ -163,9 +166,9 @@ class HeightAxis:
         )
         return good
 
-    def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
-        """Return the height of drones with a steady thrust (n, 1) and the attitude of commands (n, 2)."""
-        unknown, share = unknown_height(thrust_m_s2[:, 0]), self._cosine(command_rad)
+    def steady(self, thrust_m_s2: Real, share: Real) -> HeightState:
+        """Return the height of drones with a steady thrust (n, 1), of which `share` (n,) acts vertically."""
+        unknown = unknown_height(thrust_m_s2[:, 0])
         command = self._vertical(share, thrust_m_s2[:, 0])
         if self._budget is not None:
             full = np.full_like(command, self._budget.full)
@@ -195,10 +198,10 @@ class HeightAxis:
         return changed if self._budget is None else replace(changed, commanded_m_s2=thrust_m_s2[:, 0])
 
     def observe(
-        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+        self, state: HeightState, measured: Real, share: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""
-        state, on_ground = self.measure(self.advance(state), measured, tilt_rad, has_state, none_yet)
+        state, on_ground = self.measure(self.advance(state), measured, share, has_state, none_yet)
         return Lift(state, on_ground, self.weight(self.lift(state, state.thrust)))
 
     def command_weight(self, state: HeightState) -> Real:
@@ -213,15 +216,15 @@ class HeightAxis:
         return replace(state, thrust=total(thrust), lagged=total(lagged))
 
     def measure(
-        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+        self, state: HeightState, measured: Real, share: Real, has_state: Rows, none_yet: Rows
     ) -> tuple[HeightState, Rows]:
         """Correct the estimates by measured height, climb and contact with the floor (n, 3).
 
-        tilt_rad (n, 2) compensates the thrust. Returns also which drones (n,) lie on the floor.
+        share (n,) of the thrust acts vertically. Returns also which drones (n,) lie on the floor.
         """
         on_ground = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
         step = self._products.speed_product(measured[:, 1])
-        first, share = has_state & none_yet, self._cosine(tilt_rad)
+        first = has_state & none_yet
         started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
         lying = replace(started, velocity_m_step=np.zeros_like(step))
         found = choose(none_yet, started, self._correct(state, measured, step))
@@ -323,13 +326,9 @@ class HeightAxis:
 
     def _inverse(self, name: str, value: Any) -> Real:
         """Return 1/value from products, as `Reciprocal` has it."""
-        product, (start, slope, two_last, two, steps) = self._products.factor_product, self._lines[name]
-        found: Real = start - product(slope, value)
-        for step in range(steps):
-            found = product(found, (two_last if step == steps - 1 else two) - product(found, value))
-        return found
+        return inverse(self._products, self._lines[name], value)
 
-    def _cosine(self, tilt_rad: Real) -> Real:
+    def share(self, tilt_rad: Real) -> Real:
         """Return cos roll cos pitch (n,) of angles (n, 2), at least LEAST_COSINE."""
         product = self._products.sine_product
         square = self._products.angle_square(tilt_rad)
@@ -337,6 +336,21 @@ class HeightAxis:
         both = product(cosine[:, 0], cosine[:, 1])
         limited = np.where(both < self._least_cosine, self._least_cosine, both)
         return self._products.to_factor(limited)
+
+    def spare(self, state: HeightState) -> Real | None:
+        """Return the horizontal acceleration (n,) that the thrust leaves; None if unknown."""
+        if self._spare is None:
+            return None
+        product, (largest, chords, least) = self._products.factor_product, self._spare
+        vertical = self.lift(state, state.command) + self._gravity
+        if self._found.learns_gain:
+            largest = product(largest, state.gain)
+        lines = [product(largest, rise) - product(vertical, fall) for rise, fall in chords]
+        found = lines[0]
+        for line in lines[1:]:
+            found = np.where(line < found, line, found)
+        limited: Real = np.where(found < least, least, found)
+        return limited
 
     def _vertical(self, share: Real, thrust_m_s2: Real) -> Real:
         """Return the share of a thrust over mass (n,) that acts vertically, m/step^2."""

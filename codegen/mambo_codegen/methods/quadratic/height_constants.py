@@ -17,6 +17,7 @@ from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, Loop
 from mambo_codegen.methods.quadratic.law import LawSolution, axis_law
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_small, reciprocal
+from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, has_thrust_vector
 from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.height_section import Height
@@ -64,6 +65,7 @@ class HeightConstants:
     command_m_s2:  (3,) least and largest command, and that of hover.
     up_m, down_m:  distances at which the law flies at the largest climb and descent.
     most_m_s:      (2,) largest limits of climb and descent: those that can be braked in time.
+    least_share:   the thrust is compensated for the tilt as if cos roll cos pitch were at least this.
     thrust_inverse, weight_inverse: of the thrust's factors, and of (g + u)/g; the latter is never too small.
     tracker:       of the target's height; None without.
     """
@@ -87,6 +89,7 @@ class HeightConstants:
     steps2_per_s2: float
     command_m_s2: tuple[float, float, float]
     most_m_s: tuple[float, float]
+    least_share: float
     thrust_inverse: Reciprocal
     weight_inverse: Reciprocal
     tracker: TrackerConstants | None
@@ -117,7 +120,7 @@ def height_constants(settings: Sections) -> HeightConstants | None:
     least, most = (step_s * step_s * thrust for thrust in (height.thrust_min_m_s2, height.thrust_max_m_s2))
     reach_steps = float(law[0, 1] / law[0, 0])
     climb, descent = _most_m_s(height, reach_steps * step_s)
-    shares = LEAST_COSINE * (1 - deviation), 1 + deviation
+    least_share = LEAST_SHARE if has_thrust_vector(settings) else LEAST_COSINE
     return HeightConstants(
         thrust_row=rows[0, [0, 2, 3]],
         lagged_row=rows[2, 2:],
@@ -138,7 +141,8 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         steps2_per_s2=1 / delivered_s2,
         command_m_s2=(*height.command_m_s2, GRAVITY_M_S2 / height.thrust_gain),
         most_m_s=(climb, descent),
-        thrust_inverse=reciprocal(*shares),
+        least_share=least_share,
+        thrust_inverse=reciprocal(least_share * (1 - deviation), 1 + deviation),
         weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
         tracker=tracker_constants(settings, step_s, _jump_m_s2(height)),
     )

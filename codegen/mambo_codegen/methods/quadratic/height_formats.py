@@ -8,6 +8,7 @@ import numpy as np
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants
 from mambo_codegen.methods.quadratic.height_constants import LEAST_WEIGHT, ROW_STATES, HeightConstants
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants
+from mambo_codegen.methods.quadratic.thrust_vector_constants import ThrustVectorConstants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 
@@ -62,7 +63,7 @@ def vertical_bounds(
     }
     move = float(np.max(np.abs(height.rows) @ [states[name] for name in ROW_STATES]))
     move += height.ratio * (move + limit)
-    most = (1.01 / (1 - deviation)) / 0.6
+    most = (1.01 / (1 - deviation)) / height.least_share
     tilted = attitude.limit_m_step2 * 1.01 / LEAST_WEIGHT
     return VerticalBounds(
         states=states,
@@ -101,6 +102,23 @@ def vertical_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "step2_product": bits["step2"] + bits["thrust"] - bits["acceleration"],
         "thrust_product": bits["thrust_per_step2"] + bits["acceleration"] - bits["thrust"],
         "to_factor": SINE_BITS - FACTOR_BITS,
+    }
+
+
+def spare_bound(vector: ThrustVectorConstants, height: HeightConstants) -> float:
+    """Return a bound of what the thrust leaves to the tilt, chord by chord, m/step^2."""
+    deviation = height.learn_limit if height.learns_gain else 0.0
+    vertical = height.gravity_m_step2 + height.limit_m_step2
+    return float(np.max(vector.chords)) * ((1 + deviation) * vector.spare_m_step2 + vertical)
+
+
+def vector_shifts(bits: Mapping[str, int]) -> dict[str, int]:
+    """Return the right shifts of the products of the thrust vector, by their names in the templates."""
+    return {
+        "slope_product": bits["command"] + bits["acceleration"] - FACTOR_BITS,
+        "slope_acceleration": bits["gain"] + FACTOR_BITS - bits["acceleration"],
+        "angle_to_yaw": bits["angle"] - bits["yaw"],
+        "sine_to_angle": SINE_BITS - bits["angle"],
     }
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.kept import keep
 from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attitude_loops
+from mambo_codegen.methods.quadratic.thrust_vector_constants import refusals as thrust_vector_refusals
 from mambo_codegen.methods.shared.limits_constants import (
     LimitsConstants,
     TiltAcceleration,
@@ -162,7 +163,7 @@ def refusals(settings: Sections) -> list[Refusal]:
         refused.append(Refusal("observer", "outage_s", rule))
     if horizon.ramp_s and horizon.ramp_s < 2 * horizon.update_period_s:
         refused.append(Refusal("horizon", "ramp_s", "must be 0 or at least 2 update periods"))
-    refused = refused or limits_refusals(settings, _tilted(settings))
+    refused = refused or thrust_vector_refusals(settings) or limits_refusals(settings, _tilted(settings))
     if refused:
         return refused
     try:

@@ -18,6 +18,7 @@ from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.step_choices import step_choices
+from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
@@ -37,6 +38,7 @@ class Quadratic(QuadraticConstants, Method):
         "numbers": "comparisons, limits and products",
         "inputs": "the checks of inputs",
         "trigonometry": "sine and cosine of the heading",
+        "thrust_vector": "the direction of the thrust",
         "attitude": "how the drone answers the commands",
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
@@ -54,7 +56,7 @@ class Quadratic(QuadraticConstants, Method):
         *("command_rad", "thrust_m_s2"),
     )
     iterates: ClassVar[bool] = False
-    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS, "height.thrust_gain")
+    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS, "height.thrust_gain", "model.tilt")
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec sine_cosine"),
         "refuse_nan": (
@@ -137,6 +139,7 @@ class Quadratic(QuadraticConstants, Method):
             "observer": self.observer,
             "law": self.law,
             **height_context(self.height),
+            **thrust_vector_context(self.thrust_vector),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
             "least_change": LEAST_CHANGE,
@@ -209,8 +212,8 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
     tells_noise = constants.guard is not None and constants.tracker is not None
     wanted = {
         "speed_product": True,
-        "tilt_product": True,
-        "command_product": True,
+        **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),
+        "slope_acceleration": constants.thrust_vector is not None,
         "per_step_product": True,
         "per_step2_product": True,
         "drag_product": bool(constants.observer.drag_1_step),

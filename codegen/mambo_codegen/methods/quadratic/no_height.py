@@ -25,10 +25,14 @@ class NoHeight:
         """Return that limits may be set (n,)."""
         return np.ones(len(limits), np.bool_)
 
-    def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
+    def share(self, tilt_rad: Real) -> Real:
+        """Return zeros (n,)."""
+        return np.zeros_like(tilt_rad[:, 0])
+
+    def steady(self, thrust_m_s2: Real, share: Real) -> HeightState:
         """Return zeros."""
         del thrust_m_s2
-        return unknown_height(command_rad[:, 0])
+        return unknown_height(share)
 
     def limited(self, thrust_m_s2: Real) -> Real:
         """Return the thrusts (n, 0)."""
@@ -42,14 +46,17 @@ class NoHeight:
     set_thrust = set_command
 
     def observe(
-        self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
+        self, state: HeightState, measured: Real, share: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Return zeros, on no floor."""
-        del measured, tilt_rad, none_yet
+        del measured, share, none_yet
         return Lift(state, np.zeros_like(has_state), None)
 
     def command_weight(self, state: HeightState) -> None:
         """Return that a tilt counts no more than in hover."""
+
+    def spare(self, state: HeightState) -> None:
+        """Return that no thrust limits the tilt."""
 
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None

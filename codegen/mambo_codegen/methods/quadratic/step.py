@@ -112,19 +112,24 @@ class ControlStep:
         none_yet, has_state = memory.missed >= self._no_estimate, inputs.has_state
         attitude = self._turn(memory.attitude, inputs, none_yet)
         angles, seen = inputs.state[:, 4:6], has_state[:, None]
-        tilt_rad = np.where(seen, angles, memory.command_rad)
-        lift = self.height.observe(memory.height, inputs.state[:, 7:10], tilt_rad, has_state, none_yet)
-        tilt = np.where(seen, self.model.measure(angles, lift.weight), attitude.tilt)
+        share, slope = self._direction(memory, inputs)
+        lift = self.height.observe(memory.height, inputs.state[:, 7:10], share, has_state, none_yet)
+        measured = (
+            self.model.measure(angles, lift.weight)
+            if slope is None
+            else self.model.accelerations(slope, lift.weight)
+        )
+        tilt = np.where(seen, measured, attitude.tilt)
         world = self._to_world(attitude, tilt)
         estimate = self._observe(memory, inputs, none_yet, world)
         aim = self._aim(memory, inputs, lift, estimate)
-        moves = self._minimize(attitude, estimate, aim, tilt)
+        moves, by_thrust = self._minimize(attitude, estimate, aim, tilt)
         attitude, command, budget = self._command(memory, inputs, attitude, moves, aim)
         return QuadraticMemory(
             estimate=self.observer.predict(estimate, world),
             attitude=attitude,
             target=aim.motion,
-            limits=aim.limits,
+            limits=self._with_thrust(memory.limits, aim, by_thrust),
             tilt_rad=np.where(seen, angles, memory.tilt_rad),
             command_rad=command,
             missed=aim.missed,
@@ -152,6 +157,28 @@ class ControlStep:
             target=self.tracker.turn(moved.target, sine, cosine) if self.tracker else moved.target,
         )
         return choose(jump.heading_rad != 0, turned, moved)
+
+    def commanded_share(self, command_rad: Real) -> Real:
+        """Return the vertical share (n,) of the thrust with the attitude of commands (n, 2)."""
+        vector = self.model.vector
+        return self.height.share(command_rad) if vector is None else vector.of_command(command_rad)[0]
+
+    def _direction(self, memory: QuadraticMemory, inputs: CheckedInputs) -> tuple[Real, Real | None]:
+        """Return the vertical share (n,) of the thrust, and its slopes (n, 2), None with small angles."""
+        angles, vector = inputs.state[:, 4:6], self.model.vector
+        if vector is None:
+            tilt_rad = np.where(inputs.has_state[:, None], angles, memory.command_rad)
+            return self.height.share(tilt_rad), None
+        share, slope = vector.of_measured(angles)
+        return np.where(inputs.has_state, share, self.commanded_share(memory.command_rad)), slope
+
+    def _with_thrust(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
+        """Return the memory of the limits, with whether the thrust limited the last command (n,)."""
+        if not self.limits.brake:
+            return aim.limits
+        kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
+        thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
+        return replace(aim.limits, active=(aim.limits.active & ~ActiveLimit.THRUST) + thrust)
 
     def _turn(self, attitude: AttitudeState, inputs: CheckedInputs, none_yet: Rows) -> AttitudeState:
         """Return the models after they have answered the last command, at the measured heading."""
@@ -244,7 +271,7 @@ class ControlStep:
             wanted = command
             command, left = self.tilt_budget.spend(budget, memory.command_rad, wanted)
             command, budget = clamp(command, tilt_limit), np.where(aim.has_command[:, None], left, budget)
-            told = self.model.change_command(moved, command - wanted, aim.weight)
+            told = self.model.change_command(moved, wanted, command, aim.weight)
             moved = choose((command != wanted).any(axis=1), told, moved)
         command = np.where(aim.has_command[:, None], command, held)
         attitude, level = choose(aim.has_command, moved, attitude), np.zeros_like(command)
@@ -261,8 +288,13 @@ class ControlStep:
         """Return roll and pitch (n, 2) of commands (n, 2) while tilts count `weight` (n,) times."""
         return self.model.command_rad(self.height.over_weight(command, weight))
 
-    def _minimize(self, attitude: AttitudeState, estimate: Estimate, aim: _Aim, tilt: Real) -> Real:
-        """Return the first free moves (n, 2), right and forward, with the acceleration `tilt` (n, 2)."""
+    def _minimize(
+        self, attitude: AttitudeState, estimate: Estimate, aim: _Aim, tilt: Real
+    ) -> tuple[Real, Rows]:
+        """Return the first free moves (n, 2), right and forward, with the acceleration `tilt` (n, 2).
+
+        And whether what the thrust leaves limits one of them (n,).
+        """
         disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(tilt)
         if self.tracker is not None:
             disturbance = disturbance - aim.motion.acceleration_m_step2
@@ -280,8 +312,13 @@ class ControlStep:
             attitude.lagged,
             attitude.command,
         ]
-        limit = self.model.weighed(aim.limits.command_limit, aim.weight)
-        return self.optimizer.minimize(np.stack(state, axis=2), limit)
+        limit, spare = self.model.weighed(aim.limits.command_limit, aim.weight), self.height.spare(aim.height)
+        if spare is None:
+            return self.optimizer.minimize(np.stack(state, axis=2), limit), np.zeros(len(tilt), np.bool_)
+        left = self.products.to_move(spare)[:, None]
+        limit = np.where(left < limit, left, limit)
+        moves = self.optimizer.minimize(np.stack(state, axis=2), limit)
+        return moves, np.any((limit == left) & (np.abs(moves) >= limit), axis=1)
 
     def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         """Return vectors (n, 2) along x and y from those along right and forward."""

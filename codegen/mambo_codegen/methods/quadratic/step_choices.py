@@ -92,7 +92,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         per_step2=_per_step2(constants),
         own=own,
         places={part: f"own_{part}" if part in own else f"self->{part}" for part in ("attitude", "observer")},
-        locals=_locals(has_height=has_height, has_limits=has_limits),
+        locals=_locals(constants),
         goal="good" if has_height else "target",
         follows="good != NULL"
         if has_height
@@ -121,10 +121,16 @@ def _angle(index: int, name: str, axis: str, feedback: float) -> Angle:
     return Angle(index, name, f"attitude->command_m_step2[NMPC_{axis}]", added)
 
 
-def _locals(*, has_height: bool, has_limits: bool) -> tuple[str, ...]:
+def _locals(constants: QuadraticConstants) -> tuple[str, ...]:
+    has_height, has_limits = constants.has_height, constants.has_limits
     names = ["nmpc_real_t weight", "nmpc_real_t inverse", "const nmpc_target_t *good", "int on_ground = 0"]
     found = names if has_height else []
     found += ["int limit_active"] if has_height and has_limits else []
+    if constants.has_thrust_vector:
+        found += ["nmpc_real_t slope[2]"]
+        found += (
+            ["unsigned int by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST"] if has_limits else []
+        )
     return (*found, *(("nmpc_target_t limited", "const nmpc_target_t *aim = NULL") if has_limits else ()))
 
 

@@ -84,6 +84,11 @@ class Constants(ABC):
         return self.settings.height is not None
 
     @property
+    def has_thrust_vector(self) -> bool:
+        """Whether the controller computes with the direction of the thrust."""
+        return self.has_height and self.settings.model.tilt == "exact"
+
+    @property
     def state(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_state_t, in their order."""
         return (*STATE, *HEIGHT, *CONTACT) if self.has_height else STATE

@@ -30,6 +30,7 @@ class ActiveLimit(IntFlag):
     FENCE = 4
     TILT = 8
     HEIGHT = 16
+    THRUST = 32
 
 
 @dataclass(frozen=True)
@@ -329,7 +330,7 @@ class LimitsLaw:
         self, motion: TargetMotion, before: LimitsMemory, after: LimitsMemory, target: Real
     ) -> TargetMotion:
         """Return what is known of targets (n, 4 or more), nothing where braking ends."""
-        was = before.active & ~ActiveLimit.HEIGHT
+        was = before.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)
         ends = (was == ActiveLimit.BRAKING) & (after.active == 0) & self.is_slow(after.bounds, target)
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
 

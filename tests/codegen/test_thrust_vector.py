@@ -1,0 +1,173 @@
+"""The thrust vector: the direction of the thrust by tilt, and the tilt that the thrust can afford."""
+
+from itertools import pairwise
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.methods.quadratic.thrust_vector import ThrustVector
+from mambo_codegen.methods.quadratic.thrust_vector_constants import (
+    LEAST_SHARE,
+    LEAST_SPARE_M_S2,
+    SPARE_SHARE,
+    THRUST_LEFT,
+)
+from mambo_codegen.methods.shared.limits import ActiveLimit
+from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR, MINIMAX_ARC_TANGENT
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from tests.support.cases import SCALARS
+from tests.support.height import height_case
+from tests.support.height_settings import height_settings
+
+STRONG = 7
+"""The corner of the settings whose tilt limit is the largest, without trim and with gains of 1."""
+
+
+def exact_settings(tilt_rad: float = 0.7, scalar: str = "float64") -> Settings:
+    """Return the settings of a Crazyflie with the thrust vector."""
+    settings = with_option(height_settings(scalar), "limits.tilt_rad", tilt_rad)
+    return with_option(settings, "model.tilt", "exact")
+
+
+def vector_of(scalar: str) -> tuple[Quadratic, ThrustVector]:
+    """Return a method and its thrust vector."""
+    method = Quadratic(height_case(STRONG, scalar))
+    vector = method.reference_controller(1).parts.model.vector
+    assert vector is not None
+    return method, vector
+
+
+def numbers(method: Quadratic, values: Any, quantity: str) -> NDArray[Any]:
+    """Return values (n, 2) as numbers that the reference computes with."""
+    return method.numbers.quantize(values, [quantity] * 2).astype(method.numbers.computed)
+
+
+def si(method: Quadratic, found: NDArray[Any], quantity: str) -> NDArray[np.float64]:
+    """Return numbers in SI units."""
+    return method.numbers.to_si(found, quantity).astype(np.float64)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_slopes_are_those_of_a_rotated_thrust(scalar: str) -> None:
+    """By the rotation of a vector: right, forward and vertical components, where the share is not limited."""
+    method, vector = vector_of(scalar)
+    tilts = np.random.default_rng(1).uniform(-1.2, 1.2, (5000, 2))
+    body_up = np.array([0.0, 0.0, -1.0])
+    forward, right, down = Rotation.from_euler("xy", tilts).apply(body_up).T
+    near = -down > LEAST_SHARE + 1e-3
+    share, slope = vector.of_measured(numbers(method, tilts, "angle"))
+    np.testing.assert_allclose(si(method, share, "factor")[near], -down[near], atol=1e-6)
+    expected = np.stack([right, forward], axis=1) / -down[:, np.newaxis]
+    np.testing.assert_allclose(si(method, slope, "factor")[near], expected[near], rtol=2e-6, atol=6e-6)
+    assert np.all(si(method, share, "factor")[~near] >= LEAST_SHARE - 1e-6)
+    assert np.max(np.abs(si(method, slope, "factor"))) <= 1.01 / LEAST_SHARE
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_commands_lead_back_to_the_accelerations_that_they_stand_for(scalar: str) -> None:
+    """Angle by angle, up to the tilt limit of 1.2 rad along each axis and in the corners."""
+    method, vector = vector_of(scalar)
+    gain = method.attitude.gain_m_step2_rad
+    slopes = np.random.default_rng(2).uniform(-2.5, 2.5, (5000, 2))
+    wanted = numbers(method, gain * slopes, "acceleration")
+    command = vector.command_rad(wanted)
+    tilt = si(method, command, "angle")
+    forward, right, down = Rotation.from_euler("xy", tilt).apply([0.0, 0.0, -1.0]).T
+    found = np.stack([right, forward], axis=1) / -down[:, np.newaxis]
+    np.testing.assert_allclose(found, si(method, wanted, "acceleration") / gain, rtol=3e-6, atol=4e-6)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_the_arc_tangent_keeps_its_stated_error(scalar: str) -> None:
+    """For every tangent of a fine grid, up to 4 either way; and the bound is tight."""
+    method, vector = vector_of(scalar)
+    grid = np.concatenate([np.linspace(-4, 4, 200_001), np.linspace(0.999, 1.001, 20_001)])
+    slopes = numbers(method, grid.reshape(-1, 1).repeat(2, axis=1), "factor")[:, 0]
+    errors = si(method, vector.arc_tangent(slopes), "angle") - np.arctan(si(method, slopes, "factor"))
+    bits = method.numbers.bits
+    rounding = 0.0 if bits is None else 2.0 ** -(bits["angle"] + 1)
+    largest = np.max(np.abs(errors))
+    assert 0.85 * ARC_TANGENT_ERROR[scalar] < largest <= ARC_TANGENT_ERROR[scalar] + rounding
+
+
+def test_no_other_coefficients_of_the_arc_tangent_have_a_smaller_error() -> None:
+    """The largest error occurs once more than there are coefficients, with both signs (Chebyshev)."""
+    with mpmath.workdps(40):
+        terms = [mpmath.mpf(term) for term in MINIMAX_ARC_TANGENT]
+        points = [mpmath.mpf(step) / 1500 for step in range(1, 1501)]
+        errors = [sum(c * x ** (1 + 2 * k) for k, c in enumerate(terms)) - mpmath.atan(x) for x in points]
+    largest = max(map(abs, errors))
+    peaks = [error for error in errors if abs(error) > 0.99 * largest]
+    assert sum(one * other < 0 for one, other in pairwise(peaks)) == len(terms)
+
+
+def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:
+    """The quarter circle of thrust and height, from within by at most 2 % of its radius, never nothing."""
+    method = Quadratic(exact_settings())
+    controller = method.reference_controller(200)
+    height, step_s2 = controller.parts.height, method.step_s**2
+    vertical_m_s2 = np.linspace(0.0, 25.0, 200)
+    state = controller.memory.height
+    found = height.spare(state.__class__(**{**vars(state), "command": vertical_m_s2 * step_s2}))
+    assert found is not None
+    assert method.settings.height is not None
+    radius = THRUST_LEFT * method.settings.height.thrust_max_m_s2
+    spare = found / step_s2
+    together = np.hypot(spare / SPARE_SHARE, vertical_m_s2) / radius
+    free = spare > LEAST_SPARE_M_S2 + 1e-9
+    assert np.all((together[free] <= 1 + 1e-9) & (together[free] >= 0.98))
+    assert np.min(spare) == pytest.approx(LEAST_SPARE_M_S2)
+    assert np.count_nonzero(free) > 50
+
+
+def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
+    """The same far target sideways: level the tilt limit acts, with a target high above the thrust does."""
+    settings = exact_settings(1.0)
+    tilts = []
+    for above_m in (0.0, 5.0):
+        controller = method_of(settings).reference_controller(1)
+        state = np.zeros((1, 10))
+        target = np.array([[20.0, 0.0, 0.0, 0.0, above_m, 0.0]])
+        for _ in range(30):
+            step = controller.step(state, target)
+        assert step.active is not None
+        tilts.append((np.max(np.abs(step.command_rad)), int(step.active[0])))
+    (level, _), (climbing, active) = tilts
+    assert climbing < 0.6 * level
+    assert active & ActiveLimit.THRUST
+
+
+def test_small_angles_know_no_thrust_budget() -> None:
+    """The bit is never set, and the digest of settings without the key is that of before."""
+    settings = height_settings()
+    assert settings.digest == with_option(settings, "model.tilt", "small-angle").digest
+    assert settings.digest != with_option(settings, "model.tilt", "exact").digest
+    assert Quadratic(settings).thrust_vector is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "path", "value", "words"),
+    [
+        (
+            exact_settings(0.9),
+            "model.roll_gain",
+            1.5,
+            'limits.tilt_rad = 0.9 must be at most 0.8 with model.tilt = "exact"',
+        ),
+        (presets.preset("crazyflie"), "model.tilt", "exact", "has no effect without [height]"),
+    ],
+)
+def test_what_it_cannot_be_is_refused(settings: Settings, path: str, value: object, words: str) -> None:
+    """By key, rule and fix."""
+    with pytest.raises(InvalidSettingsError) as refused:
+        with_option(settings, path, value)
+    assert words in str(refused.value)
