@@ -231,6 +231,15 @@ ITEMS: Final = (
         pictures={"height-helix.png": "pictures/height-helix.png"},
     ),
     Item(
+        name="fast",
+        commands=(f"python -m benchmarks.flights.fast {RESULTS}/fast/pictures",),
+        controllers=("design crazyflie", f"{_HERE}/fast.toml"),
+        paths=(*_FLIGHT, "benchmarks/flights/fast.py", f"{_HERE}/fast.toml", _STYLE),
+        read=read_printed,
+        tables={"fast": printed},
+        pictures={"fast-eight.png": "pictures/fast-eight.png"},
+    ),
+    Item(
         name="footprint",
         commands=(
             f"mambo-nmpc footprint mambo -o {RESULTS}/footprint/float32",

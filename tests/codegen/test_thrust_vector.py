@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_codegen.methods import method_of
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.thrust_vector import ThrustVector
 from mambo_codegen.methods.quadratic.thrust_vector_constants import (
@@ -134,7 +133,7 @@ def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
     settings = exact_settings(1.0)
     tilts = []
     for above_m in (0.0, 5.0):
-        controller = method_of(settings).reference_controller(1)
+        controller = Quadratic(settings).reference_controller(1)
         state = np.zeros((1, 10))
         target = np.array([[20.0, 0.0, 0.0, 0.0, above_m, 0.0]])
         for _ in range(30):

@@ -85,6 +85,15 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "model.attitude": "measured",
         "observer.outage_s": 0.05,
     },
+    CRAZYFLIE
+    | {
+        "model.tilt": "exact",
+        "limits.tilt_rad": 0.7,
+        "target.acceleration": "given",
+        "target.tracker_gain": 1.0,
+        "limits.speed_m_s": 5.0,
+        "guard.tilt_rad_s": 8.4,
+    },
 )
 """One move and two, all that can be learnt, with and without tracker, limits, fence, age, feedback and
 guard; drones that deliver less than the commanded thrust, and more; small angles and the thrust vector."""

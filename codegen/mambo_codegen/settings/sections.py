@@ -198,7 +198,8 @@ class Target(SettingsSection):
         ge=0.01,
         le=1,
         description="Share of a new acceleration that the estimate of the acceleration and its rate takes: "
-        "a larger gain follows faster and is noisier.",
+        "a larger gain follows faster and is noisier. 1 takes a given acceleration, and its change for the "
+        "jerk, as they come, and a guard does not doubt them.",
     )
 
 

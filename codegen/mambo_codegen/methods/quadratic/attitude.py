@@ -98,16 +98,13 @@ class AttitudeModel:
 
     def command_limit_at(self, tilt_rad: Real, generated_rad: Any) -> Real:
         """Return the largest moves (n, 2) at tilt limits (n,); those of the settings at `generated_rad`."""
+        largest_rad = tilt_rad[:, None] - np.abs(self._trim_command)
         if self.vector is not None:
-            slope = self.vector.largest(tilt_rad[:, None] - np.abs(self._trim_command))
-            product = self._products.slope_acceleration(self._gain, slope)
+            product = self._products.slope_acceleration(self._gain, self.vector.largest(largest_rad))
+            moves = clamp(self._products.to_move(product), self.command_limit)
         else:
-            product = self._products.tilt_product(
-                self._command_gain, tilt_rad[:, None] - np.abs(self._trim_command)
-            )
-        return np.where(
-            tilt_rad[:, None] == generated_rad, self.command_limit, self._products.to_move(product)
-        )
+            moves = self._products.to_move(self._products.tilt_product(self._command_gain, largest_rad))
+        return np.where(tilt_rad[:, None] == generated_rad, self.command_limit, moves)
 
     def weighed(self, acceleration: Real, weight: Real | None) -> Real:
         """Return accelerations (n, 2) or (2,) times `weight` (n,), if there is one."""

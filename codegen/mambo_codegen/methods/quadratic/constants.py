@@ -91,7 +91,7 @@ class QuadraticConstants(Constants):
         if self.tracker is None:
             return ()
         velocity = () if self.tracker.is_given else ("velocity",)
-        return (*velocity, "acceleration", "acceleration", *(("factor",) * 3 if self.guard else ()))
+        return (*velocity, "acceleration", "acceleration", *(("factor",) * 3 if self.tracker.noise else ()))
 
     @property
     def _stored_height(self) -> tuple[str, ...]:

@@ -142,6 +142,7 @@ class Quadratic(QuadraticConstants, Method):
             **thrust_vector_context(self.thrust_vector),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
+            "doubts": self.tracker is not None and self.tracker.noise is not None,
             "least_change": LEAST_CHANGE,
             "most_counted": MOST_COUNTED,
             "most_noise": MOST_NOISE,
@@ -209,7 +210,7 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
 
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
-    tells_noise = constants.guard is not None and constants.tracker is not None
+    tells_noise = constants.tracker is not None and constants.tracker.noise is not None
     wanted = {
         "speed_product": True,
         **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),

@@ -25,7 +25,7 @@ class TargetMotion:
     jerk_m_step2_update:  (n, 2) estimated change of that from one control step to the next.
     deviation:            (n, 2) what was new of the acceleration in the last step, over the most that counts.
     reversal:             (n, 2) mean product of successive deviations of opposite sign.
-    doubt:                (n, 2) 1 less the believed share of what is new. All three are 0 without a guard.
+    doubt:                (n, 2) 1 less the believed share of what is new. All three are 0 without its noise.
     is_known:             (n,) whether there was a good step.
     """
 

@@ -54,7 +54,7 @@ class TrackerConstants:
     acceleration_limit_m_step2: the acceleration of the largest input, M.
     jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
     gain, jerk_gain: alpha and beta.
-    noise: that of the guard; None without one.
+    noise: that of the guard; None without one, and where a given acceleration is taken as it comes.
     velocity_range_m_s: largest velocity of a target.
     """
 
@@ -118,7 +118,9 @@ def tracker_constants(
 
 
 def _target_noise(settings: Sections, step_s: float) -> TargetNoise | None:
-    if settings.guard is None:
+    """Return the noise of a target; None if what is new of it is believed as it comes."""
+    target = settings.target
+    if settings.guard is None or (target.acceleration == "given" and target.tracker_gain == 1):
         return None
     limit_m_step2 = MOST_NOISE * settings.guard.target_noise_m_s2 * step_s * step_s
     return TargetNoise(
