@@ -38,7 +38,7 @@ DURATION_S: Final = 20.0
 
 
 @dataclass(frozen=True)
-class Case:
+class QuickFlight:
     """A curve, and by how much the rotors are slower than the file says."""
 
     words: str
@@ -49,15 +49,15 @@ class Case:
 
 
 CASES: Final = (
-    Case("eight 0.5 rad/s", "bernoulli", 2.0, 0.5),
-    Case("eight 1.0 rad/s", "bernoulli", 2.0, 1.0),
-    Case("eight 1.2 rad/s", "bernoulli", 2.0, 1.2),
-    Case("circle 1.5 rad/s", "circle", 1.0, 1.5),
-    Case("circle 2.0 rad/s", "circle", 1.0, 2.0),
-    Case("circle 2.4 rad/s", "circle", 1.0, 2.4),
-    Case("rotors 1.5 times slower: eight 1.2 rad/s", "bernoulli", 2.0, 1.2, 1.5),
-    Case("rotors 1.5 times slower: circle 2.4 rad/s", "circle", 1.0, 2.4, 1.5),
-    Case("rotors twice as slow: circle 2.4 rad/s", "circle", 1.0, 2.4, 2.0),
+    QuickFlight("eight 0.5 rad/s", "bernoulli", 2.0, 0.5),
+    QuickFlight("eight 1.0 rad/s", "bernoulli", 2.0, 1.0),
+    QuickFlight("eight 1.2 rad/s", "bernoulli", 2.0, 1.2),
+    QuickFlight("circle 1.5 rad/s", "circle", 1.0, 1.5),
+    QuickFlight("circle 2.0 rad/s", "circle", 1.0, 2.0),
+    QuickFlight("circle 2.4 rad/s", "circle", 1.0, 2.4),
+    QuickFlight("rotors 1.5 times slower: eight 1.2 rad/s", "bernoulli", 2.0, 1.2, 1.5),
+    QuickFlight("rotors 1.5 times slower: circle 2.4 rad/s", "circle", 1.0, 2.4, 1.5),
+    QuickFlight("rotors twice as slow: circle 2.4 rad/s", "circle", 1.0, 2.4, 2.0),
 )
 
 
@@ -72,7 +72,7 @@ def settings() -> dict[str, Settings]:
     }
 
 
-def drawn(case: Case, seed: int) -> Flight:
+def drawn(case: QuickFlight, seed: int) -> Flight:
     """Return the flights of random drones on the curve of a case."""
     rng, base = np.random.default_rng(seed), Scenario(vehicle=DRONE)
 
@@ -101,12 +101,12 @@ def drawn(case: Case, seed: int) -> Flight:
     return flight_of(flights, 0.01)
 
 
-def flown(case: Case, chosen: Settings, seed: int) -> Trace:
+def flown(case: QuickFlight, chosen: Settings, seed: int) -> Trace:
     """Return the flights of a case with settings."""
     return fly(drawn(case, seed), CompiledController(chosen, DRONES))
 
 
-def cell(case: Case, chosen: Settings) -> str:
+def cell(case: QuickFlight, chosen: Settings) -> str:
     """Return IAE, median and 95 %, in m s, 95 % of the largest errors of the height, in m, and crashes."""
     iae, height, crashes = [], [], 0
     for seed in SEEDS:
