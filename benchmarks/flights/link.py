@@ -61,9 +61,8 @@ HEIGHT_M: Final = 1.5
 class JumpingFrame(SteadyFrame):
     """The frame of the estimator as it is."""
 
-    def hold(self, estimate: EstimatedState) -> EstimatedState:
-        """Return the estimate."""
-        return estimate
+    def follow(self, estimate: EstimatedState) -> None:
+        """Take no change for a jump."""
 
 
 @dataclass

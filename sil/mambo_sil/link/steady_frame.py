@@ -1,22 +1,23 @@
-"""The frame in which the controller flies when the estimator of the autopilot moves its own by a jump.
+"""What a flight does when the estimator of the autopilot moves its frame by a jump.
 
 An estimator that learns that it was wrong moves position, velocity or heading at once; the drone has not
-moved. The controller would answer with a jump of its command, and its observer would take the jump for a
-gust. So the controller gets the estimate less an offset, which begins as the jump and then fades,
+moved. So the controller is told of the jump (`nmpc_shift`), and the target moves with the frame, by an offset
+that begins as the jump and then fades,
 
-    offset'' = -2 w offset' - w^2 offset,
+    offset''' = -3 w offset'' - 3 w^2 offset' - w^3 offset,
 
-with position and velocity less `offset` and `offset'`, so that they agree: the drone glides to where the new
-frame has its target. While it does, a fence of the controller is off by the offset.
+with its velocity and acceleration, which changes gradually: the command does not jump, and the drone glides
+to where the new frame has its target. Limits stay in the frame.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from mambo_sil.api.frames import wrapped
+from mambo_sil.api.states import TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.link.records import EstimatedState
 
@@ -28,12 +29,21 @@ LONGEST_S: Final = 0.25
 """Time between two estimates from which on a jump cannot be seen."""
 NOISE_M_S: Final = 0.1
 """Change of the velocity that may be noise and motion: where resets are not counted, none is seen in it."""
-FADING_1_S: Final = 0.8
+FADING_1_S: Final = 1.05
 """w: after 0.2 m the drone glides with 0.06 m/s at most, and needs 6 s for 95 % of it."""
 
 
+@dataclass(frozen=True, eq=False)
+class FrameJump:
+    """By what position and velocity (3,), z down, and heading have jumped."""
+
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    heading_rad: float
+
+
 class SteadyFrame:
-    """Follows the jumps of an estimator; call `hold` once for each estimate."""
+    """Follows the jumps of an estimator; call `follow` once for each estimate."""
 
     def __init__(self) -> None:
         self.jumps = 0
@@ -43,43 +53,50 @@ class SteadyFrame:
         self._last: EstimatedState | None = None
         self._offset_m: FloatArray = np.zeros(3)
         self._offset_m_s: FloatArray = np.zeros(3)
-
-    @property
-    def offset_m(self) -> FloatArray:
-        """What remains of the jumps of the position (3,)."""
-        return self._offset_m
+        self._offset_m_s2: FloatArray = np.zeros(3)
 
     def begin(self, estimate: EstimatedState) -> None:
         """Take an estimate as it is, and forget what was before."""
         self._last = estimate
-        self._offset_m, self._offset_m_s = np.zeros(3), np.zeros(3)
+        self._offset_m, self._offset_m_s, self._offset_m_s2 = np.zeros((3, 3))
 
-    def hold(self, estimate: EstimatedState) -> EstimatedState:
-        """Return an estimate less the rest of the jumps; its heading is the new one."""
+    def follow(self, estimate: EstimatedState) -> FrameJump | None:
+        """Take the next estimate; return the jump that the frame has made before it, if there was one."""
         last, self._last = self._last, estimate
         if last is None or (passed_s := estimate.time_s - last.time_s) > LONGEST_S:
             self.begin(estimate)
-            return estimate
+            return None
         self._fade(passed_s)
+        if not _has_jumped(last, estimate, passed_s):
+            return None
         moved_m, moved_m_s, turned_rad = _changes(last, estimate, passed_s)
-        if _has_jumped(last, estimate, passed_s):
-            self.jumps += 1
-            self._offset_m = self._offset_m + moved_m
-            if estimate.resets is not None or float(np.abs(moved_m_s).max()) > NOISE_M_S:
-                self._offset_m_s = self._offset_m_s + moved_m_s
-            self.heading_change_rad += turned_rad
-        return replace(
-            estimate,
-            position_m=estimate.position_m - self._offset_m,
-            velocity_m_s=estimate.velocity_m_s - self._offset_m_s,
+        if estimate.resets is None and float(np.abs(moved_m_s).max()) <= NOISE_M_S:
+            moved_m_s = np.zeros(3)
+        self.jumps += 1
+        self._offset_m = self._offset_m + moved_m
+        self._offset_m_s = self._offset_m_s + moved_m_s
+        self.heading_change_rad += turned_rad
+        return FrameJump(moved_m, moved_m_s, turned_rad)
+
+    def moved(self, target: TargetState) -> TargetState:
+        """Return a target as far off as the rest of the jumps; its heading is its own."""
+        acceleration_m_s2 = target.acceleration_m_s2
+        return TargetState(
+            target.position_m + self._offset_m,
+            target.velocity_m_s + self._offset_m_s,
+            None if acceleration_m_s2 is None else acceleration_m_s2 + self._offset_m_s2,
+            target.yaw_rad,
         )
 
     def _fade(self, passed_s: float) -> None:
         """Let time pass for the offset, which solves its differential equation."""
-        left = math.exp(-FADING_1_S * passed_s)
-        pull_m_s = self._offset_m_s + FADING_1_S * self._offset_m
-        self._offset_m = left * (self._offset_m + passed_s * pull_m_s)
-        self._offset_m_s = left * (self._offset_m_s - FADING_1_S * passed_s * pull_m_s)
+        left, w = math.exp(-FADING_1_S * passed_s), FADING_1_S
+        first_m_s = self._offset_m_s + w * self._offset_m
+        second_m_s2 = self._offset_m_s2 + w * (2.0 * self._offset_m_s + w * self._offset_m)
+        later_m_s = left * (first_m_s + passed_s * second_m_s2)
+        self._offset_m = left * (self._offset_m + passed_s * (first_m_s + passed_s / 2.0 * second_m_s2))
+        self._offset_m_s = later_m_s - w * self._offset_m
+        self._offset_m_s2 = left * second_m_s2 - w * (2.0 * self._offset_m_s + w * self._offset_m)
 
 
 def _changes(

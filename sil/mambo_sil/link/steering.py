@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,7 +14,7 @@ from mambo_sil.api.outcome import StepOutcome
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.errors import LinkError
 from mambo_sil.link.records import EstimatedState, SetAttitude
-from mambo_sil.link.steady_frame import SteadyFrame
+from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
 
 PAUSE_S: Final = 0.1
 """Time without an estimate after which the controller begins anew, at the present attitude."""
@@ -31,8 +31,8 @@ class Update:
     """One step of the controller: what it got, and what it commanded."""
 
     estimate: EstimatedState
-    """As the controller got it."""
     target: TargetState
+    """As the controller got it: off by the rest of the jumps of the estimator."""
     command_rad: tuple[float, float]
     thrust_m_s2: float
     status: int
@@ -42,6 +42,8 @@ class Update:
     thrust: float
     """Share of the largest thrust."""
     jumps: int
+    jump: FrameJump | None
+    """That of the estimator before this step, if there was one."""
 
 
 class Steering:
@@ -68,6 +70,8 @@ class Steering:
         self.take_overs = 0
         self._record = record
         self._last: EstimatedState | None = None
+        self._jump: FrameJump | None = None
+        """That of the estimator since the last step."""
         self._sent_rad, self._sent_m_s2, self._yaw_rad = np.zeros(2), self.hover_m_s2, 0.0
         self._last_s = self._clock_s = -math.inf
 
@@ -79,7 +83,7 @@ class Steering:
         self._sent_m_s2 = self.hover_m_s2
         self.controller.reset(self._sent_rad, thrust_m_s2=self._sent_m_s2)
         self.frame.begin(estimate)
-        self._last = None
+        self._last = self._jump = None
         self._clock_s = estimate.time_s - self.controller.update_period_s
         self._yaw_rad = yaw_rad - self.frame.heading_change_rad
         self.take_overs += 1
@@ -95,20 +99,34 @@ class Steering:
         self._last_s, period_s = estimate.time_s, self.controller.update_period_s
         steps = round((estimate.time_s - self._clock_s) / period_s)
         self._clock_s += steps * period_s
-        held, last = self.frame.hold(estimate), self._last
+        self._follow_frame(estimate)
         if steps < 1:
             return None
-        self._last = held
+        last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
-            self._step(_between(last or held, held, 1.0 - left / steps), targets(left * period_s))
+            self._step(_between(last, estimate, 1.0 - left / steps), self._goal(targets(left * period_s)))
             self.controller.set_command(self._sent_rad, self._sent_m_s2)
-        target = self._turned(targets(0.0))
-        outcome = self._step(held, target)
-        return self._send(held, target, outcome, steps * period_s)
+        target = self._goal(targets(0.0))
+        outcome = self._step(estimate, target)
+        return self._send(estimate, target, outcome, steps * period_s)
 
-    def _step(self, held: EstimatedState, target: TargetState) -> StepOutcome:
-        state = DroneState(held.position_m, held.velocity_m_s, held.attitude_rad)
-        return self.controller.step(state, self._turned(target))
+    def _follow_frame(self, estimate: EstimatedState) -> None:
+        """Tell the controller of a jump of the estimator."""
+        jump = self.frame.follow(estimate)
+        if jump is None:
+            return
+        self.controller.shift(jump.position_m, jump.velocity_m_s, jump.heading_rad)
+        self._jump = jump if self._jump is None else _sum(self._jump, jump)
+        if self._last is not None:
+            self._last = _moved(self._last, jump)
+
+    def _step(self, estimate: EstimatedState, target: TargetState) -> StepOutcome:
+        state = DroneState(estimate.position_m, estimate.velocity_m_s, estimate.attitude_rad)
+        return self.controller.step(state, target)
+
+    def _goal(self, target: TargetState) -> TargetState:
+        """Return the target that the controller gets for one of the course."""
+        return self._turned(self.frame.moved(target))
 
     def _turned(self, target: TargetState) -> TargetState:
         """Return a target with the heading at which the controller began, if it has none."""
@@ -116,7 +134,7 @@ class Steering:
         return TargetState(target.position_m, target.velocity_m_s, target.acceleration_m_s2, yaw_rad)
 
     def _send(
-        self, held: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float
+        self, estimate: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float
     ) -> SetAttitude:
         """Return the set-point of an outcome, and record it; the controller learns of a capped thrust."""
         roll_rad, pitch_rad, heading_rad, thrust_m_s2 = outcome.attitude_thrust("NED").tolist()
@@ -129,12 +147,14 @@ class Steering:
         self.is_accepted = int(outcome.status) == 0
         self._record(
             Update(
-                *(held, target, (roll_rad, pitch_rad), thrust_m_s2, int(outcome.status)),
+                *(estimate, target, (roll_rad, pitch_rad), thrust_m_s2, int(outcome.status)),
                 *(self.take_overs, self.hover_m_s2, thrust, self.frame.jumps),
+                self._jump,
             )
         )
+        self._jump = None
         attitude_rad = np.array([roll_rad, pitch_rad, heading_rad])
-        return SetAttitude(held.time_s, attitude_rad, thrust)
+        return SetAttitude(estimate.time_s, attitude_rad, thrust)
 
     def level(self, time_s: float) -> SetAttitude:
         """Return a level set-point with the thrust of hover, for a drone whose state is not known."""
@@ -144,6 +164,25 @@ class Steering:
     def _heading_rad(self) -> float:
         """The heading at which the controller began, in the present frame of the estimator."""
         return self._yaw_rad + self.frame.heading_change_rad
+
+
+def _moved(estimate: EstimatedState, jump: FrameJump) -> EstimatedState:
+    """Return an estimate of the old frame in the new one."""
+    return replace(
+        estimate,
+        position_m=estimate.position_m + jump.position_m,
+        velocity_m_s=estimate.velocity_m_s + jump.velocity_m_s,
+        attitude_rad=estimate.attitude_rad + np.array([0.0, 0.0, jump.heading_rad]),
+    )
+
+
+def _sum(one: FrameJump, other: FrameJump) -> FrameJump:
+    """Return two jumps as one."""
+    return FrameJump(
+        one.position_m + other.position_m,
+        one.velocity_m_s + other.velocity_m_s,
+        one.heading_rad + other.heading_rad,
+    )
 
 
 def _between(last: EstimatedState, now: EstimatedState, share: float) -> EstimatedState:

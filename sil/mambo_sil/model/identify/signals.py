@@ -26,6 +26,12 @@ TAKE_OVERS: Final = "take_overs"
 """How often the controller has begun anew, at the present attitude."""
 START_THRUST: Final = "start_thrust_m_s2"
 """The thrust over mass with which it did."""
+JUMPS: Final = "estimator_jumps"
+"""How often the frame of the estimates has jumped."""
+JUMP: Final = (
+    *("jump_x_m", "jump_y_m", "jump_z_m", "jump_vx_m_s", "jump_vy_m_s", "jump_vz_m_s", "jump_yaw_rad"),
+)
+"""By what it did last, as the controller was told."""
 GROUNDED: Final = "grounded"
 """Whether the controller was told that the floor may carry the drone."""
 LEVELLED: Final = "levelled"
@@ -37,7 +43,19 @@ OF_HEIGHTS: Final = (START_THRUST, GROUNDED, LEVELLED)
 UPDATE: Final = "update"
 """The number of the update that the row is of, counted modulo `UPDATES`."""
 UPDATES: Final = 2**16
-OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS, UPDATE, *OF_HEIGHTS)
+OPTIONAL: Final = (
+    YAW,
+    *POSITION,
+    HEIGHT,
+    *VELOCITY,
+    THRUST,
+    THRUST_COMMAND,
+    TAKE_OVERS,
+    UPDATE,
+    *OF_HEIGHTS,
+    JUMPS,
+    *JUMP,
+)
 """Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
 pitch is positive with the nose up."""
 

@@ -20,6 +20,8 @@ from mambo_sil.model.identify.signals import (
     DEGREE,
     GROUNDED,
     HEIGHT,
+    JUMP,
+    JUMPS,
     LEVELLED,
     SHIFT,
     START_THRUST,
@@ -84,7 +86,9 @@ _OTHER: Final[dict[str, tuple[Column, ...]]] = {
     "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
-    **{name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, GROUNDED, LEVELLED)},
+    **{
+        name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, GROUNDED, LEVELLED, JUMPS, *JUMP)
+    },
 }
 SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     name: (
@@ -132,6 +136,8 @@ class LoggedInputs:
     """Whether its caller flew level instead (k,)."""
     begins: NDArray[np.bool_]
     """Whether the controller begins anew at the attitude (k,): at a take-over or behind a long gap."""
+    jump: FloatArray
+    """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
     gaps: int
     """Gaps that are too long to fill."""
     may_lie: NDArray[np.bool_]
@@ -191,6 +197,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         shift=np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1),
         levelled=levelled,
         begins=begins,
+        jump=_jumps(log, time_s),
         gaps=int(behind.sum()),
         may_lie=_near_floor(state[:, -3])
         if commands_thrust and GROUNDED not in log.signals
@@ -304,6 +311,15 @@ def _take_overs(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
         return np.zeros(len(time_s), bool)
     begins: NDArray[np.bool_] = np.diff(_held(log, (TAKE_OVERS,), time_s)[:, 0], prepend=np.nan) != 0.0
     return begins
+
+
+def _jumps(log: FlightLog, time_s: FloatArray) -> FloatArray:
+    """Return by what the frame has jumped before updates (k, 7), zeros where it has not."""
+    if any(name not in log.signals for name in (JUMPS, *JUMP)):
+        return np.zeros((len(time_s), len(JUMP)))
+    counts = _held(log, (JUMPS,), time_s)
+    has_jumped = np.diff(counts, prepend=counts[:1], axis=0) > 0.0
+    return np.where(has_jumped, _held(log, JUMP, time_s), 0.0)
 
 
 def _behind_gaps(is_logged: NDArray[np.bool_], longest: int) -> NDArray[np.bool_]:

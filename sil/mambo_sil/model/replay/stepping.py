@@ -1,13 +1,17 @@
 """One update of a replay: a step of n controllers on an update of a log."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.replay.logged_inputs import LoggedInputs
+
+_UPWARDS: Final = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+_LEVEL: Final = [0, 1, 3, 4, 6]
+"""A jump with the height upwards, and the columns of one without."""
 
 
 def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: FloatArray) -> Any:
@@ -18,6 +22,9 @@ def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: F
     """
     n, settings = len(states), controller.settings
     commands_thrust = settings.height is not None
+    if inputs.jump[k].any():
+        change = inputs.jump[k] * _UPWARDS if commands_thrust else inputs.jump[k][_LEVEL]
+        controller.shift(np.repeat(change[np.newaxis], n, axis=0))
     target = np.repeat(inputs.target[k : k + 1], n, axis=0)
     if inputs.shift[k].any():
         controller.shift(np.repeat(inputs.shift[k : k + 1], n, axis=0))
