@@ -236,11 +236,13 @@ def test_a_counted_jump_may_be_small_and_have_a_velocity() -> None:
 
 
 @pytest.mark.long
-def test_ctrl_c_lands_and_raises() -> None:
-    """The program is told after the landing."""
-    flight = Hovering("px4")
-    with pytest.raises(KeyboardInterrupt, match="landed: Ctrl-C"):
-        flight.fly(3.0, (0.0, interrupt))
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_ctrl_c_lands_and_raises(number: signal.Signals, word: str) -> None:
+    """The program is told after the landing; SIGTERM, by which a service is stopped, does the same."""
+    before, flight = signal.getsignal(number), Hovering("px4")
+    with pytest.raises(KeyboardInterrupt, match=f"landed: {word}"):
+        flight.fly(3.0, (0.0, lambda: os.kill(os.getpid(), number)))
+    assert signal.getsignal(number) == before
     assert flight.autopilot.is_on_ground
     assert not flight.autopilot.armed
 

@@ -42,7 +42,8 @@ class Pilot:
     It is a context manager: it opens its link, lands if the drone still flies, and closes the link.
     The calls must follow each other without a pause: while none runs, nothing is sent, which the autopilot
     takes for a lost link after a second. Ctrl-C lands, a second one stops the motors; either raises
-    KeyboardInterrupt after that. Every call raises PilotError, with a sentence, if the flight has ended.
+    KeyboardInterrupt after that; so does SIGTERM. Every call raises PilotError, with a sentence, if the
+    flight has ended.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class Pilot:
     ) -> None:
         self._open_link, self.steering = open_link, Steering(controller, record)
         self.life = LifeCycle(self.steering, 1.0)
-        self._watch, self._interrupts = watch, 0
+        self._watch, self._interrupts, self._interrupted = watch, 0, ""
 
     @classmethod
     def connect(cls, path: str | Path, link: str, **options: Unpack[ControllerOptions]) -> Self:
@@ -169,9 +170,9 @@ class Pilot:
         for record in records:
             self.life.receive(record, now_s)
         if self._interrupts > 1:
-            self.life.stop("Ctrl-C twice")
+            self.life.stop(f"{self._interrupted} twice")
         elif self._interrupts == 1:
-            self.life.land("Ctrl-C", good=False)
+            self.life.land(self._interrupted, good=False)
         for order in self.life.orders(now_s):
             send_order(self.link.mav, order, self.life.system, self.life.stack or PX4)
         self._watch(self)
@@ -185,19 +186,21 @@ class Pilot:
 
     @contextlib.contextmanager
     def _counted_interrupts(self) -> Iterator[None]:
-        """Count SIGINT in place of raising KeyboardInterrupt; only the main thread gets signals."""
+        """Count SIGINT and SIGTERM in place of what else they do; only the main thread gets signals."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
 
         def count(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - what a handler gets
             self._interrupts += 1
+            self._interrupted = "Ctrl-C" if number == signal.SIGINT else "SIGTERM"
 
-        before = signal.signal(signal.SIGINT, count)
+        before = {number: signal.signal(number, count) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, before)
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
     def __enter__(self) -> Self:
         """Open the link; raises LinkError."""
