@@ -101,7 +101,7 @@ QUADRATIC_FAULTS = {
     "pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
     "no trim of roll": ("state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
     "rows of the other axis": ("next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),
-    "the tilt stays": ("    attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
+    "the tilt stays": ("    turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
     "the first move alone": ("move_m_step2 - (move_ratios[axis] * change_m_step2)", "move_m_step2"),
     "the ratio of the other axis": ("(move_ratios[axis] * change_m_step2)", "(move_ratios[1 - axis] * change_m_step2)"),
     "the second move has no limit": ("(within(second_m_step2, limit_m_step2) == 0)", "(0)"),
