@@ -19,7 +19,7 @@ LONG = {
         for name in ("crazyflie", "first-flight", "own-drone", "paper", "px4-ardupilot")
     ),
     *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
-    *(f"how-to/{name}.md" for name in ("gymnasium", "rotorpy")),
+    "how-to/simulators.md",
     *(f"how-to/{name}.md" for name in ("regress", "replay", "tune", "verify")),
 }
 """Pages whose commands take two seconds or more of an idle core."""
@@ -39,14 +39,8 @@ NOT_RUN = {
     ),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
-    "how-to/crazyflow.md": ("it installs", "needs crazyflow and JAX"),
     "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
     "how-to/from-0.1-to-0.2.md": ("needs files of 0.1",),
-    "how-to/gym-pybullet-drones.md": (
-        "it installs",
-        "needs gym-pybullet-drones, which is not on PyPI",
-    ),
-    "how-to/gymnasium.md": ("it installs",),
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/libraries.md": ("needs arduino-cli", "needs PlatformIO", "needs ESP-IDF"),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
@@ -62,8 +56,13 @@ NOT_RUN = {
         "needs the packages build and twine",
         "it changes the version",
     ),
-    "how-to/pyflyt.md": ("it installs", "needs PyFlyt"),
-    "how-to/rotorpy.md": ("it installs",),
+    "how-to/simulators.md": (
+        *("it installs", "needs crazyflow and JAX"),
+        "it installs",
+        *("it installs", "needs gym-pybullet-drones, which is not on PyPI"),
+        *("it installs", "needs PyFlyt"),
+        "it installs",
+    ),
     "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),
     "tutorials/crazyflie.md": (
@@ -95,8 +94,9 @@ def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: 
         require(tool, package)
     if name in {"how-to/design.md", "how-to/tune.md"}:
         require_module("optuna")
-    if name in {"how-to/gymnasium.md", "how-to/rotorpy.md"}:
-        require_module(Path(name).stem)
+    if name == "how-to/simulators.md":
+        require_module("gymnasium")
+        require_module("rotorpy")
     found = faults(read(DOCS / name), tmp_path, warm)
     assert not found, "\n\n".join(found)
 
