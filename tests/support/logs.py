@@ -298,6 +298,8 @@ def ulog(
 ) -> bytes:
     """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body.
 
+    Where the columns have a seen position, the camera measured it, in the axes of the estimate.
+
     `target` names the columns of position, velocity and acceleration of the target, as far as it has them;
     `hover` is the estimated share of the thrust in hover, where the columns have a thrust.
     """
@@ -327,6 +329,9 @@ def ulog(
             [each for x, y in zip(given[::2], given[1::2], strict=True) for each in (x, y, nothing)]
         )
 
+    if "seen_x_m" in columns:
+        formats["vehicle_visual_odometry"] = "uint64_t timestamp;float[2] position;float pose_frame;"
+        topics.append([columns["seen_x_m"], columns["seen_y_m"], np.ones_like(roll)])
     if hover is not None:
         formats["hover_thrust_estimate"] = "uint64_t timestamp;float hover_thrust;float valid;"
         topics.append([np.full_like(roll, hover), np.ones_like(roll)])

@@ -16,6 +16,7 @@ from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.curves import Curves
 from mambo_sil.model.identify.dataflash import read_dataflash
+from mambo_sil.model.identify.estimator import estimator_errors
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
 from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, tumbled
@@ -91,6 +92,9 @@ def identify(logs: Sequence[FlightLog], left_out: Sequence[str] = ()) -> tuple[I
         motion=motion,
         thrust=fit_thrust(segments),
         noise=Noise(_white_noise(logs, POSITION), _white_noise(logs, VELOCITY)),
+        estimator=estimator_errors(
+            logs, [[(one.time_s[0], one.time_s[-1]) for one in piece] for piece in pieces]
+        ),
         model=model,
         remarks=remarks,
     )

@@ -1,9 +1,10 @@
 """The record of an identification: its summary, what it found in words, and the section of the report."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from mambo_sil.model.identify.estimator import EstimatorErrors
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.model.identify.signals import DEGREE
@@ -103,6 +104,8 @@ class IdentifySummary(ReportedSummary):
     thrust: ThrustResult | None = None
     """None where no log has both height and thrust."""
     noise: Noise
+    estimator: EstimatorErrors | None = None
+    """None where no log has what the autopilot's camera measured."""
     model: dict[str, float]
     """The keys of section [model] that follow; empty if an axis is refused."""
     remarks: list[str]
@@ -188,7 +191,7 @@ def thrust_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
 
 
 def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
-    """Return name and value of the measured tilts' offset and of each noise."""
+    """Return name and value of the measured tilts' offset, of each noise and of the estimator's error."""
     tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
     offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
     rows = [
@@ -200,6 +203,10 @@ def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
     ):
         rows += [(words, f"{three_digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
+    if summary.estimator is not None:
+        error, lasts = (three_digits(one) for one in astuple(summary.estimator))
+        words = f"{error} m/s, correlated for {lasts} s"
+        rows.append(("error of the estimated velocity", words))
     return rows
 
 

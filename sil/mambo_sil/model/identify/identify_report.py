@@ -105,6 +105,7 @@ def vehicle_text(summary: IdentifySummary, mass_kg: float | None) -> str:
         *trims,
         *responses,
         *thrust,
+        *_sensors_lines(summary),
         "",
         "[uncertainty]  # half-widths of the 95 % intervals; no flight reads them",
         *(f"{key} = {float(f'{each.within:.2g}')!r}" for key, each in within.items()),
@@ -131,6 +132,19 @@ def _thrust_lines(summary: IdentifySummary) -> tuple[list[str], dict[str, Interv
         f"lag_s = {_round(thrust.lag_s.value)}  # with dead time and the age of the height",
     ]
     return lines, {"thrust_gain": gain, "thrust_lag_s": thrust.lag_s}
+
+
+def _sensors_lines(summary: IdentifySummary) -> list[str]:
+    """Return the section [sensors], if the logs show how the estimator of an autopilot errs."""
+    if (errors := summary.estimator) is None:
+        return []
+    return [
+        "",
+        "[sensors]  # the estimate beside what the camera measured",
+        'kind = "autopilot"',
+        f"velocity_error_m_s = {_round(errors.velocity_m_s)}",
+        f"velocity_error_s = {_round(errors.correlation_s)}",
+    ]
 
 
 def _heading(summary: IdentifySummary) -> list[str]:

@@ -17,6 +17,8 @@ YAW: Final = "yaw_rad"
 POSITION: Final = ("x_m", "y_m")
 HEIGHT: Final = "z_m"
 VELOCITY: Final = ("vx_m_s", "vy_m_s")
+SEEN: Final = ("seen_x_m", "seen_y_m")
+"""The position that a camera measured, beside the estimate."""
 THRUST: Final = "thrust_acceleration_m_s2"
 THRUST_COMMAND: Final = "thrust_command"
 """The commanded thrust in any unit; where a log has none, its `THRUST` is taken."""
@@ -48,6 +50,7 @@ OPTIONAL: Final = (
     *POSITION,
     HEIGHT,
     *VELOCITY,
+    *SEEN,
     THRUST,
     THRUST_COMMAND,
     TAKE_OVERS,

@@ -20,6 +20,7 @@ from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
     LEVELLED,
+    SEEN,
     SHIFT,
     START_THRUST,
     TAKE_OVERS,
@@ -42,6 +43,9 @@ _TARGET: Final[dict[str, tuple[str, ...]]] = {
     "target_ay_m_s2": ("acceleration[1]",),
 }
 """Fields of the target, since PX4 1.14 and before; NaN where PX4 was not given the quantity."""
+VISION: Final = "vehicle_visual_odometry"
+_NED: Final = 1
+"""Its pose frame with the axes of the estimate."""
 _ANGLES: Final = ("roll", "pitch", "yaw")
 _THRUST: Final = "thrust_body[2]"
 """Commanded thrust along z of the body, which points down."""
@@ -122,6 +126,7 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
     for signal, field in _MOTION.items():
         if field in motion:
             signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
+    signals |= _seen(topics.get(VISION, {}))
     target = topics.get(TRAJECTORY, {})
     for signal, fields in _TARGET.items():
         for field in fields:
@@ -131,6 +136,17 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
     if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
         raise LogError(tuple(faults))
     return signals
+
+
+def _seen(vision: Mapping[str, FloatArray]) -> dict[str, Signal]:
+    """Return the positions that a camera measured, if their axes are those of the estimate."""
+    if not (vision.get("pose_frame", np.zeros(0)) == _NED).any():
+        return {}
+    fields = [f"position[{axis}]" for axis in range(2)]
+    return {
+        signal: _signal(vision, vision[field], f"{VISION}.{field}")
+        for signal, field in zip(SEEN, fields, strict=True)
+    }
 
 
 def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
@@ -145,7 +161,7 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
-            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, STEPS])
+            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, VISION, STEPS])
     except OSError as error:
         raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
     except Exception as error:  # whatever a damaged file makes of the parser
