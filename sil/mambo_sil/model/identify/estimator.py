@@ -28,7 +28,7 @@ _FALLEN: Final = 2.0 / math.e
 
 
 @dataclass(frozen=True)
-class EstimatorErrors:
+class VelocityErrors:
     """Of the velocity, the median of all windows and both axes."""
 
     velocity_m_s: Number
@@ -37,7 +37,7 @@ class EstimatorErrors:
 
 def estimator_errors(
     logs: Sequence[FlightLog], stretches: Sequence[Sequence[Stretch]]
-) -> EstimatorErrors | None:
+) -> VelocityErrors | None:
     """Return the errors of the estimator in the stretches of each log.
 
     None if no window of them has a position that was seen.
@@ -52,7 +52,7 @@ def estimator_errors(
     if not found:
         return None
     velocity_m_s, correlation_s = np.median(np.array(found), axis=0).tolist()
-    return EstimatorErrors(velocity_m_s=velocity_m_s, correlation_s=correlation_s)
+    return VelocityErrors(velocity_m_s=velocity_m_s, correlation_s=correlation_s)
 
 
 def _windows(log: FlightLog, stretch: Stretch) -> Iterator[FloatArray]:

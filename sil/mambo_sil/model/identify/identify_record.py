@@ -4,7 +4,7 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from mambo_sil.model.identify.estimator import EstimatorErrors
+from mambo_sil.model.identify.estimator import VelocityErrors
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.model.identify.signals import DEGREE
@@ -104,7 +104,7 @@ class IdentifySummary(ReportedSummary):
     thrust: ThrustResult | None = None
     """None where no log has both height and thrust."""
     noise: Noise
-    estimator: EstimatorErrors | None = None
+    estimator: VelocityErrors | None = None
     """None where no log has what the autopilot's camera measured."""
     model: dict[str, float]
     """The keys of section [model] that follow; empty if an axis is refused."""
