@@ -796,7 +796,7 @@ int nmpc_is_saturated(const nmpc_t *self)
            || (reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
 }
 
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m[2],
                          const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
 {
     if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {

@@ -223,7 +223,7 @@ int nmpc_is_saturated(const nmpc_t *self);
  *
  * Returns NMPC_BAD_SHIFT, and changes nothing, if a change exceeds NMPC_POSITION_RANGE_M, NMPC_VELOCITY_RANGE_M_S or
  * NMPC_YAW_RANGE_RAD, or is NaN. */
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
+nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m[2],
                          const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad);
 
 /* Return the next set-point of a yaw loop on the shortest way from `previous_rad` to `wanted_rad`, at most

@@ -97,7 +97,7 @@ QUADRATIC_FAULTS = {
     "drag the other way": ("           - (NMPC_DRAG_1_STEP", "           + (NMPC_DRAG_1_STEP"),
     "no age of the velocity": ("+ (NMPC_AGE_STEPS * acceleration_m_step2)", "+ (nmpc_real_t)0"),
     "a start forgets the disturbance": ("NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n    }", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n        observer->disturbance_m_step2[axis] = (nmpc_real_t)0;\n    }"),
-    "no limit of the disturbance": ("                  NMPC_DISTURBANCE_LIMIT_M_STEP2);", "                  (nmpc_real_t)1000);"),
+    "no limit of the disturbance": ("n_m_step)),\n                  NMPC_DISTURBANCE_LIMIT_M_STEP2);", "n_m_step)),\n                  (nmpc_real_t)1000);"),
     "pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
     "no trim of roll": ("state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
     "rows of the other axis": ("next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),

@@ -95,7 +95,8 @@ def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
 ) -> None:
     """Each plus made a minus and the other way round, from the attitude model to the interface.
 
-    The self-test makes steps only: it does not set a command in place of the last one, nor turn a heading.
+    The self-test makes steps only: it does not set a command in place of the last one, turn a heading or
+    shift the frame.
     """
     bench = SelfTest(files, tmp_path)
     unnoticed, count = [], 0
@@ -104,7 +105,9 @@ def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
     others = [
         range(found.start(), text.index("\n}\n", found.start()))
         for found in re.finditer(
-            r"^.* (attitude_change_command|nmpc_set_command|nmpc_slew_heading)\(", text, re.MULTILINE
+            r"^.* (attitude_change_command|nmpc_set_command|nmpc_slew_heading|\w+_shift|\w+er_turn)\(",
+            text,
+            re.MULTILINE,
         )
     ]
     for mutant in mutants(CONTROLLER, text):

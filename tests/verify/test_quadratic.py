@@ -85,7 +85,7 @@ UNPROVEN = {
     "the model has no limit": Fault(
         "take_numbers",
         Harm(CONTROLLER, r"return clamp\(sum, NMPC_ATTITUDE_LIMIT_M_STEP2\)", "return sum"),
-        Alarm(CONTROLLER, "(right * cosine)", "is_nan"),
+        Alarm(CONTROLLER, "(first * cosine)", "is_nan"),
     ),
     "a row is read past its end": Fault(
         "take_numbers",

@@ -33,6 +33,30 @@ def tracker_of(settings: Settings, *, climb: bool = False) -> TrackerConstants:
     return found
 
 
+@pytest.mark.parametrize(
+    ("changed", "doubted"),
+    [
+        ({}, True),
+        ({"target.tracker_gain": 1.0}, True),
+        ({"target.acceleration": "given"}, True),
+        ({"target.acceleration": "given", "target.tracker_gain": 1.0}, False),
+        ({"guard": None}, False),
+    ],
+)
+def test_what_is_given_as_it_comes_is_not_doubted(changed: dict[str, Any], doubted: bool) -> None:
+    """All else is, with a guard."""
+    settings = presets.preset("crazyflie")
+    settings = with_option(
+        with_option(settings, "target.acceleration", "tracked"), "target.tracker_gain", 0.5
+    )
+    for name, value in changed.items():
+        if name == "guard":
+            settings = settings.model_copy(update={"guard": None})
+        else:
+            settings = with_option(settings, name, value)
+    assert (tracker_of(settings).noise is not None) == doubted
+
+
 def given(settings: Settings, **changed: float) -> Settings:
     """Return settings whose targets have their acceleration, and a range of thrusts."""
     for name, value in changed.items():
