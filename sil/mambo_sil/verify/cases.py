@@ -402,7 +402,8 @@ def _target_motion(settings: Settings) -> Iterator[Tape]:
     """For a tracker change the target's velocity by its limit and the numbers next to it, either way.
 
     If the acceleration is given, set it to its limit and the numbers next to that. Then accelerate the target
-    to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way.
+    to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way, and
+    with a turn of the frame.
     """
     tracker, ranges = method_of(settings).tracker, settings.ranges
     if tracker is None:
@@ -430,6 +431,10 @@ def _target_motion(settings: Settings) -> Iterator[Tape]:
     both = motion[:, None] * [1.0, -0.7]
     again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
     yield np.concatenate([steps(both), again, steps(both[::-1])])
+    turned = np.zeros((1, len(method_of(settings).shift)))
+    turned[:, -1] = 0.3
+    turn = calls(settings, ApiFunction.SHIFT, turned)
+    yield np.concatenate([steps(both[:32]), turn, steps(both[32:])])
 
 
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:

@@ -367,9 +367,9 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
 static int shifts_alike(nmpc_t *self, nmpc_t *other)
 {
     const float position_m[3] = { 0.5f, -0.25f, 0.125f };
-    const float velocity_m_s[3] = { 0.125f, -0.5f, 0.25f };
+    const float velocity_m_s[3] = { 0.0078125f, -0.015625f, 0.25f };
     const nmpc_real_t position[3] = { NMPC_POSITION(0.5), NMPC_POSITION(-0.25), NMPC_POSITION(0.125) };
-    const nmpc_real_t velocity[3] = { NMPC_VELOCITY(0.125), NMPC_VELOCITY(-0.5), NMPC_VELOCITY(0.25) };
+    const nmpc_real_t velocity[3] = { NMPC_VELOCITY(0.0078125), NMPC_VELOCITY(-0.015625), NMPC_VELOCITY(0.25) };
 
     return (nmpc_float_shift(self, NULL, velocity_m_s, 0.0625f) == NMPC_NULL_POINTER)
            && (nmpc_float_shift(self, position_m, NULL, 0.0625f) == NMPC_NULL_POINTER)
