@@ -35,7 +35,7 @@ from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
 from mambo_sil.flight.names import ALTITUDE_NAMES, SENSORS_KINDS, SensorsKind
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 
 LARGEST_N: Final = 1_000_000
 
@@ -84,7 +84,7 @@ class Controller:
         if sensors is not None:
             require_choice("sensors", sensors, SENSORS_KINDS)
             drone = drone.with_sensors(sensors)
-        settings = controller_toml.parse(controller_text(drone, drone.name), f"settings for {drone.name}")
+        settings = controller_toml.parse(chosen_text(drone, drone.name), f"settings for {drone.name}")
         return cls._made(settings, n, drone, options)
 
     @classmethod

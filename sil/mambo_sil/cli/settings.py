@@ -196,13 +196,13 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
-    from mambo_sil.model.derive.derived_settings import controller_text
+    from mambo_sil.model.derive.chosen_tilt import chosen_text
     from mambo_sil.model.derive.missing_height import missing_height
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
         drone = drone.with_sensors(sensors)
-    text = controller_text(drone, source, _relative(vehicle, output))
+    text = chosen_text(drone, source, _relative(vehicle, output))
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
         name = echo(str(output))

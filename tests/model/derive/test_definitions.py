@@ -119,9 +119,10 @@ def test_the_height_is_what_thrust_and_lag_allow(ratio: float, lag_s: float, dea
     assert height is not None
     assert height.lag_s == pytest.approx(float(np.clip(lag_s, 0.03, 0.5)), rel=ROUNDED)
     assert height.delay_s == pytest.approx(min(dead_time_s + 0.005, 0.1), rel=ROUNDED)
-    slow_s = 1.5 * (height.lag_s + height.delay_s)
-    assert height.response_time_s == pytest.approx(max(0.13, slow_s), rel=ROUNDED)
-    assert height.velocity_weight_s == pytest.approx(min(1.15 * height.response_time_s, 2.0), rel=0.05)
+    slow_s = 1.3 * (height.lag_s + height.delay_s)
+    assert height.response_time_s == pytest.approx(max(0.1, slow_s), rel=ROUNDED)
+    assert height.velocity_weight_s == pytest.approx(min(2.0 * height.response_time_s, 2.0), rel=0.05)
+    assert height.disturbance_noise == 1.5
     most_m_s2 = min(0.95 * drone.altitude.thrust_max_n / drone.body.mass_kg, 100.0)
     assert height.thrust_max_m_s2 == pytest.approx(most_m_s2, rel=ROUNDED)
     assert height.thrust_min_m_s2 == pytest.approx(0.3 * GRAVITY_M_S2, rel=0.02)

@@ -16,8 +16,9 @@ from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.model.derive.derived_flight import _fault, fly_derived
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.chosen_tilt import chosen_text
+from mambo_sil.model.derive.derived_flight import _fault, flies_quick_circle, fly_derived
+from mambo_sil.model.derive.derived_settings import controller_text, is_strong
 from tests.support.scenarios import CRAZYFLIE
 
 
@@ -69,6 +70,44 @@ def test_a_drone_that_oscillates_is_seen() -> None:
     assert not found.good
     assert found.words.startswith("flown for 10 s: OSCILLATES, by 0.")
     assert found.words.endswith(f"(through sensors {SENSORS_OF['mambo'][-1]})")
+
+
+@pytest.mark.parametrize(
+    ("name", "strong", "survives"), [("cf2x-pyflyt", True, True), ("hummingbird", True, False)]
+)
+def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survives: bool) -> None:
+    """Of two drones with ten times their weight in thrust; the mixer of one loses the height in large swings."""
+    drone = vehicle_toml.preset(name)
+    exact = controller_toml.parse(controller_text(drone, name, exact=True), name)
+    assert (exact.model.tilt, is_strong(drone)) == ("exact", strong)
+    assert exact.limits.tilt_rad > 0.7
+    assert flies_quick_circle(exact, drone) is survives
+    chosen = controller_toml.parse(chosen_text(drone, name), name)
+    assert chosen == (exact if survives else settings_for(drone))
+    assert (chosen.model.tilt, chosen.limits.tilt_rad) == (("exact", 0.74) if survives else ("small-angle", 0.5))
+
+
+def test_the_quick_circle_has_slower_rotors() -> None:
+    """1.5 times slower: a thrust with 0.15 s of lag, which flies it, is flown with 0.225 s, and is lost."""
+    drone = vehicle_toml.preset("cf2x-pyflyt")
+    exact = controller_toml.parse(controller_text(drone, "mine", exact=True), "mine")
+    assert drone.thrust is not None
+    survives = [
+        flies_quick_circle(
+            exact,
+            drone.model_copy(update={"thrust": drone.thrust.model_copy(update={"lag_s": lag_s})}),
+        )
+        for lag_s in (0.1, 0.15)
+    ]
+    assert survives == [True, False]
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "x500", "mambo", "generic"])
+def test_a_drone_with_less_thrust_keeps_small_angles(name: str) -> None:
+    """Below 2.5 times its weight."""
+    drone = vehicle_toml.preset(name)
+    assert not is_strong(drone)
+    assert chosen_text(drone, name) == controller_text(drone, name)
 
 
 TIME_S = np.arange(-1.0, 10.005, 0.01)

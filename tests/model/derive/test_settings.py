@@ -125,7 +125,7 @@ def test_the_height_is_that_of_drones_whose_thrust_is_known() -> None:
     height = settings_for(CRAZYFLIE).height
     assert height is not None
     assert (height.lag_s, height.delay_s) == (0.072, 0.005)
-    assert (height.response_time_s, height.velocity_weight_s) == (0.13, 0.15)
+    assert (height.response_time_s, height.velocity_weight_s) == (0.1, 0.2)
     assert (height.thrust_min_m_s2, height.thrust_max_m_s2) == (2.9, 15.2)
     mambo = settings_for(vehicle_toml.preset("mambo")).height
     assert mambo is not None
@@ -133,7 +133,7 @@ def test_the_height_is_that_of_drones_whose_thrust_is_known() -> None:
     assert settings_for(GENERIC).height is None
     slow = settings_for(changed(GENERIC, thrust={"lag_s": 0.1, "dead_time_s": 0.04})).height
     assert slow is not None
-    assert (slow.lag_s, slow.delay_s, slow.response_time_s) == (0.1, 0.045, 0.218)
+    assert (slow.lag_s, slow.delay_s, slow.response_time_s) == (0.1, 0.045, 0.189)
     weak = {"thrust_max_n": 1.15 * GENERIC.weight_n}
     assert settings_for(changed(GENERIC, thrust={"lag_s": 0.1}, altitude=weak)).height is None
 

@@ -6,18 +6,20 @@ from typing import Final
 
 import numpy as np
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.crashes import first_crash
+from mambo_sil.flight.crashes import detect_crashes, first_crash
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
+from mambo_sil.flight.metrics import height_error_m
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.flight.trajectories import Hover
+from mambo_sil.flight.trajectories import Circle, Hover, Trajectory
 
 DURATION_S: Final = 10.0
 JUDGED_S: Final = 5.0
@@ -30,6 +32,11 @@ FAR_M: Final = 0.05
 """A drone whose mean place is farther from its target is not there: 12 mm is the most of shipped ones."""
 SWINGING_RAD: Final = 0.15
 """Rms of a tilt that oscillates: 0.02 is the most of shipped drones, 0.07 that with 2 cm of noise."""
+QUICK_CIRCLE: Final = 1.2
+"""Rate of a circle over the one that takes the whole tilt limit."""
+SLOWER_ROTORS: Final = 1.5
+LOST_HEIGHT_M: Final = 1.0
+
 SWINGING_M_S: Final = 0.2
 """Rms of a velocity that oscillates: 0.03 is the most of shipped drones, 0.05 that with 2 cm of noise."""
 
@@ -48,23 +55,45 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
     A height is judged only if the settings hold it. Raises BuildError, CacheError.
     """
     sensors = SENSORS_OF[drone.sensors.kind][-1]
+    trace = _flown(settings, drone, Hover(), START)
+    where = "true state" if sensors == "true" else f"through sensors {sensors}"
+    fault = _fault(trace, drone, axes=2 if settings.height is None else 3)
+    if fault is not None:
+        return FlownSettings(good=False, words=f"flown for {DURATION_S:g} s: {fault} ({where})")
+    return FlownSettings(good=True, words=f"flown for {DURATION_S:g} s: stays at its target ({where})")
+
+
+def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
+    """Return whether a drone with slower rotors survives a circle of 1 m that asks for more than its tilt limit.
+
+    Lost is a drone that crashes, or whose height is a metre off. Raises BuildError, CacheError.
+    """
+    rate_rad_s = QUICK_CIRCLE * math.sqrt(GRAVITY_M_S2 * math.tan(settings.limits.tilt_rad))
+    parts = {name: getattr(drone, name) for name in ("rotors", "thrust")}
+    slower = {
+        name: part.model_copy(update={"lag_s": SLOWER_ROTORS * part.lag_s})
+        for name, part in parts.items()
+        if part is not None
+    }
+    trace = _flown(settings, drone.model_copy(update=slower), Circle(1.0, rate_rad_s), Offset())
+    off_m = np.abs(height_error_m(trace))
+    return not detect_crashes(trace, drone).any() and bool((off_m < LOST_HEIGHT_M).all())
+
+
+def _flown(settings: Settings, drone: VehicleFile, trajectory: Trajectory, offset: Offset) -> Trace:
+    """Return flights at headings around the whole turn, through the drone's own sensors."""
     flight = Flight(
-        Hover(),
+        trajectory,
         duration_s=DURATION_S,
         flights=HEADINGS,
         yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,
         vehicle=Vehicle.of(drone),
         update_period_s=settings.horizon.update_period_s,
         seeds=tuple(range(HEADINGS)),
-        offset=START,
-        sensors=choose_sensors(sensors, drone),
+        offset=offset,
+        sensors=choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone),
     )
-    trace = fly(flight, CompiledController(settings, HEADINGS))
-    where = "true state" if sensors == "true" else f"through sensors {sensors}"
-    fault = _fault(trace, drone, axes=2 if settings.height is None else 3)
-    if fault is not None:
-        return FlownSettings(good=False, words=f"flown for {DURATION_S:g} s: {fault} ({where})")
-    return FlownSettings(good=True, words=f"flown for {DURATION_S:g} s: stays at its target ({where})")
+    return fly(flight, CompiledController(settings, HEADINGS))
 
 
 def _fault(trace: Trace, drone: VehicleFile, axes: int) -> str | None:

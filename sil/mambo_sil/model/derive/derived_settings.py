@@ -34,6 +34,8 @@ LEAST_BRAKING_M_S2: Final = 0.1
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
+EXACT_THRUST: Final = 2.5
+"""Largest thrust over the weight from which on a larger tilt is worth its trigonometry."""
 
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
@@ -44,7 +46,9 @@ FLOW_POSITION_M: Final = 0.04
 ESTIMATED_POSITION_M, ESTIMATED_VELOCITY_M_S, SLOW_DISTURBANCE_M_S3 = 0.03, 1.0, 0.5
 """Noise densities of the observer."""
 
-QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.13, 1.5, 1.15
+QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.1, 1.3, 2.0
+HEIGHT_DISTURBANCE_M_S3: Final = 1.5
+"""A quicker learning takes gain and phase from the loop, most where rotors are quicker than the file says."""
 LEAST_LAG_S, LONGEST_LAG_S = 0.03, 0.5
 """A shorter lag in the model of the thrust rings on a drone whose rotors are slower."""
 THRUST_MIN_M_S2, THRUST_SHARE = 2.9, 0.95
@@ -69,8 +73,17 @@ class Derived:
     reason: str
 
 
-def derive(drone: VehicleFile) -> list[Derived]:
-    """Return the settings for a drone that differ from the defaults, section by section."""
+def is_strong(drone: VehicleFile) -> bool:
+    """Return whether a drone has thrust, and settings of its height, for more tilt than small angles allow."""
+    strong = drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
+    return strong and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
+
+
+def derive(drone: VehicleFile, *, exact: bool = False) -> list[Derived]:
+    """Return the settings for a drone that differ from the defaults, section by section.
+
+    exact: with the exact thrust vector, and a tilt limit without the bound of small angles.
+    """
     attitude = list(_attitude(drone))
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
     return [
@@ -78,21 +91,25 @@ def derive(drone: VehicleFile) -> list[Derived]:
         *attitude,
         Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
         Derived("model", "attitude", "predicted", "No quick loop through the measured attitude"),
+        *([_exact_tilt(drone)] if exact else []),
         Derived("target", "acceleration", "tracked", "Removes most of the tracking error on curves"),
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0),
         *_observer(drone),
-        *_limits(drone),
+        *_limits(drone, exact=exact),
         *_thrust_range(drone),
         *(height := list(_height(drone))),
-        *_guard(drone, height),
+        *_guard(drone, height, exact=exact),
     ]
 
 
-def controller_text(drone: VehicleFile, source: str, vehicle: str | None = None) -> str:
+def controller_text(
+    drone: VehicleFile, source: str, vehicle: str | None = None, *, exact: bool = False
+) -> str:
     """Return a controller.toml for the drone of `source`, with the reason of each value as a comment.
 
     vehicle: what the key `vehicle` names, for commands that fly the settings; None leaves it out.
+    exact:   as for `derive`.
     """
     lines = [
         comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
@@ -105,7 +122,7 @@ def controller_text(drone: VehicleFile, source: str, vehicle: str | None = None)
         ]
         lines += [f"{VEHICLE} = {json.dumps(vehicle, ensure_ascii=False)}"]
     section = ""
-    for each in derive(drone):
+    for each in derive(drone, exact=exact):
         if each.section != section:
             section = each.section
             lines += ["", f"[{section}]"]
@@ -148,6 +165,12 @@ def _attitude(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("model", f"{name}_delay_s", _round(fit.delay_s), "Likewise")
         if fit.integral_1_s:
             yield Derived("model", f"{name}_integral_1_s", _round(fit.integral_1_s), "Likewise")
+
+
+def _exact_tilt(drone: VehicleFile) -> Derived:
+    ratio = drone.largest_thrust_n / drone.weight_n
+    words = f"The thrust, {ratio:.3g} times the weight, carries more tilt than small angles are good for"
+    return Derived("model", "tilt", "exact", words)
 
 
 def _response(slowness_s: float) -> Derived:
@@ -202,9 +225,9 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
 
 
-def _limits(drone: VehicleFile) -> Iterator[Derived]:
+def _limits(drone: VehicleFile, *, exact: bool) -> Iterator[Derived]:
     """Yield the limits of tilt and, if the tilt allows some braking, of speed and braking."""
-    tilt = _tilt_limit(drone)
+    tilt = _tilt_limit(drone, exact=exact)
     yield tilt
     gain, trim_m_s2 = GRAVITY_M_S2, 0.0
     if isinstance(drone.attitude, FirstOrderAttitude):
@@ -212,30 +235,30 @@ def _limits(drone: VehicleFile) -> Iterator[Derived]:
         slope = GRAVITY_M_S2 * attitude.acceleration_per_tilt_g
         gain = slope * min(attitude.roll.gain, attitude.pitch.gain)
         trim_m_s2 = slope * max(abs(attitude.roll_trim_rad), abs(attitude.pitch_trim_rad))
-    most_m_s2 = gain * float(tilt.value) - trim_m_s2
+    # A large swing from braking to tilt and back takes the mixer's thrust.
+    tilt_rad = min(float(tilt.value), MOST_TILT_RAD)
+    most_m_s2 = gain * tilt_rad - trim_m_s2
     braking_m_s2 = _round(BRAKING_SHARE * most_m_s2)
     if braking_m_s2 >= LEAST_BRAKING_M_S2:
         words = "No file says how fast a drone may be; a target farther away is flown to at this speed"
         yield Derived("limits", "speed_m_s", SPEED_LIMIT_M_S, words)
         words = (
-            f"{BRAKING_SHARE:g} of {most_m_s2:.3g}, what the tilt limit gives; the rest is for wind and lag"
+            f"{BRAKING_SHARE:g} of {most_m_s2:.3g}, what a tilt of {spell(tilt_rad)} gives; the rest is for wind and lag"
         )
         yield Derived("limits", "braking_m_s2", braking_m_s2, words)
 
 
-def _tilt_limit(drone: VehicleFile) -> Derived:
-    """Return half the tilt at which the largest thrust carries the weight, within a bound."""
+def _tilt_limit(drone: VehicleFile, *, exact: bool) -> Derived:
+    """Return half the tilt at which the largest thrust carries the weight, within the bound of small angles."""
     ratio = drone.largest_thrust_n / drone.weight_n
     half_rad = 0.5 * math.acos(1.0 / ratio)
     words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
-    by_flow = isinstance(drone.sensors, MamboSensors)
-    most_rad = MOST_TILT_BY_FLOW_RAD if by_flow else MOST_TILT_RAD
-    if half_rad > most_rad:
-        why = (
-            "the optical flow drifts in larger tilts" if by_flow else "the model takes a tilt for its tangent"
-        )
-        words += f"; at most {most_rad:g}, since {why}"
-    return Derived("limits", "tilt_rad", _round(max(min(half_rad, most_rad), 0.01)), words)
+    most_rad, why = MOST_TILT_RAD, "the model takes a tilt for its tangent"
+    if isinstance(drone.sensors, MamboSensors):
+        most_rad, why = MOST_TILT_BY_FLOW_RAD, "the optical flow drifts in larger tilts"
+    if half_rad > most_rad and not exact:
+        half_rad, words = most_rad, f"{words}; at most {most_rad:g}, since {why}"
+    return Derived("limits", "tilt_rad", _round(max(half_rad, 0.01)), words)
 
 
 def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:
@@ -255,7 +278,9 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     source = "rotors.lag_s" if drone.thrust is None else "thrust.lag_s"
     lag_s = min(drone.motor_lag_s if drone.thrust is None else drone.thrust.lag_s, LONGEST_LAG_S)
     dead_time_s = 0.0 if drone.thrust is None else drone.thrust.dead_time_s
-    words = f"As {source}" if lag_s >= LEAST_LAG_S else f"Longer than {source}: too long is safe"
+    words = f"As {source}"
+    if lag_s < LEAST_LAG_S:
+        words = f"Longer than {source}: a model as quick as that rings on slower rotors"
     yield Derived("height", "lag_s", _round(max(lag_s, LEAST_LAG_S)), words)
     delay_s = _round(min(dead_time_s + _update_period_s(drone) / 2.0, 0.1))
     words = "Half an update period" + (" and thrust.dead_time_s" if dead_time_s else "")
@@ -268,6 +293,8 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     yield Derived("height", "response_time_s", response_s, words)
     weight_s = float(f"{min(CLIMB_WEIGHT * response_s, SLOWEST_RESPONSE_S):.2g}")
     yield Derived("height", "velocity_weight_s", weight_s, f"{CLIMB_WEIGHT:g} times that")
+    words = "Learns the weight within half a second; quicker takes margins from the loop"
+    yield Derived("height", "disturbance_noise", HEIGHT_DISTURBANCE_M_S3, words)
     yield Derived("height", "thrust_min_m_s2", THRUST_MIN_M_S2, "0.3 g: roll and pitch need some thrust")
     gain = "" if drone.thrust_gain == 1.0 else "thrust.gain times "
     words = f"{THRUST_SHARE:g} of {thrust_m_s2:.3g}, {gain}altitude.thrust_max_n over body.mass_kg"
@@ -279,9 +306,9 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     yield Derived("height", "descent_m_s", min(descent_m_s, DESCENT_M_S), words)
 
 
-def _guard(drone: VehicleFile, height: list[Derived]) -> Iterator[Derived]:
+def _guard(drone: VehicleFile, height: list[Derived], *, exact: bool) -> Iterator[Derived]:
     """Yield the guard, by the tilt limit and, with settings of the height, the range of the thrust."""
-    tilt_rad = float(_tilt_limit(drone).value)
+    tilt_rad = float(_tilt_limit(drone, exact=exact).value)
     words = f"{TILT_SWINGS:g} times limits.tilt_rad: swings are free, and a mixer keeps its thrust"
     yield Derived("guard", "tilt_rad", _round(TILT_SWINGS * tilt_rad), words)
     words = f"{TILT_SWINGS_1_S:g} times limits.tilt_rad in a second: commands that rattle by more are bounded"
