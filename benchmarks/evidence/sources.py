@@ -15,7 +15,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 
 ROOT: Final = Path(__file__).parents[2]
 
@@ -41,7 +41,7 @@ def _settings(source: str) -> Settings:
     if source.startswith(_DESIGN):
         name, _, sensors = source.removeprefix(_DESIGN).partition(" --sensors ")
         drone = vehicle_toml.load(name)
-        return parse(controller_text(drone.with_sensors(sensors) if sensors else drone, name), source)
+        return parse(chosen_text(drone.with_sensors(sensors) if sensors else drone, name), source)
     return presets.load(source if source in presets.names() else str(ROOT / source))
 
 

@@ -12,7 +12,7 @@ from mambo_sil.api.options import with_options
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Designed:
     def controller(self, drones: int, *, noisy: bool) -> Controller:
         """Return the C for new drones."""
         drone = self.drone if noisy else self.drone.with_sensors("true")
-        return Controller(controller_toml.parse(controller_text(drone, drone.name), drone.name), drones)
+        return Controller(controller_toml.parse(chosen_text(drone, drone.name), drone.name), drones)
 
     def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return the C for new drones."""

@@ -64,7 +64,7 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
 
 
 def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
-    """Return whether a drone with slower rotors survives a circle of 1 m that asks for more than its tilt limit.
+    """Return whether a drone with slower rotors survives a circle of 1 m that asks for more than its tilt.
 
     Lost is a drone that crashes, or whose height is a metre off. Raises BuildError, CacheError.
     """

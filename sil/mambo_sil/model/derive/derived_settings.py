@@ -74,7 +74,7 @@ class Derived:
 
 
 def is_strong(drone: VehicleFile) -> bool:
-    """Return whether a drone has thrust, and settings of its height, for more tilt than small angles allow."""
+    """Return whether a drone has thrust, and a height, for more tilt than small angles allow."""
     strong = drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
     return strong and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
 
@@ -242,14 +242,13 @@ def _limits(drone: VehicleFile, *, exact: bool) -> Iterator[Derived]:
     if braking_m_s2 >= LEAST_BRAKING_M_S2:
         words = "No file says how fast a drone may be; a target farther away is flown to at this speed"
         yield Derived("limits", "speed_m_s", SPEED_LIMIT_M_S, words)
-        words = (
-            f"{BRAKING_SHARE:g} of {most_m_s2:.3g}, what a tilt of {spell(tilt_rad)} gives; the rest is for wind and lag"
-        )
+        words = f"{BRAKING_SHARE:g} of {most_m_s2:.3g}, what a tilt of {tilt_rad:g} gives"
+        words += "; the rest is for wind and lag"
         yield Derived("limits", "braking_m_s2", braking_m_s2, words)
 
 
 def _tilt_limit(drone: VehicleFile, *, exact: bool) -> Derived:
-    """Return half the tilt at which the largest thrust carries the weight, within the bound of small angles."""
+    """Return half the tilt at which the largest thrust carries the weight, as far as angles may be."""
     ratio = drone.largest_thrust_n / drone.weight_n
     half_rad = 0.5 * math.acos(1.0 / ratio)
     words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
