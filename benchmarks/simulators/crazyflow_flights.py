@@ -6,18 +6,25 @@ its Mellinger attitude loop, `so_rpy_rotor_drag` responses that were fitted to f
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 import jax.numpy as jnp
 import numpy as np
-from crazyflow.control import Control
 from crazyflow.control.core import load_fn_params
 from crazyflow.control.mellinger import state2attitude
-from crazyflow.sim import Sim
 from scipy.spatial.transform import Rotation
 
+from benchmarks.simulators.crazyflow_worlds import (
+    CRAZYFLIE,
+    FITTED,
+    FREQ_HZ,
+    SimulatedCrazyflie,
+    noise,
+    place,
+    sight,
+    through,
+)
 from benchmarks.simulators.identified import LogRow, identified, manoeuvre
 from benchmarks.simulators.missions import (
     HEIGHT_M,
@@ -30,19 +37,14 @@ from benchmarks.simulators.missions import (
     cost_of,
 )
 from benchmarks.simulators.pilots import Challenger, Designed, Preset, Sight, SimulatorPilot
-from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
+from benchmarks.simulators.raptor_flights import MOTOR_N, fly_raptor
+from mambo_sil.api.frames import command_in_frame
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.plant.vehicle import Seen
-from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
 SEEDS: Final = (101, 102, 103, 104, 105)
 SEARCH_SEED, CANDIDATES = 201, 30
-FREQ_HZ: Final = 500
-CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")
-FITTED: Final = "so_rpy_rotor_drag"
-MODELS: Final = {"first_principles": "first principles", FITTED: "fitted"}
+RAPTOR: Final = "RAPTOR, a network that knows no drone"
 WORLDS: Final = (
     ("cf2x_L250", "first_principles", "crazyflie-l250"),
     ("cf2x_L250", FITTED, "crazyflie-l250"),
@@ -52,37 +54,6 @@ WORLDS: Final = (
     ("hb_x500", FITTED, "x500"),
 )
 """Drone of crazyflow, its model, and the vehicle that the page names for it."""
-
-
-@dataclass(frozen=True)
-class SimulatedCrazyflie:
-    """One drone of crazyflow with one of its models, and the vehicle of ours."""
-
-    drone: str
-    model: str
-    vehicle: str
-
-    @property
-    def title(self) -> str:
-        """Name of drone and model."""
-        return f"{self.drone}, {MODELS[self.model]}"
-
-    def simulation(self, worlds: int) -> Any:
-        """Return a simulation with attitude control at its start; each number of worlds is compiled once."""
-        simulation = self._compiled(worlds)
-        simulation.reset()
-        return simulation
-
-    @cached_property
-    def mass_kg(self) -> float:
-        """The mass that the simulation has."""
-        return float(np.ravel(self.simulation(1).data.params.mass)[0])
-
-    @lru_cache(maxsize=3)  # noqa: B019 - as many as one simulated drone needs
-    def _compiled(self, worlds: int) -> Any:
-        return Sim(
-            n_worlds=worlds, drone=self.drone, dynamics=self.model, control=Control.attitude, freq=FREQ_HZ
-        )
 
 
 GAINS: Final = ("kp", "kd", "ki")
@@ -185,49 +156,6 @@ def fly_rows(
     return fly(world, [Rows()], mission, [SEARCH_SEED] * CANDIDATES)
 
 
-def place(simulation: Any, position_m: FloatArray, mass_kg: float) -> None:
-    """Let all drones hover at positions (w, 3)."""
-    states = simulation.data.states
-    hover_n = mass_kg * 9.81 / 4.0
-    rotors = hover_n
-    if hasattr(simulation.data.params, "rpm2thrust"):
-        constant, linear, square = np.ravel(np.asarray(simulation.data.params.rpm2thrust, float))[-3:]
-        rotors = float(max(np.roots([square, linear, constant - hover_n]).real))
-    simulation.data = simulation.data.replace(
-        states=states.replace(
-            pos=jnp.asarray(position_m[:, np.newaxis], states.pos.dtype),
-            rotor_vel=jnp.full_like(states.rotor_vel, rotors),
-        )
-    )
-
-
-def sight(simulation: Any) -> Sight:
-    """Return the true states."""
-    states = simulation.data.states
-    position, velocity, quaternion = (
-        np.asarray(part[:, 0], np.float64) for part in (states.pos, states.vel, states.quat)
-    )
-    length = np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return Sight(position, velocity, attitude_of_quaternion(quaternion / length))
-
-
-def noise(true: Sight, seeds: Sequence[int]) -> MocapSuite:
-    """Return the motion capture of vehicle `crazyflie` for drones with these seeds."""
-    sensors = CRAZYFLIE.sensors
-    assert isinstance(sensors, MocapSensors)
-    return MocapSuite(MotionCapture(sensors), seeds, _as_seen(true), STEP_S)
-
-
-def through(suite: MocapSuite, true: Sight) -> Sight:
-    """Return what the drones see."""
-    found = suite.estimate(_as_seen(true))
-    return Sight(found.position_m.T, found.velocity_m_s.T, found.euler_rad.T)
-
-
-def _as_seen(true: Sight) -> Seen:
-    return Seen(true.position_m.T, true.velocity_m_s.T, true.angles_rad.T, np.zeros_like(true.angles_rad.T))
-
-
 def advance(simulation: Any, commands: FloatArray, force_n: FloatArray) -> None:
     """Hold commands (w, 4) and forces (w, 3) for one step of the controllers."""
     kind = simulation.data.states.pos.dtype
@@ -283,7 +211,9 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
 def measure(world: SimulatedCrazyflie, folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """Return the scores by challenger and mission, and the paths of the first seed on the eight (k, 3)."""
     challengers = challengers_of(world, folder)
+    by_network = world.drone in MOTOR_N and world.model != FITTED
     figures: dict[str, dict[str, list[Score]]] = {title: {} for title in challengers}
+    figures |= {RAPTOR: {}} if by_network else {}
     paths: dict[str, Any] = {}
     each = len(SEEDS)
     for name, mission in MISSIONS.items():
@@ -293,5 +223,7 @@ def measure(world: SimulatedCrazyflie, folder: Path) -> tuple[dict[str, Any], Ma
             figures[title][name] = scores[each * number : each * (number + 1)]
             if name == "eight":
                 paths[title] = flown.position_m[:, each * number]
+        if by_network:
+            figures[RAPTOR][name] = mission.scores(fly_raptor(world, mission, SEEDS))
         print(f"{world.title}: {name}", flush=True)
     return figures, paths
