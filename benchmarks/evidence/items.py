@@ -41,7 +41,9 @@ from benchmarks.evidence.simulator_pictures import DRAWN, draw_simulators
 from benchmarks.evidence.simulator_tables import (
     SIMULATORS,
     every_controller,
+    quick,
     read_pyflyt,
+    read_quick,
     read_simulators,
     summary,
 )
@@ -341,6 +343,15 @@ ITEMS: Final = (
         tables={"simulators-summary": summary, "simulators-all": every_controller},
         pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in DRAWN},
         draw=draw_simulators,
+        variable="SIMULATORS",
+    ),
+    Item(
+        name="quick",
+        commands=(f"python -m benchmarks.simulators quick {RESULTS}/quick/quick",),
+        controllers=tuple(f"design {drone}" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500")),
+        paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
+        read=read_quick,
+        tables={"quick": quick},
         variable="SIMULATORS",
     ),
     Item(

@@ -58,6 +58,24 @@ def summary(figures: Figures) -> str:
     return table(rows)
 
 
+def read_quick(results: Path) -> Figures:
+    """Return the scores on quick curves by simulated drone, controller and mission."""
+    found: Figures = json.loads((results / "quick" / "figures.json").read_text("utf-8"))
+    return found
+
+
+def quick(figures: Figures) -> str:
+    """Return a row for each controller on each drone, medians over the seeds."""
+    return table(
+        [
+            {"": f"{drone}: {who}"}
+            | {f"{name} rad/s, mm": _number(median(scores)) for name, scores in missions.items()}
+            for drone, controllers in figures.items()
+            for who, missions in controllers.items()
+        ]
+    )
+
+
 def every_controller(figures: Figures) -> str:
     """Return medians, least and largest of each controller, below the name of the drone; best are bold."""
     rows: list[Row] = []

@@ -125,16 +125,16 @@ def fly(
     return Flight3d(position_m, level), commands
 
 
-def tuned(world: SimulatedCrazyflie) -> tuple[Mellinger, list[float]]:
-    """Return the best of 30 random controllers, the first of which has its own gains, and its factors."""
+def tuned(world: SimulatedCrazyflie, missions: Mapping[str, Mission]) -> tuple[Mellinger, list[float]]:
+    """Return the best of 30 random controllers on missions, the first with its own gains, and its factors."""
     draws = np.random.default_rng(11)
     factors = np.exp(draws.uniform(-1.1, 1.1, (CANDIDATES, 7)))
     factors[:, 6] = draws.uniform(0.9, 1.25, CANDIDATES) * world.mass_kg / _mass_of(world)
     factors[0] = 1.0
     scores: list[dict[str, Score]] = [{} for _ in factors]
-    for name in TUNED_ON:
-        flown, _ = fly_rows(world, Mellinger(world.drone, factors), MISSIONS[name])
-        for found, score in zip(scores, MISSIONS[name].scores(flown), strict=True):
+    for name, mission in missions.items():
+        flown, _ = fly_rows(world, Mellinger(world.drone, factors), mission)
+        for found, score in zip(scores, mission.scores(flown), strict=True):
             found[name] = score
     best = factors[int(np.argmin([cost_of(found) for found in scores]))]
     return Mellinger(world.drone, best[np.newaxis]), [float(f"{factor:.3g}") for factor in best]
@@ -190,7 +190,7 @@ def challengers_of(world: SimulatedCrazyflie, folder: Path) -> dict[str, Challen
     drone = vehicle_toml.preset(world.vehicle)
     text = identified(fly_log(world), folder / f"{name}.csv", world.mass_kg, drone)
     (folder / f"{name}.toml").write_text(text, "utf-8")
-    best, factors = tuned(world)
+    best, factors = tuned(world, {searched: MISSIONS[searched] for searched in TUNED_ON})
     (folder / f"{name}-found.txt").write_text(f"{factors}\n", "utf-8")
     return {
         "Mellinger": Mellinger(world.drone),

@@ -114,12 +114,16 @@ MISSIONS: Final = {
 }
 TUNED_ON: Final = ("space", "step", "push")
 """Missions on which opponents are tuned, with scores that count alike."""
-SCALES: Final = {"space": 30.0, "step": 1.0, "push": 80.0}
+DISTANCE_MM: Final = 30.0
+SCALES: Final = {"step": 1.0, "push": 80.0}
+"""Of those that are not distances from a curve."""
 LOST: Final = 20.0
 """Cost of a flight that was lost, and the most that another may cost."""
 
 
 def cost_of(scores: dict[str, Score]) -> float:
     """Return what a search for gains makes small."""
-    parts = (LOST if score is None else score / SCALES[name] for name, score in scores.items())
+    parts = (
+        LOST if score is None else score / SCALES.get(name, DISTANCE_MM) for name, score in scores.items()
+    )
     return float(sum(min(part, LOST) for part in parts))
