@@ -1,6 +1,6 @@
 /* One drone on the field: a module and its flight, update by update. */
 const LIMITS = 11, FENCE_AT = 2; /* most numbers of nmpc_limits_t; the first of its fence: least x and y, largest x and y */
-const LIMIT_NAMES = ["speed", "braking", "fence", "tilt", "height"]; /* the bits of nmpc_limits_active */
+const LIMIT_NAMES = ["speed", "braking", "fence", "tilt", "height", "thrust"]; /* the bits of nmpc_limits_active */
 const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array };
 
 class Drone {
