@@ -130,6 +130,17 @@ def test_waypoints_fly(tmp_path: Path) -> None:
     run("fly", "--trajectory", "way.csv", "--duration-s", "2", "--no-pictures")
 
 
+def test_polynomial_pieces_fly(tmp_path: Path) -> None:
+    """A CSV file with a duration in its header has pieces, and a bad one is named by its line."""
+    header = ",".join(("Duration", *(f"{axis}^{k}" for axis in ("x", "y", "z", "yaw") for k in range(8))))
+    piece = tmp_path / "piece.csv"
+    piece.write_text(f"{header}\n2,0,0.1,0.05{',0' * 29}\n")
+    run("fly", "--trajectory", "piece.csv", "--duration-s", "3", "--no-pictures")
+    piece.write_text(f"{header}\n2{',0' * 32}\n-1{',0' * 32}\n")
+    _, said = run("fly", "--trajectory", "piece.csv", "--no-pictures", code=2)
+    assert "piece.csv: line 3: duration = -1.0 must be a number of seconds" in unwrapped(said)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

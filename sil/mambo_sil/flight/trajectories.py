@@ -5,21 +5,18 @@ A jump of the position or of the velocity has no acceleration. A trajectory in s
 Half-width and radius are in metres, the angular rate in rad/s.
 """
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol, Self, TypeGuard
+from typing import Any, Final, Protocol, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mambo_codegen.errors import echo
-from mambo_codegen.plain_file import read_plain_file
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.errors import TrajectoryError
+from mambo_sil.flight.course_file import named, read_text, rows_of
 from mambo_sil.flight.height_profiles import (
     HeightProfile,
     Swing,
@@ -39,7 +36,6 @@ COLUMNS = ("time_s", "x_m", "y_m")
 LARGEST = (1e6, 1e4, 1e4)
 """Largest magnitude of a waypoint's time in s, x in m and y in m."""
 
-LARGEST_FILE_BYTES = 10_000_000
 SHORTEST_LEG_S = 1e-6
 """Least time from one waypoint to the next, which bounds the velocity."""
 
@@ -211,19 +207,9 @@ class Waypoints:
 
         Raises `TrajectoryError`, which names file, line, column and rule.
         """
-        name = echo(str(path))
-        try:
-            content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
-            if len(content) > LARGEST_FILE_BYTES:
-                raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
-            points = _read(content.decode("utf-8-sig"))
+        with named(path):
+            points: dict[str, Any] = rows_of(read_text(path), COLUMNS)
             _check(list(points), tuple(points.values()))
-        except OSError as error:
-            raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
-        except UnicodeDecodeError:
-            raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
-        except TrajectoryError as error:
-            raise TrajectoryError(f"{name}: {error}") from None
         return cls(tuple(points.values()))
 
     def target(self, time_s: ArrayLike) -> FloatArray:
@@ -255,39 +241,6 @@ def _check(places: Sequence[str], points: Sequence[Point]) -> None:
                 f"{place}: time_s = {after[0]} must be later than the {before[0]} before it, "
                 f"by {SHORTEST_LEG_S:g} or more"
             )
-
-
-def _read(text: str) -> dict[str, Point]:
-    """Return the point of every row of a CSV file that is not blank, by the number of its line."""
-    rows, points = csv.reader(io.StringIO(text, newline=""), strict=True), {}
-    try:
-        header = [name.strip() for name in next(rows, [])]
-        for column in COLUMNS:
-            if header.count(column) != 1:
-                fault = "appears more than once" if column in header else "is missing"
-                raise TrajectoryError(
-                    f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
-                )
-        for row in filter(None, rows):
-            line = f"line {rows.line_num}"
-            if len(row) > len(header):
-                raise TrajectoryError(f"{line}: has more fields than the {len(header)} of the header")
-            time_s, x_m, y_m = (_number(row[header.index(name) :][:1], line, name) for name in COLUMNS)
-            points[line] = time_s, x_m, y_m
-    except csv.Error as error:
-        raise TrajectoryError(f"line {rows.line_num}: is not CSV: {error}") from None
-    return points
-
-
-def _number(field: Sequence[str], line: str, column: str) -> float:
-    """Return one field of a CSV row as a number; no field is one missing at the end of the row."""
-    text = "".join(field)
-    if not text.strip():
-        raise TrajectoryError(f"{line}: {column} is missing")
-    try:
-        return float(text)
-    except ValueError:
-        raise TrajectoryError(f"{line}: {column} = {echo(text)} must be a number") from None
 
 
 @dataclass(frozen=True)

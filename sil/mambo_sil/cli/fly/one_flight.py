@@ -30,6 +30,7 @@ from mambo_sil.flight.fences import Walls, walls_m
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PD_TITLES, SIZED, TIMED
+from mambo_sil.flight.polynomials import read_course
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -40,7 +41,7 @@ from mambo_sil.flight.scenario import (
     choose_sensors,
 )
 from mambo_sil.flight.traces import Trace, write_csv, write_npz
-from mambo_sil.flight.trajectories import CURVES, Trajectory, Waypoints
+from mambo_sil.flight.trajectories import CURVES, Trajectory
 from mambo_sil.results.folders import new_results
 from mambo_sil.results.scratch import scratch_folder
 
@@ -129,7 +130,7 @@ def summary_fields(
     course: Course, conditions: Conditions, runner: Runner, flight: Flight, settings: Settings
 ) -> dict[str, Any]:
     """Return the fields of a `FlySummary` that do not follow from the trace."""
-    waypoints = Path(course.trajectory) if isinstance(flight.trajectory, Waypoints) else None
+    file = None if course.trajectory in CURVES else Path(course.trajectory)
     flies_settings = runner.controller not in PD_TITLES
     size_m, rate_rad_s = _size_and_rate(course)
     return (vars(course) | vars(conditions) | vars(runner)) | {
@@ -142,7 +143,7 @@ def summary_fields(
         "size_m": size_m,
         "rate_rad_s": rate_rad_s,
         "duration_s": _flown_s(flight),
-        "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
+        "trajectory_sha256": file and hashlib.sha256(file.read_bytes()).hexdigest(),
         "push_m_s2": flight.disturbances.push_m_s2,
         "wind_speed_m_s": flight.disturbances.wind_speed_m_s,
     }
@@ -233,7 +234,7 @@ def _on_board(runner: Runner, settings: Settings) -> PositionController:
 
 
 def curve_of(course: Course) -> Trajectory:
-    """Return the curve by name, or the waypoints of a file; raises FlightError and TrajectoryError."""
+    """Return the curve by name, or the course of a file; raises FlightError and TrajectoryError."""
     size_m, rate_rad_s = _size_and_rate(course)
     for name, curve in CURVES.items():
         if name == course.trajectory:
@@ -242,7 +243,7 @@ def curve_of(course: Course) -> Trajectory:
         raise TrajectoryError(
             f"--trajectory {echo(course.trajectory)} must be {', '.join(CURVES)} or a file ending in .csv"
         )
-    return Waypoints.read(Path(course.trajectory))
+    return read_course(Path(course.trajectory))
 
 
 def _size_and_rate(course: Course) -> tuple[float | None, float | None]:
