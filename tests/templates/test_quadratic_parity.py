@@ -177,7 +177,7 @@ def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
     rng = np.random.default_rng(index)
     n, kinds = 4 * CASES, set()
     move = 10.0 ** rng.uniform(-2, 1.5, (n, 1, 1)) * limits[None, :, None]
-    states = rng.normal(0, 1, (n, 2, 8)) * move / (np.abs(law.rows).max(axis=1) + 1e-30)[None]
+    states = rng.normal(0, 1, (n, *law.rows.shape[::2])) * move / (np.abs(law.rows).max(axis=1) + 1e-30)[None]
     states *= rng.choice([0.0, 1.0, 1.0], states.shape)
     states[:, :, 7] = np.clip(states[:, :, 7], -limits, limits)
     states = states.astype(blocks.scalar)

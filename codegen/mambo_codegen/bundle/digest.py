@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from mambo_codegen.kept import keep
 from mambo_codegen.methods import Method, Step
 from mambo_codegen.methods.shared.math import Real, rounded
+from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import InputLimits, Representation
+from mambo_codegen.numbers.representation import PREVIEW_TIMES, InputLimits, Representation
 
 TICKS: Final = 100
 """Steps of an episode."""
@@ -78,6 +79,8 @@ def input_scales(method: Method) -> InputScales:
         if tracker:
             most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
         motions.append(min(tracker.tested_input, most) if tracker else 0.0)
+    if method.has_preview:
+        motions = [given_limit_m_s2(settings)] * 2
     return InputScales(
         target_position_m=position_m / unit,
         target_velocity_m_s=velocity_m_s / unit,
@@ -99,6 +102,7 @@ def input_scales(method: Method) -> InputScales:
 def scale_constants(method: Method, scales: InputScales) -> list[tuple[str, float, str]]:
     """Return the scales that have a constant in the C: its name, the scale and its quantity."""
     tracker, has_height = method.tracker, method.has_height
+    is_given = method.settings.target.gives_acceleration
     found = [
         ("TARGET_M", scales.target_position_m, "position"),
         ("TARGET_M_S", scales.target_velocity_m_s, "velocity"),
@@ -108,12 +112,12 @@ def scale_constants(method: Method, scales: InputScales) -> list[tuple[str, floa
     if not has_height:
         found.append(("THRUST_M_S2", scales.thrust_acceleration_m_s2, "thrust"))
         found.append(("HOVER_M_S2", scales.hover_m_s2, "thrust"))
-    if tracker:
-        ending = "M_S2" if tracker.is_given else "CHANGE_M_S"
-        level = "TARGET_M_S2" if tracker.is_given else ending
-        found.append((level, scales.target_motion, tracker.input_quantity))
+    if tracker or is_given:
+        quantity = "thrust" if is_given else "velocity"
+        ending = "M_S2" if is_given else "CHANGE_M_S"
+        found.append(("TARGET_M_S2" if is_given else ending, scales.target_motion, quantity))
         if has_height:
-            found.append((f"CLIMB_{ending}", scales.climb_motion, tracker.input_quantity))
+            found.append((f"CLIMB_{ending}", scales.climb_motion, quantity))
     return found
 
 
@@ -206,9 +210,11 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
         thrust = numbers.constant(scales.hover_m_s2, "thrust") + offset
         thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
     change = [np.zeros_like(thrust)] * len(method.target)
-    if method.tracker:
-        motion = [draw(scales.target_motion, method.tracker.input_quantity) for _ in range(2)]
-        if method.tracker.is_given:
+    is_given = method.settings.target.gives_acceleration
+    has_motion, quantity = method.tracker is not None or is_given, "thrust" if is_given else "velocity"
+    if has_motion:
+        motion = [draw(scales.target_motion, quantity) for _ in range(2)]
+        if is_given:
             target += motion
         else:
             change[2:4] = motion
@@ -217,13 +223,24 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
         state += [target[-2] + error(scales.error_position_m, "position")]
         state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
         state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
-        vertical = [draw(scales.climb_motion, tracker.input_quantity)] if (tracker := method.tracker) else []
+        vertical = [draw(scales.climb_motion, quantity)] if has_motion else []
         if len(method.target) > len(target):
             target += vertical
         else:
             change[-1:] = vertical or change[-1:]
-
+    axes = scales.target_motion, scales.target_motion, scales.climb_motion
+    target += [draw(scale, quantity) for scale in axes * PREVIEW_TIMES * method.has_preview]
     fault = (choice >> 8) & 63
+    _put_out_of_range(method, fault, state, target, change)
+    thrust = np.where(fault == 4, numbers.computed(0), thrust)
+    return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
+
+
+def _put_out_of_range(
+    method: Method, fault: NDArray[Any], state: list[Real], target: list[Real], change: list[Real]
+) -> None:
+    """Put one input out of range where `fault` (n,) is small, in place, but for a thrust."""
+    numbers, limits = method.numbers, method.limits
     position, pitch, yaw, velocity = _out_of_range(numbers, limits)
     state[0] = np.where(fault == 0, position, state[0])
     state[5] = np.where(fault == 1, pitch, state[5])
@@ -231,10 +248,9 @@ def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> 
     target[3], change[3] = np.where(fault == 3, velocity, target[3]), np.where(fault == 3, 0, change[3])
     if method.has_height:
         state[8] = np.where(fault == 4, velocity, state[8])
-    thrust = np.where(fault == 4, numbers.computed(0), thrust)
-    if len(method.level_target) > 4:
-        target[4] = np.where(fault == 5, position, target[4])
-    return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
+    if method.settings.target.gives_acceleration:
+        last = -2 if method.has_preview else 4
+        target[last] = np.where(fault == 5, position, target[last])
 
 
 def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, Any, Any, Any]:

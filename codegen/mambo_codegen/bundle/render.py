@@ -37,7 +37,15 @@ from mambo_codegen.methods.shared.members import limits_members, state_members, 
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_codegen.numbers.representation import (
+    PREVIEW_PERIOD_S,
+    PREVIEW_TIMES,
+    STATE,
+    TARGET,
+    THRUST,
+    WEIGHTS,
+    Representation,
+)
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
@@ -89,6 +97,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update
     period, or wants a controller of another kind.
     """
+    target.refuse_preview(has_preview=settings.target.acceleration == "preview")
     target.refuse_level(
         has_height=settings.height is not None, has_limits=method_of(settings).limiting is not None
     )
@@ -209,9 +218,13 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "fuzz_target": _target_inputs(method, len(method.state)),
             "proof_target": _target_inputs(method, len(method.state) - method.has_height),
             "level_columns": len(method.level_target),
+            "target_numbers": len(method.target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
-            "given": method.tracker is not None and method.tracker.is_given,
+            "given": settings.target.gives_acceleration,
+            "preview": PREVIEW_TIMES if method.has_preview else 0,
+            "preview_period_s": PREVIEW_PERIOD_S,
+            "previewed": [name for name in target_members(method) if name.startswith("preview")],
             "trigonometry": method.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,

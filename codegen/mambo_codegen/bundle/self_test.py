@@ -10,6 +10,7 @@ import numpy as np
 from mambo_codegen.bundle.digest import step_digest
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
+from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.settings.model import Settings
@@ -64,7 +65,7 @@ def self_test(settings: Settings) -> tuple[SelfTestStep, ...]:
     still = [tiny] + [0.0] * (len(method.state) - 1)
     steps = [step(still, [0.0] * len(method.target), hover_thrust(settings))]
     tracker = method.tracker
-    measures = tracker is not None and not tracker.is_given
+    measures, given_m_s2 = tracker is not None and not tracker.is_given, given_limit_m_s2(settings) / 2
     velocity_m_s, change_m_s, climb_m_s = [0.0, 0.0], speed_m_s, 0.0
     if tracker and measures:
         change_m_s = min(tracker.tested_input, speed_m_s / 8)
@@ -77,15 +78,16 @@ def self_test(settings: Settings) -> tuple[SelfTestStep, ...]:
         error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
         tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
-        if tracker and tracker.is_given:
-            target += [_next(spread, tracker.input_limit / 2) for _ in range(2)]
+        if len(method.level_target) > len(target):
+            target += [_next(spread, given_m_s2) for _ in range(2)]
         if method.has_height:
             goal_m, climb_change_m_s = _next(spread, position_m), _next(spread, change_m_s)
             climb_m_s = (climb_m_s * measures) + climb_change_m_s
             state += [goal_m + _next(spread, 0.15 * position_m), climb_m_s + _next(spread, 0.5 * speed_m_s)]
             state += [float(index % 5 == 4)]
-            given = [_next(spread, tracker.input_limit / 2)] if tracker else []
+            given = [_next(spread, given_m_s2)] if settings.target.acceleration != "none" else []
             target = [*target, goal_m, climb_m_s, *given][: len(method.target)]
+        target += [_next(spread, given_m_s2) for _ in range(len(method.target) - len(target))]
         thrust = hover_thrust(settings, _next(spread, 2.0))
         if index % refused == refused - 1:
             match index // refused:

@@ -185,14 +185,22 @@ class Model(SettingsSection):
 class Target(SettingsSection):
     """What the controller knows of the target's motion beyond its position and velocity."""
 
-    acceleration: Literal["none", "given", "tracked"] = Field(
+    acceleration: Literal["none", "given", "tracked", "preview"] = Field(
         "none",
         description='Acceleration of the target in the prediction: "none" predicts a target of constant '
         'velocity, as the paper does (eq 11); "given" takes it from the caller, in a further member of the '
         'target; "tracked" estimates it from the velocities of successive steps, which must then be those '
         "of the target's motion, without noise. Held over the horizon, it removes most of the tracking error "
-        "on curved paths.",
+        'on curved paths. "preview" takes the acceleration from the caller as "given" does, and those that '
+        "the target will have 0.05, 0.1 .. 0.3 s ahead, so that the drone tilts before the curve does; with "
+        "a height.",
     )
+
+    @property
+    def gives_acceleration(self) -> bool:
+        """Whether the caller gives the acceleration."""
+        return self.acceleration in ("given", "preview")
+
     tracker_gain: Number = Field(
         0.3,
         ge=0.01,

@@ -313,16 +313,22 @@ class Controller:
     def _aims(self, target: TargetState) -> list[FloatArray]:
         """Return the columns of targets; raises ArgumentError if the controller is not told enough."""
         aims = [target.position_m, target.velocity_m_s]
-        if self.settings.target.acceleration == "given":
+        given = self.settings.target
+        if given.gives_acceleration:
             acceleration = target.acceleration_m_s2
             if acceleration is None:
-                raise ArgumentError(
-                    'target: acceleration_m_s2 is missing; the settings have target.acceleration = "given"'
-                )
+                raise ArgumentError(_missing("acceleration_m_s2", given.acceleration))
             if self._method.has_height and acceleration.shape[-1] != 3:
                 raise ArgumentError("target: acceleration_m_s2 has no z; [height] wants x, y, z (..., 3)")
             aims.append(acceleration)
-        return _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
+        columns = _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
+        if self._method.has_preview:
+            if target.preview_m_s2 is None:
+                raise ArgumentError(_missing("preview_m_s2", given.acceleration))
+            columns += list(
+                (target.preview_m_s2.reshape(self.n, -1, 3) * (1.0, 1.0, -1.0)).reshape(self.n, -1).T
+            )
+        return columns
 
     def _empty_inputs(self) -> list[NDArray[Any]]:
         """Return the arrays that the C reads: states and targets (n, k), thrusts (n,) without `[height]`."""
@@ -388,6 +394,11 @@ class Controller:
         good = array.dtype == np.bool_ and array.size == self.n
         require(good, "which", which, f"be {self.n} truth values, one for each drone")
         return array.reshape(self.n)
+
+
+def _missing(name: str, acceleration: str) -> str:
+    """Return the message for a target without the array `name`."""
+    return f'target: {name} is missing; the settings have target.acceleration = "{acceleration}"'
 
 
 def _columns(*batches: FloatArray, count: int = 2) -> list[FloatArray]:

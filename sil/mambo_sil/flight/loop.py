@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import COMMAND
+from mambo_codegen.numbers.representation import COMMAND, PREVIEW_PERIOD_S, PREVIEW_TIMES
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -34,7 +34,12 @@ from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
-from mambo_sil.flight.controllers.thrust_controller import adapted, commands_thrust, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import (
+    adapted,
+    commands_thrust,
+    has_preview,
+    numbers_of,
+)
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.thrust_delivery import ThrustDelivery
@@ -203,6 +208,26 @@ class Flight:
         return np.concatenate([by_flight, level], axis=-1).swapaxes(0, 1)
 
     @cached_property
+    def targets_ahead(self) -> FloatArray:
+        """The targets (k, n, 27) as controllers with a preview are given them.
+
+        Behind the columns in space stand the accelerations x, y and up at each time of the preview.
+        """
+        columns = [self.targets_in_space.swapaxes(0, 1)]
+        for time in range(1, PREVIEW_TIMES + 1):
+            times_s = self.times_s() + time * PREVIEW_PERIOD_S
+            level, up = self.trajectory.acceleration(times_s), vertical_of(self.trajectory, times_s)[..., 2:]
+            columns.append(self._for_each_flight("acceleration", level, 2).swapaxes(0, 1))
+            columns.append(self._for_each_flight("vertical", up, 1).swapaxes(0, 1))
+        return np.concatenate(columns, axis=-1).swapaxes(0, 1)
+
+    def targets_for(self, *, commands_thrust: bool, has_preview: bool) -> FloatArray:
+        """Return the targets (k, n, 6, 9 or 27) as a controller is given them."""
+        if has_preview:
+            return self.targets_ahead
+        return self.targets_in_space if commands_thrust else self.given_targets
+
+    @cached_property
     def landing(self) -> NDArray[np.bool_]:
         """Which courses (n,) touch the ground; there it carries the drone."""
         return np.asarray((self.given_targets[..., HEIGHT][..., :1] <= 0.0).any(axis=(0, 2)))
@@ -231,7 +256,8 @@ def fly(
     """
     controller = adapted(controller)
     has_thrust = commands_thrust(controller)
-    times_s, targets = flight.times_s(), flight.targets_in_space if has_thrust else flight.given_targets
+    times_s = flight.times_s()
+    targets = flight.targets_for(commands_thrust=has_thrust, has_preview=has_preview(controller))
     open_loop_until, landing = open_loop_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])

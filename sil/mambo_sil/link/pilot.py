@@ -53,6 +53,11 @@ class Pilot:
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
         watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
     ) -> None:
+        if controller.settings.target.acceleration == "preview":
+            raise ArgumentError(
+                'controller: target.acceleration = "preview" must be "given" or "tracked": the targets of a '
+                "pilot do not say what comes"
+            )
         self._open_link, self.steering = open_link, Steering(controller, record)
         self.life = LifeCycle(self.steering, 1.0)
         self._watch, self._interrupts, self._interrupted = watch, 0, ""

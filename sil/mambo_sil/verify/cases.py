@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
@@ -453,9 +454,8 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
     thrust = np.clip(rng.uniform(8, 12, n), low, high)
-    tracker = method.tracker
-    if tracker and tracker.is_given:
-        accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit
+    if settings.target.gives_acceleration:
+        accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * given_limit_m_s2(settings)
         target = np.concatenate([target, accelerations], axis=1)
     if not method.has_height:
         return StepRows(method).join(StepInputs(state, target, thrust))

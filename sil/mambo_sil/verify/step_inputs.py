@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -48,15 +49,20 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
     method = method_of(settings)
-    tracker = method.tracker
-    if tracker and tracker.is_given:
-        target = np.concatenate([target, _accelerations(tracker.input_limit, high, (n, 2), rng)], axis=1)
-    if not method.has_height:
-        return StepInputs(state, target, thrust)
-    own, goal = _heights(settings, scale, rng)
-    if climb := method.climb_tracker if tracker and tracker.is_given else None:
-        goal = np.concatenate([goal, _accelerations(climb.input_limit, high, (n, 1), rng)], axis=1)
-    return StepInputs(np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1), None)
+    level, climb = method.tracker, method.climb_tracker
+    most = level.input_limit if level else given_limit_m_s2(settings)
+    if settings.target.gives_acceleration:
+        target = np.concatenate([target, _accelerations(most, high, (n, 2), rng)], axis=1)
+    if method.has_height:
+        own, goal = _heights(settings, scale, rng)
+        state, target = np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1)
+        if settings.target.gives_acceleration:
+            most_up = climb.input_limit if climb else most
+            target = np.concatenate([target, _accelerations(most_up, high, (n, 1), rng)], axis=1)
+    if ahead := len(method.target) - target.shape[1]:
+        preview = _accelerations(most, high, (n, ahead), rng, special=0.003)
+        target = np.concatenate([target, preview], axis=1)
+    return StepInputs(state, target, None if method.has_height else thrust)
 
 
 def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -73,13 +79,20 @@ def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tupl
 
 
 def _accelerations(
-    limit_m_s2: float, range_m_s2: float, shape: tuple[int, int], rng: np.random.Generator
+    limit_m_s2: float,
+    range_m_s2: float,
+    shape: tuple[int, int],
+    rng: np.random.Generator,
+    special: float = 0.05,
 ) -> Array:
-    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input."""
+    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input.
+
+    special: share of those at an edge.
+    """
     drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, shape)
-    special = rng.random(shape) < 0.05
+    is_special = rng.random(shape) < special
     edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
-    return np.where(special, rng.choice(edges, shape), np.clip(drawn, -range_m_s2, range_m_s2))
+    return np.where(is_special, rng.choice(edges, shape), np.clip(drawn, -range_m_s2, range_m_s2))
 
 
 def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import ACCELERATION, STATE, TARGET, THRUST
+from mambo_codegen.numbers.representation import STATE, TARGET, THRUST
 from mambo_sil.verify.step_inputs import StepInputs
 
 Rows = NDArray[np.float64]
@@ -20,7 +20,7 @@ YAW = 6
 
 
 class StepRows:
-    """The columns of a row: state, target, thrust, and the acceleration of the target if it is given.
+    """The columns of a row: state, target, thrust, and the accelerations of the target if they are given.
 
     With a height: state and target, and no thrust.
 
@@ -39,7 +39,7 @@ class StepRows:
         self.quantities: tuple[str, ...] = (
             (*method.state, *method.target)
             if method.has_height
-            else (*STATE, *TARGET, *THRUST, *(ACCELERATION if is_given else ()))
+            else (*STATE, *TARGET, *THRUST, *method.target[len(TARGET) :])
         )
 
     def hovering(self, n: int) -> Rows:

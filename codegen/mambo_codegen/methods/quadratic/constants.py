@@ -76,7 +76,7 @@ class QuadraticConstants(Constants):
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
         tracker = [quantity for quantity in self._stored_tracker for _ in "xy"]
         limiting = stored_quantities("move", "move") if self.limiting else ()
-        if self.limiting and self.tracker and self.tracker.is_given:
+        if self.limiting and self.settings.target.gives_acceleration:
             limiting += ("velocity", "velocity")
         height = self._stored_height
         if self.limiting and self.height:

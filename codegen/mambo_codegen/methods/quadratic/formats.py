@@ -18,7 +18,7 @@ import numpy as np
 
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, attitude_constants
 from mambo_codegen.methods.quadratic.guard_constants import guard_constants
-from mambo_codegen.methods.quadratic.height_constants import height_constants
+from mambo_codegen.methods.quadratic.height_constants import INTEGRAL, height_constants
 from mambo_codegen.methods.quadratic.height_formats import (
     learnt_m_s2,
     spare_bound,
@@ -27,7 +27,7 @@ from mambo_codegen.methods.quadratic.height_formats import (
     vertical_bounds,
     vertical_shifts,
 )
-from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
+from mambo_codegen.methods.quadratic.law import law_constants, law_states, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
 from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     MOST_SLOPE,
@@ -50,6 +50,9 @@ LAGGED: Final = 1.01
 
 _ATTITUDE_STATES: Final = ("a", "i", "c", "u")
 """The states of the attitude model, in the order of its rows."""
+
+_INPUTS: Final = {"e": "position", "v": "speed", "p": "thrust"}
+"""The quantities of the law's states that are no accelerations in m/step^2."""
 
 _SUM_BITS: Final = 62
 """Most bits of a sum of products without its sign: one less than the type has, as rounding adds to it."""
@@ -126,7 +129,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
     if observer.coarse_gain is not None:
         gain = np.concatenate([gain, observer.coarse_gain[np.newaxis]])
     if height is not None:
-        laws = np.concatenate([laws, np.insert(height.rows, STATES.index("i"), 0.0, axis=1)[np.newaxis]])
+        laws = np.concatenate([laws, np.insert(height.rows, INTEGRAL, 0.0, axis=1)[np.newaxis]])
         loops = np.concatenate([loops, np.insert(height.thrust_row, 1, 0.0)[np.newaxis]])
         gain, ratios = (
             np.concatenate([gain, height.gain[np.newaxis]]),
@@ -161,9 +164,11 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "factor": FACTOR_BITS,
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
+    names = law_states(settings)
+    inputs = [bits[_INPUTS.get(name, "acceleration")] for name in names]
     shifts = {
         "attitude": _attitude_shift(loops, bounds.states, bits),
-        "row": _shift(np.abs(laws), [bounds.states[name] for name in STATES], _inputs(bits), bits["move"]),
+        "row": _shift(np.abs(laws), [bounds.states[name] for name in names], inputs, bits["move"]),
     }
     bits["attitude"] = shifts["attitude"]
     if height is not None:
@@ -180,7 +185,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
         shifts[f"{name}_correction"] = shift
         for by, source in zip(("position", "velocity"), sources, strict=True):
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
-    for name, source in zip(STATES, _inputs(bits), strict=True):
+    for name, source in zip(names, inputs, strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
     shifts |= _product_shifts(bits, tracker.input_quantity if tracker else "")
     shifts |= vertical_shifts(bits) if height else {}
@@ -210,18 +215,13 @@ def refusals(settings: Sections) -> list[Refusal]:
     return [Refusal("ranges", "position_m", rule)]
 
 
-def _inputs(bits: Mapping[str, int]) -> list[int]:
-    """Return the fractional bits of the states that a row multiplies."""
-    return [bits["position"], bits["speed"], *[bits["acceleration"]] * 6]
-
-
 def _bounds(settings: Sections) -> _Bounds:
     """Return the bounds along all axes."""
     height, level = height_constants(settings), _level_bounds(settings)
     if height is None:
         return level
     found = vertical_bounds(
-        height, observer_constants(settings), attitude_constants(settings), settings.ranges.position_m
+        height, observer_constants(settings), attitude_constants(settings), settings.ranges
     )
     names = ("position", "speed", "acceleration", "move", "thrust_m_s2", "angle")
     gain = attitude_constants(settings).gain_m_step2_rad
@@ -262,6 +262,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
         "v": _TURN * (corrected + speed),
         "w": _TURN * (unexplained + target),
         "j": _TURN * jerk,
+        "p": _TURN * settings.ranges.thrust_acceleration_max_m_s2,
         "a": max(tilted, turned),
         "i": limit,
         "c": LAGGED * limit,
@@ -270,7 +271,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
         "innovation_step": innovation_step,
     }
     rows = np.abs(np.concatenate([attitude.tilt_row, attitude.integral_row]))
-    move = float(np.max(np.abs(law.rows) @ [states[name] for name in STATES]))
+    move = float(np.max(np.abs(law.rows) @ [states[name] for name in law_states(settings)]))
     if law.moves == 2:
         most = float(np.max(attitude.command_limit_m_step2))
         move += float(np.max(np.abs(law.ratios))) * (move + most)
@@ -294,7 +295,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
             guard.tilt_rad + guard.tilt_growth_rad if guard else 0.0,
         ),
         thrust_m_s2=max(
-            settings.ranges.thrust_acceleration_max_m_s2,
+            states["p"] if settings.target.acceleration == "preview" else states["p"] / _TURN,
             guard.thrust_m_s2 + guard.thrust_growth_m_s2 if guard and settings.height else 0.0,
         ),
         learnt_m_s2=max(settings.observer.disturbance_limit_m_s2, 0.001),

@@ -15,7 +15,6 @@ from mambo_codegen.methods.quadratic.height_constants import (
     FLOOR_MARGIN_M,
     LEAST_COSINE,
     LEAST_WEIGHT,
-    ROW_STATES,
     HeightConstants,
 )
 from mambo_codegen.methods.quadratic.thrust_vector import inverse, inverse_line
@@ -103,7 +102,7 @@ class HeightAxis:
         self._thrust_row = [constant(value, "attitude") for value in found.thrust_row]
         self._lagged_row = [constant(value, "attitude") for value in found.lagged_row]
         self._rows = [
-            [constant(value, f"row_{state}") for value, state in zip(row, ROW_STATES, strict=True)]
+            [constant(value, f"row_{state}") for value, state in zip(row, found.states, strict=True)]
             for row in found.rows
         ]
         self._ratio = constant(found.ratio, "ratio")
@@ -120,6 +119,7 @@ class HeightAxis:
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._tracker = Tracker(found.tracker, products) if found.tracker else None
+        self._has_preview = constants.has_preview
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
             self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
@@ -236,7 +236,7 @@ class HeightAxis:
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
     ) -> tuple[HeightState, Rows]:
-        """Set the next thrust for targets (n, 2 or 3), or for rest at the own height.
+        """Set the next thrust for targets (n, 2 or more), or for rest at the own height.
 
         measured (n, 3): as in `measure`, zeros without a good state. follows (n,): whether there is a target.
         Returns also whether speed or fence changed what was aimed at (n,).
@@ -244,13 +244,15 @@ class HeightAxis:
         products, motion = self._products, state.target
         goal = np.where(follows, target[:, 0], state.height_m)
         climb = np.where(follows, products.speed_product(target[:, 1]), np.zeros_like(goal))
-        disturbance, jerk = state.disturbance_m_step2, np.zeros_like(goal)
+        disturbance, led = state.disturbance_m_step2, [np.zeros_like(goal)]
+        if self._has_preview:
+            led = [np.where(follows, each, np.zeros_like(goal)) for each in target[:, 2:].T]
         if self._tracker is not None:
             given = target[:, 2:3] if self._tracker.is_given else target[:, 1:2]
             motion = choose(follows, self._tracker.update(motion, given), motion)
             acceleration = motion.acceleration_m_step2[:, 0]
             disturbance = np.where(follows, disturbance - acceleration, disturbance)
-            jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
+            led = [np.where(follows, motion.jerk_m_step2_update[:, 0], led[0])]
         error = state.height_m - goal
         lead = products.reach_product(self._reach, climb)
         up, down = self._up, self._down
@@ -263,8 +265,9 @@ class HeightAxis:
             share = products.factor_product(share, state.gain)
         least, most = (products.factor_product(thrust, share) - self._gravity for thrust in self._thrusts)
         values = [
-            *(limited, state.velocity_m_step - climb, disturbance, jerk),
+            *(limited, state.velocity_m_step - climb, disturbance, led[0]),
             *(self.lift(state, thrust) for thrust in (state.thrust, state.lagged, state.command)),
+            *led[1:],
         ]
         command = self._minimize(values, least, most)
         rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)

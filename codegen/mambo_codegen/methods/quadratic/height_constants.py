@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, LoopValues, attitude_solution
-from mambo_codegen.methods.quadratic.law import LawSolution, axis_law
+from mambo_codegen.methods.quadratic.law import STATES, LawSolution, axis_law, law_states
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_small, reciprocal
 from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, has_thrust_vector
@@ -42,8 +42,8 @@ DESCENT_SHARE: Final = 0.7
 FLOOR_MARGIN_M: Final = 0.02
 """A target at most this far above a drone on the floor is one on the floor."""
 
-ROW_STATES: Final = ("e", "v", "w", "j", "a", "c", "u")
-"""The states that a row multiplies: those of the law less the integral part, which a thrust does not have."""
+INTEGRAL: Final = STATES.index("i")
+"""The place among the law's states of the integral part, which a thrust does not have."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class HeightConstants:
 
     thrust_row:    (3,) the next a from [a, c, u].
     lagged_row:    (2,) the next c from [c, u].
-    rows, ratio:   (moves, 7) the unlimited minimum from ROW_STATES, and H12/H11, as in `LawConstants`.
+    rows, ratio:   (moves, k) the unlimited minimum from `states`, and H12/H11, as in `LawConstants`.
+    states:        (k,) those of the law less the integral part.
     gain:          (3, 2) of the observer, as in `ObserverConstants`; with a learnt thrust gain the last row
                    is that of the gain.
     learn_limit:   largest deviation of the gain from 1, or largest learnt acceleration, m/step^2.
@@ -73,6 +74,7 @@ class HeightConstants:
     thrust_row: NDArray[np.float64]
     lagged_row: NDArray[np.float64]
     rows: NDArray[np.float64]
+    states: tuple[str, ...]
     ratio: float
     gain: NDArray[np.float64]
     learn: str
@@ -125,6 +127,7 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         thrust_row=rows[0, [0, 2, 3]],
         lagged_row=rows[2, 2:],
         rows=law,
+        states=tuple(name for name in law_states(settings) if name != "i"),
         ratio=_solution(settings, height).ratio,
         gain=gain,
         learn=height.learn,
@@ -186,7 +189,7 @@ def height_context(height: HeightConstants | None) -> dict[str, object]:
     """Return what the templates of the height insert."""
     return {
         "height": height,
-        "height_quantities": [f"row_{state}" for state in ROW_STATES],
+        "height_quantities": [f"row_{state}" for state in height.states] if height else [],
         "cosine_terms": COSINE_TERMS,
         "least_cosine": LEAST_COSINE,
         "steepest_rad": STEEPEST_RAD,
@@ -214,9 +217,9 @@ def _loop(height: Height) -> LoopValues:
 
 
 def _solution(settings: Sections, height: Height) -> LawSolution:
-    return axis_law(settings.horizon, height.response_time_s, height.velocity_weight_s, _loop(height))
+    return axis_law(settings, height.response_time_s, height.velocity_weight_s, _loop(height))
 
 
 def _law(settings: Sections, height: Height) -> NDArray[np.float64]:
-    """Return the rows (moves, 7) of ROW_STATES."""
-    return np.array(_solution(settings, height).rows)[:, [0, 1, 2, 3, 4, 6, 7]]
+    """Return the rows of the law's states less the integral part."""
+    return np.delete(np.array(_solution(settings, height).rows), INTEGRAL, axis=1)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants
-from mambo_codegen.methods.quadratic.height_constants import LEAST_WEIGHT, ROW_STATES, HeightConstants
+from mambo_codegen.methods.quadratic.height_constants import LEAST_WEIGHT, HeightConstants
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants
 from mambo_codegen.methods.quadratic.thrust_vector_constants import ThrustVectorConstants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.sections import Ranges
 
 GAIN_CHANGE = 2.0
 """Beyond any change of the learnt gain; a correction is limited to it."""
@@ -20,7 +21,7 @@ GAIN_CHANGE = 2.0
 class VerticalBounds:
     """Bounds of absolute values of the height, in m and m/step^k; `thrust_m_s2` in SI units.
 
-    states: of ROW_STATES, and of the innovations.
+    states: of those of the law, and of the innovations.
     angle:  command, in rad, of the largest acceleration of a tilt over the least weight.
     """
 
@@ -37,9 +38,10 @@ def vertical_bounds(
     height: HeightConstants,
     observer: ObserverConstants,
     attitude: AttitudeConstants,
-    reach_m: float,
+    ranges: Ranges,
 ) -> VerticalBounds:
-    """Return the bounds of the height for positions within `reach_m`."""
+    """Return the bounds of the height for inputs within `ranges`."""
+    reach_m = ranges.position_m
     limit, speed, gravity = height.limit_m_step2, observer.velocity_limit_m_step, height.gravity_m_step2
     learnt = height.learn_limit if height.learns_acceleration else 0.0
     deviation = height.learn_limit if height.learns_gain else 0.0
@@ -55,13 +57,14 @@ def vertical_bounds(
         "v": corrected + speed,
         "w": learnt + target,
         "j": jerk,
+        "p": ranges.thrust_acceleration_max_m_s2,
         "a": limit,
         "c": limit,
         "u": limit,
         "innovation": innovation,
         "innovation_step": innovation_step,
     }
-    move = float(np.max(np.abs(height.rows) @ [states[name] for name in ROW_STATES]))
+    move = float(np.max(np.abs(height.rows) @ [states[name] for name in height.states]))
     move += height.ratio * (move + limit)
     most = (1.01 / (1 - deviation)) / height.least_share
     tilted = attitude.limit_m_step2 * 1.01 / LEAST_WEIGHT

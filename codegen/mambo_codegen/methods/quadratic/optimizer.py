@@ -1,29 +1,29 @@
 """Optimizer of the quadratic cost: its minimum in a box, along both axes of the heading."""
 
-from typing import Final
-
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.law import STATES
+from mambo_codegen.methods.quadratic.law import law_states
 from mambo_codegen.methods.shared.math import Real, clamp
 
-ROW: Final = tuple(f"row_{state}" for state in STATES)
-"""The quantity of each gain of a row."""
+
+def row_quantities(constants: QuadraticConstants) -> tuple[str, ...]:
+    """Return the quantity of each gain of a row."""
+    return tuple(f"row_{state}" for state in law_states(constants.settings))
 
 
 class QuadraticOptimizer:
     """The constants of the minimum, in the scalar type of the controller."""
 
     def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic, limit: Real) -> None:
-        numbers, law = arithmetic.numbers, constants.law
+        numbers, law, quantities = arithmetic.numbers, constants.law, row_quantities(constants)
         self._products = arithmetic
         self._limit = limit
         self._rows = np.array(
             [
                 [
-                    [numbers.constant(value, name) for value, name in zip(row, ROW, strict=True)]
+                    [numbers.constant(value, name) for value, name in zip(row, quantities, strict=True)]
                     for row in axis
                 ]
                 for axis in law.rows
@@ -32,7 +32,7 @@ class QuadraticOptimizer:
         self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
 
     def minimize(self, state: Real, limit: Real | None = None) -> Real:
-        """Return the first free move (n, 2), right and forward, from states (n, 2, 8).
+        """Return the first free move (n, 2), right and forward, from states (n, 2, k) of `law_states`.
 
         limit, (2,) or (n, 2), is that of the moves; None for that of the settings.
         """

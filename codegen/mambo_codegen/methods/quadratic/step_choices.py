@@ -77,7 +77,7 @@ def _per_step2(constants: QuadraticConstants) -> str:
 def step_choices(constants: QuadraticConstants) -> StepChoices:
     """Return what the template of the step chooses by the settings."""
     has_height, has_limits, tracker = constants.has_height, constants.has_limits, constants.tracker
-    is_fixed, is_given = constants.numbers.formats is not None, bool(tracker and tracker.is_given)
+    is_fixed, is_given = constants.numbers.formats is not None, constants.settings.target.gives_acceleration
     learns_gain = constants.height is not None and constants.height.learns_gain
     own = () if is_fixed else ("observer",) if has_height else ("attitude", "observer")
     feedback = constants.feedback_steps or (0.0, 0.0)

@@ -16,6 +16,7 @@ from mambo_codegen.numbers.representation import (
     COMMAND,
     CONTACT,
     HEIGHT,
+    PREVIEW_NUMBERS,
     STATE,
     TARGET,
     THRUST,
@@ -55,7 +56,7 @@ class Constants(ABC):
 
     @cached_property
     def tracker(self) -> TrackerConstants | None:
-        """The constants of the target tracker, in float64; None with `target.acceleration = "none"`."""
+        """The constants of the target tracker, in float64; None if there is nothing to track."""
         return tracker_constants(self.settings, self.step_s)
 
     @property
@@ -79,6 +80,11 @@ class Constants(ABC):
         return self.limiting is not None
 
     @property
+    def has_preview(self) -> bool:
+        """Whether the caller gives accelerations that the target will have."""
+        return self.settings.target.acceleration == "preview"
+
+    @property
     def has_height(self) -> bool:
         """Whether the controller has the height for a third axis, and commands the thrust."""
         return self.settings.height is not None
@@ -96,7 +102,7 @@ class Constants(ABC):
     @property
     def level_target(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_target_t but the height's, in their order."""
-        return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
+        return (*TARGET, *ACCELERATION) if self.settings.target.gives_acceleration else TARGET
 
     @property
     def target(self) -> tuple[str, ...]:
@@ -104,7 +110,8 @@ class Constants(ABC):
         level = self.level_target
         if not self.has_height:
             return level
-        return (*level, *HEIGHT, *(THRUST if len(level) > len(TARGET) else ()))
+        upward = THRUST if len(level) > len(TARGET) else ()
+        return (*level, *HEIGHT, *upward, *THRUST * (PREVIEW_NUMBERS * self.has_preview))
 
     @property
     def command(self) -> tuple[str, ...]:

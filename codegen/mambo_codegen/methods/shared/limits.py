@@ -17,6 +17,7 @@ from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
+from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]
@@ -149,9 +150,8 @@ class LimitsLaw:
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
         self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
         self._trim = constant(limits.tilted.trim_m_s2, "braking")
-        tracker = constants.tracker
-        self.is_given = tracker is not None and tracker.is_given
-        self._jump = constant(tracker.input_limit, "thrust") if tracker and self.is_given else None
+        self.is_given = constants.settings.target.gives_acceleration
+        self._jump = constant(given_limit_m_s2(constants.settings), "thrust") if self.is_given else None
         self._turn = None
         if limits.turn_m_s_rad is not None:
             self._turn = constant(limits.turn_m_s_rad, "slope")

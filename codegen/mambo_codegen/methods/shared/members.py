@@ -1,6 +1,7 @@
 """Members of the structures of nmpc.h, arrays by element, in the order of their numbers."""
 
 from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.numbers.representation import PREVIEW_TIMES
 
 
 def state_members(constants: Constants) -> tuple[str, ...]:
@@ -11,10 +12,12 @@ def state_members(constants: Constants) -> tuple[str, ...]:
 
 def target_members(constants: Constants) -> tuple[str, ...]:
     """Return the members of nmpc_target_t."""
-    is_given = constants.tracker is not None and constants.tracker.is_given
+    is_given = constants.settings.target.gives_acceleration
     level = _pairs("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
     upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
-    return (*level, *upward) if constants.has_height else level
+    times = range(PREVIEW_TIMES * constants.has_preview)
+    ahead = (f"preview_m_s2[{time}][{axis}]" for time in times for axis in range(3))
+    return (*level, *upward, *ahead) if constants.has_height else level
 
 
 def limits_members(constants: Constants) -> tuple[str, ...]:
@@ -25,7 +28,7 @@ def limits_members(constants: Constants) -> tuple[str, ...]:
 
 def bounds_members(constants: Constants) -> dict[str, int]:
     """Return the members of nmpc_bounds_t, and how many numbers each holds."""
-    is_given = constants.tracker is not None and constants.tracker.is_given
+    is_given = constants.settings.target.gives_acceleration
     is_turning = constants.limiting is not None and constants.limiting.turn_m_s_rad is not None
     return {
         "centre_m": 2,

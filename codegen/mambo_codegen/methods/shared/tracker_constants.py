@@ -90,17 +90,18 @@ def tracker_constants(
 ) -> TrackerConstants | None:
     """Derive the constants of the tracker for the prediction step tau; None if `settings` have none.
 
-    `jump_m_s2` is the acceleration from which on the target has jumped; None for what the tilt limit gives.
+    A target with a preview is not tracked: it says where it goes. `jump_m_s2` is the acceleration from which
+    on the target has jumped; None for what the tilt limit gives.
     """
-    if settings.target.acceleration == "none":
+    if settings.target.acceleration in ("none", "preview"):
         return None
     is_given, ranges = settings.target.acceleration == "given", settings.ranges
     update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
-    acceleration_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
     if is_given:
-        input_limit = min(acceleration_m_s2, ranges.thrust_acceleration_max_m_s2)
+        input_limit = given_limit_m_s2(settings, jump_m_s2)
         factor = step_s * step_s
     else:
+        acceleration_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
         input_limit = min(acceleration_m_s2 * update_s, 2 * ranges.velocity_m_s)
         factor = (step_s * step_s) / update_s
     acceleration_m_step2 = factor * input_limit
@@ -115,6 +116,12 @@ def tracker_constants(
         noise=_target_noise(settings, step_s),
         velocity_range_m_s=ranges.velocity_m_s,
     )
+
+
+def given_limit_m_s2(settings: Sections, jump_m_s2: float | None = None) -> float:
+    """Return the limit of a given acceleration; `jump_m_s2` as of `tracker_constants`."""
+    most_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
+    return min(most_m_s2, settings.ranges.thrust_acceleration_max_m_s2)
 
 
 def _target_noise(settings: Sections, step_s: float) -> TargetNoise | None:

@@ -50,11 +50,8 @@ def native_faulty(
         _fill_alteration(record, fault.alter)
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
-        record.controller, record.self, record.commands_thrust = (
-            inner.step,
-            inner.instance(row),
-            inner.commands_thrust,
-        )
+        record.controller, record.self = inner.step, inner.instance(row)
+        record.commands_thrust, record.has_preview = inner.commands_thrust, inner.has_preview
         record.computed = pointer("double *", history)
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))

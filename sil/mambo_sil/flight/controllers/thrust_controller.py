@@ -2,6 +2,7 @@
 
     state  [x, y, vx, vy, roll, pitch, yaw, height, climb, contact with the floor]   (n, 10)
     target [x, y, vx, vy, ax, ay, height, climb, vertical acceleration]              (n, 9)
+           and with a preview [ax, ay, vertical acceleration] at each of its times   (n, 27)
     thrust what the drones got in the last update period over the nominal mass       (n,)
 
 The thrust is NaN where it is what the controller had commanded.
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import TARGET
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 
 
@@ -50,8 +50,9 @@ class ThrustController:
 
     def __init__(self, controller: Any) -> None:
         self.controller = controller
-        level = len(method_of(controller.settings).level_target)
-        self._columns = [*range(level), *range(6, 8 if level == len(TARGET) else 9)]
+        method = method_of(controller.settings)
+        level = len(method.level_target)
+        self._columns = [*range(level), *range(6, 6 + len(method.target) - level)]
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
         """Tell the controllers the thrusts that are no NaN, and return the next commands."""
@@ -61,7 +62,7 @@ class ThrustController:
 
     def wrap(self, _engine: Any, inner: Any) -> Any:
         """Return the same in the engine: `nmpc_host_step` has this interface."""
-        return replace(inner, commands_thrust=True)
+        return replace(inner, commands_thrust=True, has_preview=has_preview(self))
 
 
 def adapted(controller: Any) -> Any:
@@ -85,6 +86,12 @@ def commands_thrust(controller: Any) -> bool:
             return False
         controller = controller.controller
     return True
+
+
+def has_preview(controller: Any) -> bool:
+    """Return whether a controller knows the accelerations that its target will have."""
+    settings = getattr(innermost(controller), "settings", None)
+    return settings is not None and settings.target.acceleration == "preview"
 
 
 def hover_command(controller: Any) -> tuple[float, ...]:

@@ -94,4 +94,6 @@ class AdjustedController:
             records[row].adjustments, records[row].count = due, len(own)
             kept.append(due)
         size = ffi.sizeof("engine_adjusted_t")
-        return Native(engine.engine_adjusted_step, records, size, tuple(kept), inner.commands_thrust)
+        return Native(
+            engine.engine_adjusted_step, records, size, tuple(kept), inner.commands_thrust, inner.has_preview
+        )

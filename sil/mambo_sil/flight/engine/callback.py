@@ -7,7 +7,7 @@ import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.flight.controllers.thrust_controller import commands_thrust, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import commands_thrust, has_preview, numbers_of
 from mambo_sil.flight.engine.engine_library import ffi
 from mambo_sil.flight.engine.native import Native
 from mambo_sil.flight.loop import Flight, PositionController
@@ -21,7 +21,7 @@ def called_back(
     After an exception, which cannot pass through C, the controller is not called any more.
     """
     has_thrust, errors = commands_thrust(controller), list[BaseException]()
-    targets = flight.targets_in_space if has_thrust else flight.given_targets
+    targets = flight.targets_for(commands_thrust=has_thrust, has_preview=has_preview(controller))
     updates, done = len(targets), 0
 
     def step(_self: Any, state: Any, target: Any, thrust_m_s2: float, command: Any) -> int:
@@ -41,7 +41,7 @@ def called_back(
         errors.append(error.with_traceback(traceback))
 
     function = ffi.callback("engine_controller_t", step, error=NOT_CALLED, onerror=keep)
-    return Native(function, ffi.NULL, 0, (function,), has_thrust), errors
+    return Native(function, ffi.NULL, 0, (function,), has_thrust, has_preview(controller)), errors
 
 
 def _row(numbers: Any, columns: int) -> FloatArray:

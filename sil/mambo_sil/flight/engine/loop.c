@@ -132,9 +132,10 @@ static inline vertical_t vertical_target(const engine_simulation_t *simulation, 
     vertical_t wanted;
     int lane;
 
-    if (simulation->target_columns == SPATIAL_COLUMNS) {
+    if (simulation->target_columns >= SPATIAL_COLUMNS) {
         for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
-            const double *target = targets + (SPATIAL_COLUMNS * (((index + lane) * simulation->updates) + update));
+            const int64_t row = ((index + lane) * simulation->updates) + update;
+            const double *target = targets + (simulation->target_columns * row);
 
             z_m.lane[lane] = 0.0 - target[HEIGHT_COLUMN];
             climb_m_s.lane[lane] = target[HEIGHT_COLUMN + 1];

@@ -40,6 +40,7 @@ class Native:
 
     kept: whatever the instances point to, which lives as long as this record.
     commands_thrust: whether they command the thrust.
+    has_preview: whether they know the accelerations that their targets will have.
     """
 
     step: Any
@@ -47,6 +48,7 @@ class Native:
     stride: int
     kept: tuple[Any, ...] = ()
     commands_thrust: bool = False
+    has_preview: bool = False
 
     def instance(self, index: int) -> Any:
         """Return a pointer to the instance of flight `index`."""

@@ -153,9 +153,7 @@ class _Simulation:
         self.lanes = int(engine.engine_lanes())
         self.firsts = range(0, flight.flights, self.lanes)
         self._times_s = flight.times_s()
-        self._records = cache(
-            lambda commands_thrust: simulation_record(flight, self._times_s, commands_thrust=commands_thrust)
-        )
+        self._records = cache(partial(simulation_record, flight, self._times_s))
         self._groups = in_lanes(flight_records(flight, flight.given_targets[0]), self.lanes)
         updates = len(self._times_s)
         self._buffers = _Buffers(flight, self.lanes, updates, updates * flight.ticks_per_update)
@@ -172,8 +170,11 @@ class _Simulation:
 
     def fly(self, first: int, called: Native, record: Any, place: int) -> None:
         """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
-        flight, common = self._flight, self._records(called.commands_thrust)
-        targets = flight.targets_in_space if called.commands_thrust else flight.given_targets
+        flight, wants = (
+            self._flight,
+            {"commands_thrust": called.commands_thrust, "has_preview": called.has_preview},
+        )
+        common, targets = self._records(**wants), flight.targets_for(**wants)
         common["flights"] = place + min(self.lanes, flight.flights - first)
         self._engine.engine_fly(
             pointer("engine_simulation_t *", common),

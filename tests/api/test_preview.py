@@ -1,0 +1,85 @@
+"""What a program says of what comes, and where a preview is refused because nobody can say it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings.controller_toml import to_toml
+from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState
+from mambo_nmpc.curves import curve, preview, sample
+from mambo_sil.errors import FlightError, LogError
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.link.pilot import Pilot
+from mambo_sil.model.replay.logged_inputs import read_inputs
+from mambo_sil.pages.playground.page_controllers import page_controllers
+from tests.support.height import CRAZYFLIE
+from tests.support.quadratic import settings_of
+
+TOLD = settings_of(CRAZYFLIE | {"target.acceleration": "preview"})
+
+
+def test_a_preview_is_the_acceleration_of_the_curve_later() -> None:
+    """At each of its times, in the frame that is asked for."""
+    helix, times_s = curve("helix", 1.0, 1.5), np.array([0.5, 2.0])
+    ahead = preview(helix, times_s, "NWU")
+    assert ahead.shape == (2, 6, 3)
+    for number in range(6):
+        later = sample(helix, times_s + 0.05 * (number + 1), "NWU")
+        np.testing.assert_allclose(ahead[:, number], later.acceleration_m_s2, atol=1e-12)
+
+
+def test_the_controller_reads_it_in_every_frame() -> None:
+    """The command is that of the C for the numbers in its own frame, z upwards."""
+    eight = curve("swinging-eight", 2.0, 1.2)
+    now = sample(eight, 0.7, "NWU")
+    target = TargetState.in_frame("NWU", *now, preview_m_s2=preview(eight, 0.7, "NWU"))
+    state = DroneState.in_frame("NWU", now.position_m, now.velocity_m_s, np.zeros(3))
+    found = Controller(TOLD).step(state, target)
+    place, speed, bent = (np.asarray(part) * (1.0, 1.0, -1.0) for part in sample(eight, 0.7))
+    ahead = preview(eight, 0.7) * (1.0, 1.0, -1.0)
+    measured = np.concatenate([place[:2], speed[:2], np.zeros(3), [place[2], speed[2], 0.0]])
+    wanted = np.concatenate([place[:2], speed[:2], bent[:2], [place[2], speed[2], bent[2]], ahead.ravel()])
+    expected = CompiledController(TOLD).step(measured[None], wanted[None])
+    np.testing.assert_array_equal(found.status, 0)
+    np.testing.assert_allclose(found.command_rad, expected.command_rad[0], atol=1e-6)
+    assert found.thrust_m_s2 is not None
+    np.testing.assert_allclose(found.thrust_m_s2, expected.thrust_m_s2[0], rtol=1e-6)
+
+
+def test_a_missing_preview_and_another_shape_are_named() -> None:
+    """By the name of the argument."""
+    still = np.zeros(3)
+    with pytest.raises(ArgumentError, match=r"preview_m_s2: has shape \(5, 3\); it must be \(6, 3\)"):
+        TargetState(still, still, still, preview_m_s2=np.zeros((5, 3)))
+    with pytest.raises(ArgumentError, match="target: preview_m_s2 is missing; the settings have"):
+        Controller(TOLD).step(DroneState(still, still, still), TargetState(still, still, still))
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "fmu", "mambo", "px4"])
+def test_what_makes_its_own_targets_refuses_a_preview(name: str) -> None:
+    """Its set-points say what is now; the message says what to write."""
+    with pytest.raises(InvalidSettingsError, match=rf"must not be with --for {name}.*; write \"given\" or"):
+        render_target(TOLD, TARGETS[name], with_digest=False)
+
+
+def test_what_gets_its_targets_takes_it() -> None:
+    """The firmware of a processor in the loop has a target of 27 numbers."""
+    assert (
+        "pil_assert_target_has_27_numbers" in render_target(TOLD, TARGETS["pil"], with_digest=False)["pil.c"]
+    )
+
+
+def test_logs_pages_and_pilots_refuse_a_preview(tmp_path: Path) -> None:
+    """None of them knows what comes."""
+    path = tmp_path / "told.toml"
+    path.write_text(to_toml(TOLD), "utf-8")
+    with pytest.raises(LogError, match="cannot be replayed: no log has what came"):
+        read_inputs(tmp_path / "log.csv", {}, TOLD)
+    with pytest.raises(FlightError, match=r'must be "given" or "tracked": the target of the page'):
+        page_controllers([str(path)])
+    with pytest.raises(ArgumentError, match=r'must be "given" or "tracked": the targets of a pilot'):
+        Pilot.simulate(path, "crazyflie")
