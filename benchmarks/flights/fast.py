@@ -63,12 +63,13 @@ CASES: Final = (
 
 def settings() -> dict[str, Settings]:
     """Return what is compared, by the words of the table."""
-    given = controller_toml.read(SETTINGS)
-    alone = controller_toml.with_option(given, "target.acceleration", "tracked")
+    told = controller_toml.read(SETTINGS)
+    given = controller_toml.with_option(told, "target.acceleration", "given")
     return {
         "small angles": controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived"),
-        "thrust vector": controller_toml.with_option(alone, "target.tracker_gain", 0.3),
-        "and acceleration given": given,
+        "thrust vector": controller_toml.with_option(told, "target.acceleration", "tracked"),
+        "and acceleration given": controller_toml.with_option(given, "target.tracker_gain", 1.0),
+        "and preview": told,
     }
 
 
@@ -138,13 +139,14 @@ def draw_eight(stem: Path) -> None:
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 2.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, words, colour in zip(panels, list(compared)[::2], (VERMILION, BLUE), strict=True):
+        for axes, words, colour in zip(panels, list(compared)[::3], (VERMILION, BLUE), strict=True):
             trace = flown(case, compared[words], SEEDS[0])
             late = trace.time_s > DURATION_S / 2.0
             target = trace.target[late, 0]
             axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=BROAD, label="target")
             axes.plot(*trace.position_m[late, 0, :2].T, color=colour, label="drone")
-            axes.set(xlabel="x, m", aspect="equal", title="thrust vector" if colour == BLUE else words)
+            title = "thrust vector and preview" if colour == BLUE else words
+            axes.set(xlabel="x, m", aspect="equal", title=title)
         panels[0].set_ylabel("y, m")
         save(figure, stem)
 
