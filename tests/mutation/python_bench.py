@@ -82,6 +82,7 @@ ROOMS: Final = {
             *(f"{_CONSTANTS}/test_{name}.py" for name in ("input_ranges", "one_norm_constants")),
             *(f"{_CONSTANTS}/test_{name}.py" for name in ("stored_numbers", "tracker_constants")),
             "tests/codegen/test_limits.py",
+            "tests/codegen/test_preview.py",
         ),
     ),
     "laws": Room(
@@ -91,6 +92,7 @@ ROOMS: Final = {
             f"{_CONSTANTS}/test_limits_constants.py",
             "tests/codegen/test_quadratic.py",
             "tests/codegen/test_quadratic_settings.py",
+            "tests/codegen/test_preview.py",
         ),
         without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
     ),
