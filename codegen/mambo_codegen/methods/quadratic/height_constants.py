@@ -189,7 +189,6 @@ def height_context(height: HeightConstants | None) -> dict[str, object]:
     """Return what the templates of the height insert."""
     return {
         "height": height,
-        "height_quantities": [f"row_{state}" for state in height.states] if height else [],
         "cosine_terms": COSINE_TERMS,
         "least_cosine": LEAST_COSINE,
         "steepest_rad": STEEPEST_RAD,

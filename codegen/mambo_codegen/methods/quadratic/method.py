@@ -150,6 +150,7 @@ class Quadratic(QuadraticConstants, Method):
             "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),
             "row_quantities": row_quantities(self),
+            "height_quantities": [name for name in row_quantities(self) if name != "row_i"],
             "row_names": state_names(self.settings),
             "height_names": [name for name in state_names(self.settings) if name != "i"],
             "stored_limits": _stored_limits(self),
