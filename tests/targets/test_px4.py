@@ -81,6 +81,20 @@ def test_the_pilot_may_switch_twenty_times(wind_m_s: float, module: Path) -> Non
             desk.select(HOLD, 2000)
 
 
+@pytest.mark.parametrize(("rates", "goes_on_deg"), [(0.0, 0.0), (1.0, 5.0)], ids=["attitude", "rates"])
+def test_the_mode_goes_on_from_what_px4_flies(rates: float, goes_on_deg: float, module: Path) -> None:
+    """From its attitude set-point, which the drone lags; from the drone, after a mode that sends none."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed)
+        desk.set("px4.rates", rates)
+        desk.set("px4.roll_error", math.radians(5.0))
+        desk.run(200)
+        before = desk.angles_deg
+        desk.select(MPC)
+        start_deg = np.degrees([desk["s.start_roll"], desk["s.start_pitch"]])
+        assert start_deg - before == pytest.approx([goes_on_deg, 0.0], abs=0.6)
+
+
 @pytest.mark.parametrize(
     ("stick", "axis", "sign"),
     [("pitch", 0, 1.0), ("roll", 1, -1.0), ("throttle", 2, 1.0)],

@@ -43,8 +43,8 @@ OLDEST_S: Final = 0.1
 """Age of an estimate beyond which nothing is flown by it."""
 REFUSED_S: Final = 0.5
 """How long the controller may refuse the state before the pilot lands."""
-CLOCK_DRIFT: Final = 1e-3
-"""By how much the autopilot's clock may be slower than the pilot's."""
+CLOCK_DRIFT: Final = 0.02
+"""By how much the autopilot's clock may be slower than the pilot's; that of PX4's simulator is, by 1.2 %."""
 ASK_S, BEAT_S = 0.5, 1.0
 """Periods of repeated requests and of heartbeats."""
 STOPS: Final = 5

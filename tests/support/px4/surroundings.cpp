@@ -28,7 +28,7 @@ float stored_parameters[static_cast<int>(px4::params::COUNT)];
 Parameter *first_parameter;
 
 // What the pilot of the desk sets
-static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops, is_indoors;
+static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops, is_indoors, flies_rates;
 static float hover = 0.6f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error;
 
 // What they find
@@ -46,6 +46,7 @@ extern "C" const struct variable host_parameters[] = {
 	{ "group", "px4", nullptr },
 	BYTE("mode", &wanted_mode) BYTE("estimate_ms", &estimate_ms) BYTE("silent", &is_silent) BYTE("invalid", &is_invalid)
 	BYTE("sticks", &has_sticks) BYTE("trajectory", &has_trajectory) BYTE("slow_ms", &slow_ms) BYTE("stop", &stops) BYTE("indoors", &is_indoors)
+	BYTE("rates", &flies_rates)
 	FLOAT("hover", &hover) FLOAT("roll", &sticks[0]) FLOAT("pitch", &sticks[1]) FLOAT("yaw", &sticks[2]) FLOAT("throttle", &sticks[3])
 	FLOAT("jump_x", &jump[0]) FLOAT("jump_y", &jump[1]) FLOAT("jump_z", &jump[2]) FLOAT("jump_heading", &jump_heading) FLOAT("roll_error", &roll_error)
 	FLOAT("jump_vx", &jump_velocity[0]) FLOAT("jump_vy", &jump_velocity[1]) FLOAT("jump_vz", &jump_velocity[2])
@@ -269,7 +270,7 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 	controllerPid(control, &to, sensors, state, step);
 	throttle = control->thrust / FULL;
 
-	if (nav_state != MPC) { // PX4's own controllers publish too
+	if (nav_state != MPC && !flies_rates) { // PX4's own controllers publish too, but those of rates alone
 		matrix::Quatf(matrix::Eulerf(state->attitude.roll / DEG, state->attitude.pitch / DEG, data_vehicle_local_position.heading))
 		.copyTo(data_vehicle_attitude_setpoint.q_d);
 		data_vehicle_attitude_setpoint.thrust_body[2] = -throttle;

@@ -25,7 +25,9 @@ THRUST_COMMAND: Final = "thrust_command"
 TARGET: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
 TARGET_ACCELERATION: Final = ("target_ax_m_s2", "target_ay_m_s2")
 TAKE_OVERS: Final = "take_overs"
-"""How often the controller has begun anew, at the present attitude."""
+"""How often the controller has begun anew, at the present attitude or its `START_TILTS`."""
+START_TILTS: Final = ("start_roll_rad", "start_pitch_rad")
+"""The angles with which it did."""
 START_THRUST: Final = "start_thrust_m_s2"
 """The thrust over mass with which it did."""
 JUMPS: Final = "estimator_jumps"
@@ -41,7 +43,7 @@ LEVELLED: Final = "levelled"
 SHIFT: Final = "shift"
 """By what the frame of a controller of the height jumped before the step: shift_0 .. shift_6, of position,
 velocity (each x, y, up) and heading."""
-OF_HEIGHTS: Final = (START_THRUST, GROUNDED, LEVELLED)
+OF_HEIGHTS: Final = (*START_TILTS, START_THRUST, GROUNDED, LEVELLED)
 UPDATE: Final = "update"
 """The number of the update that the row is of, counted modulo `UPDATES`."""
 UPDATES: Final = 2**16

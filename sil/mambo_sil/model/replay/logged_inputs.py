@@ -25,6 +25,7 @@ from mambo_sil.model.identify.signals import (
     LEVELLED,
     SHIFT,
     START_THRUST,
+    START_TILTS,
     TAKE_OVERS,
     TARGET,
     TARGET_ACCELERATION,
@@ -128,14 +129,16 @@ class LoggedInputs:
     """Measured state (k, 7), or with a height (k, 10)."""
     target: FloatArray
     thrust_m_s2: FloatArray
+    start_rad: FloatArray
+    """Roll and pitch (k, 2) at which the controller begins: of the log, or as measured."""
     start_m_s2: FloatArray
-    """Thrust over mass (k,) at which the controller begins."""
+    """Thrust over mass (k,) at which it does."""
     shift: FloatArray
     """Jumps of the frame before each update (k, 7), as `ReferenceController.shift` takes them."""
     levelled: NDArray[np.bool_]
     """Whether its caller flew level instead (k,)."""
     begins: NDArray[np.bool_]
-    """Whether the controller begins anew at the attitude (k,): at a take-over or behind a long gap."""
+    """Whether the controller begins anew (k,): at a take-over or behind a long gap."""
     jump: FloatArray
     """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
     gaps: int
@@ -185,6 +188,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         own = -state[:, len(STATE) :]
         state = np.column_stack([state[:, : len(STATE)], own, _held_or(log, GROUNDED, time_s, 0.0)])
     thrust_m_s2 = _held_or(log, THRUST, time_s, GRAVITY_M_S2)
+    starts = [_held_or(log, name, time_s, state[:, 4 + axis]) for axis, name in enumerate(START_TILTS)]
     start_m_s2 = _held_or(log, START_THRUST, time_s, thrust_m_s2)
     levelled = commands_thrust & (_held_or(log, LEVELLED, time_s, 0.0) != 0.0)
     behind = _behind_gaps(is_logged, round(LONGEST_FILLED_S / period_s))
@@ -197,6 +201,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         state=state,
         target=target,
         thrust_m_s2=thrust_m_s2,
+        start_rad=np.stack(starts, axis=1),
         start_m_s2=start_m_s2,
         shift=np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1),
         levelled=levelled,

@@ -39,7 +39,7 @@ def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: F
 
 
 def begin(controller: CompiledController, inputs: LoggedInputs, k: int) -> None:
-    """Reset a controller to the measured attitude, and with a height to the thrust, of update `k`."""
-    held = inputs.state[k : k + 1, 4:6]
+    """Reset a controller to the attitude with which it began, and with a height to the thrust, of update `k`."""
+    held = inputs.start_rad[k : k + 1]
     commands_thrust = controller.settings.height is not None
     controller.reset(np.column_stack([held, inputs.start_m_s2[k : k + 1]]) if commands_thrust else held)
