@@ -21,10 +21,12 @@ from mambo_sil.api.states import TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.link.records import EstimatedState
 
-JUMP_M, JUMP_RAD = 0.1, 0.1
+JUMP_M, JUMP_RAD = 0.03, 0.1
 """Smallest changes that are taken for a jump where the estimator does not count its resets."""
 ERROR_M_S, RATE_RAD_S = 0.5, 6.0
 """And how much larger they must be for each second between two estimates."""
+CLOCK_S: Final = 0.005
+"""Error of the time of an estimate, in which a drone flies as far as its velocity says."""
 LONGEST_S: Final = 0.25
 """Time between two estimates from which on a jump cannot be seen."""
 NOISE_M_S: Final = 0.1
@@ -103,7 +105,7 @@ def _changes(
     last: EstimatedState, estimate: EstimatedState, passed_s: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return by what position and velocity (3,) and heading differ from the expected ones."""
-    expected_m = last.position_m + passed_s * last.velocity_m_s
+    expected_m = last.position_m + passed_s * 0.5 * (last.velocity_m_s + estimate.velocity_m_s)
     turned_rad = float(wrapped(estimate.attitude_rad[2] - last.attitude_rad[2]))
     return estimate.position_m - expected_m, estimate.velocity_m_s - last.velocity_m_s, turned_rad
 
@@ -113,5 +115,6 @@ def _has_jumped(last: EstimatedState, estimate: EstimatedState, passed_s: float)
     if last.resets is not None and estimate.resets is not None:
         return last.resets != estimate.resets
     moved_m, _, turned_rad = _changes(last, estimate, passed_s)
-    is_moved = float(np.abs(moved_m).max()) > JUMP_M + ERROR_M_S * passed_s
+    flown_m = (ERROR_M_S * passed_s) + (CLOCK_S * float(np.abs(estimate.velocity_m_s).max()))
+    is_moved = float(np.abs(moved_m).max()) > JUMP_M + flown_m
     return is_moved or abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s
