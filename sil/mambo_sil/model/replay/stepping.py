@@ -39,7 +39,7 @@ def step(controller: CompiledController, inputs: LoggedInputs, k: int, states: F
 
 
 def begin(controller: CompiledController, inputs: LoggedInputs, k: int) -> None:
-    """Reset a controller to that with which it began at update `k`: the attitude, with a height the thrust."""
+    """Reset a controller to what it began with at update `k`: the attitude, with a height the thrust."""
     held = inputs.start_rad[k : k + 1]
     commands_thrust = controller.settings.height is not None
     controller.reset(np.column_stack([held, inputs.start_m_s2[k : k + 1]]) if commands_thrust else held)
