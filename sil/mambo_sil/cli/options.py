@@ -14,7 +14,7 @@ from mambo_sil.flight.names import present_sensors
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-    from mambo_sil.results.summary import Summary
+    from mambo_sil.results.summary import ReportedSummary, Summary
 
 __all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
 
@@ -128,3 +128,10 @@ def demand_port(port: str | None, baud: int | None) -> None:
 def show(summary: "Summary", text: str, *, as_json: bool) -> None:
     """Print `summary` as JSON, or `text`."""
     typer.echo(summary.text() if as_json else text, nl=not as_json)
+
+
+def show_result(summary: "ReportedSummary", folder: Path | None, *, as_json: bool) -> None:
+    """Print `summary` as JSON, or its result as text; `folder` has its files."""
+    from mambo_sil.results.terminal import result_text
+
+    show(summary, result_text(summary.result(folder or Path())), as_json=as_json)
