@@ -83,9 +83,15 @@ class BoardFootprint:
     def answer(self) -> str:
         """Whether the controller fits, and what it takes."""
         found = f"{self.name}: {self.verdict}, {self.flash_bytes.total / 1000:.3g} KB of flash"
-        return (
-            found if self.period_share is None else f"{found}, {100 * self.period_share:.2g} % of the period"
-        )
+        return found if self.period_share is None else f"{found}, {self._period} of the period"
+
+    @property
+    def _period(self) -> str:
+        return "-" if self.period_share is None else f"{100 * self.period_share:.2g} %"
+
+    @property
+    def _stack(self) -> str:
+        return str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -99,11 +105,11 @@ class BoardFootprint:
             self.name,
             str(self.flash_bytes.total),
             str(self.ram_bytes.total),
-            str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-",
+            self._stack,
             "-" if counts is None else f"{counts.mean:.0f} / {counts.most_met}",
             cycles,
             "-" if time_s is None else f"{1000 * time_s[1]:.3g}",
-            "-" if self.period_share is None else f"{100 * self.period_share:.2g} %",
+            self._period,
             self.verdict,
         )
 
@@ -137,14 +143,13 @@ class BoardFootprint:
             per_instruction = f"{board.mean_cycles / counts.mean:.3g}"
         cycles = (board.cycles.least, board.cycles.median, board.cycles.most)
         time_ms = [1000 * one / board.clock_hz for one in cycles]
-        stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
         return [
             ("a step", "measured: least / median / most", "counted: least / mean / largest; estimated"),
             ("instructions", "-", counted[0]),
             ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
             ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),
             ("cycles per instruction", per_instruction, counted[3]),
-            ("stack, B", str(board.stack_bytes), stack),
+            ("stack, B", str(board.stack_bytes), self._stack),
         ]
 
     @property
@@ -155,12 +160,7 @@ class BoardFootprint:
     def details(self, *, functions: bool) -> Details:
         """Return what only a page shows of the board: budgets, counts, and functions."""
         limits = [
-            (
-                one.name,
-                f"{digits(one.value)} {one.unit}",
-                f"{digits(one.budget)} {one.unit}",
-                f"{one.percent} %",
-            )
+            (f"{one.name}, {one.unit}", digits(one.value), digits(one.budget), f"{one.percent} %")
             for one in self.limits
         ]
         facts = {"core": self.core, "compiler": self.compiler}
@@ -201,7 +201,9 @@ class FootprintSummary(ReportedSummary):
                 blocks += [Sentence(board.on_board.sentence), ResultTable(head, rows)]
         if alone:
             blocks.append(self.boards[0].function_table)
-        blocks += [Sentence(board.cycles_sentence) for board in self.boards if board.cycles is not None]
+        blocks += [
+            Sentence(board.cycles_sentence) for board in self.boards if board.cycles_estimate is not None
+        ]
         blocks += [Sentence(note) for board in self.boards for note in board.notes]
         about = f"{self.generator}, settings {self.digest}, {self.scalar}, {self.optimisation}. {_ABOUT}"
         return CommandResult(
