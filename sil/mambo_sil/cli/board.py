@@ -164,12 +164,8 @@ def sweep(
         )
         summary.write(folder)
     if fit and not as_json:
-        show_result(
-            summary.model_copy(update={"points": [] if best is None else [best]}), output, as_json=False
-        )
-    else:
-        show_result(summary, output, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
+        summary = summary.model_copy(update={"points": [] if best is None else [best]})
+    show_result(summary, output, SWEEP_FILES, as_json=as_json)
     if fit and best is None:
         raise typer.Exit(1)
 

@@ -69,8 +69,7 @@ def verify(
         )
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show_result(summary, output, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {PAGE}, {SUMMARY}, {CONTROLLER}, {REPORTS}", err=True)
+    show_result(summary, output, (PAGE, SUMMARY, CONTROLLER, REPORTS), as_json=as_json)
     if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
 
@@ -266,8 +265,7 @@ def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> Non
             summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
         (folder / SENSED_TABLE).write_text(sensed_markdown(summary.rows) + "\n", "utf-8")
         summary.write(folder)
-    show_result(summary, output, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)
+    show_result(summary, output, (SENSED_TABLE,), as_json=as_json)
 
 
 def report(

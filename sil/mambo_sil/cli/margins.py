@@ -78,11 +78,9 @@ def margins(
         drawing = _campaign(campaign, vehicle, vehicle_toml.of_settings(source), sensors)
         subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "true")
         summary = _measure_drawn(subject, campaign, drawing, drones, output)
-    show_result(summary, output, as_json=as_json)
-    if output is not None:
-        drawn = (*PICTURES, RESPONSES) if summary.axes else ()
-        written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
-        typer.echo(f"{echo(str(output))}: {', '.join(written)}", err=True)
+    drawn = (*PICTURES, RESPONSES) if summary.axes else ()
+    written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
+    show_result(summary, output, written, as_json=as_json)
     if not summary.stable:
         raise typer.Exit(1)
 

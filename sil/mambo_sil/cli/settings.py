@@ -164,9 +164,8 @@ def identify(
                 (folder / MODEL).write_text(model_text(summary), "utf-8")
                 (folder / VEHICLE).write_text(vehicle_text(summary, mass_kg), "utf-8")
             summary.write(folder)
-    show_result(summary, output, as_json=as_json)
     models = (MODEL, VEHICLE) if summary.good else ()
-    typer.echo(f"{echo(str(output))}: {', '.join((*models, CURVES, *PICTURES, SUMMARY))}", err=True)
+    show_result(summary, output, (*models, CURVES, *PICTURES, SUMMARY), as_json=as_json)
     if not summary.good:
         raise typer.Exit(1)
 
@@ -277,9 +276,8 @@ def tune(
     from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT
     from mambo_sil.results.folders import SUMMARY
 
-    show_result(summary, output, as_json=as_json)
-    written = f"{CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg, {SUMMARY}"
-    typer.echo(f"{echo(str(output))}: {written}", err=True)
+    written = (CONTROLLER, f"{FRONT}.csv", f"{FRONT}.png", f"{FRONT}.svg", SUMMARY)
+    show_result(summary, output, written, as_json=as_json)
 
 
 def _tune(
@@ -380,9 +378,6 @@ def diff(
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:
         summary = compare(sides[0], sides[1], load_drone(vehicle, a, b), output, bar)
-    show_result(summary, output, as_json=as_json)
-    if output is not None:
-        pictures = () if summary.same else PICTURES
-        typer.echo(f"{echo(str(output))}: {', '.join((*pictures, SUMMARY))}", err=True)
+    show_result(summary, output, (*(() if summary.same else PICTURES), SUMMARY), as_json=as_json)
     if not summary.same:
         raise typer.Exit(1)

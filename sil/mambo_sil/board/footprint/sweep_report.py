@@ -46,9 +46,13 @@ class SweepSummary(ReportedSummary):
             return sweep_panels(self.points, self.axes, self.budget)
 
         flown = [point for point in self.points if point.refusal is None]
-        answer = [f"{sum(point.fits for point in flown)} of {len(self.points)} controllers fit"]
         best = self.closest_fit
-        answer += [] if best is None else [f"closest: {_values(best)}, IAE {digits(best.iae_m_s)} m s"]
+        answer = [f"nothing fits {self.board}"]
+        if best is not None:
+            answer = [
+                f"{sum(point.fits for point in flown)} of {len(self.points)} controllers fit",
+                f"closest: {_values(best)}, IAE {digits(best.iae_m_s)} m s",
+            ]
         return CommandResult(
             f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}",
             best is not None,

@@ -62,9 +62,8 @@ def fly_app(
             console=trace.console,
         )
         summary.write(folder)
-    show_result(summary, output.output, as_json=output.as_json)
     written = DESK_FILES[:1] if output.no_pictures else DESK_FILES
-    typer.echo(f"{echo(str(output.output))}: {', '.join(written)}", err=True)
+    show_result(summary, output.output, written, as_json=output.as_json)
     if not summary.good:
         raise typer.Exit(1)
 

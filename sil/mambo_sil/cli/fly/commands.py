@@ -92,8 +92,8 @@ def campaign(
     from mambo_sil.experiment.campaign.store import TABLE
     from mambo_sil.results.folders import SUMMARY
 
-    show_result(summary, output, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {TABLE}, {SUMMARY}, {PICTURE}.png, {PICTURE}.svg, {RECORDS}/", err=True)
+    files = (TABLE, SUMMARY, f"{PICTURE}.png", f"{PICTURE}.svg", f"{RECORDS}/")
+    show_result(summary, output, files, as_json=as_json)
 
 
 def _fly_campaign(
@@ -219,7 +219,6 @@ def replay(
         write_curves(replayed, folder / CURVES)
         draw_replay(folder / CURVES, folder / "replay")
         summary.write(folder)
-    show_result(summary, output, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {', '.join((CURVES, *PICTURES, SUMMARY))}", err=True)
+    show_result(summary, output, (CURVES, *PICTURES, SUMMARY), as_json=as_json)
     if not summary.good:
         raise typer.Exit(2 if summary.good is None else 1)

@@ -190,8 +190,7 @@ def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None, spe
 
 def finish(summary: FlightSummary, output: Output, files: tuple[str, ...]) -> None:
     """Print the results and the files written; exit 1 unless the summary is good."""
-    show_result(summary, output.output, as_json=output.as_json)
-    typer.echo(f"{echo(str(output.output))}: {', '.join(files)}", err=True)
+    show_result(summary, output.output, files, as_json=output.as_json)
     if not summary.good:
         raise typer.Exit(1)
 

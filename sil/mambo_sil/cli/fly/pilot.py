@@ -81,8 +81,7 @@ def pilot(
             trajectory=trajectory,
         )
         summary.write(folder)
-    show_result(summary, output, as_json=as_json)
-    typer.echo(f"{output}: {LOG}", err=True)
+    show_result(summary, output, (LOG,), as_json=as_json)
     if interrupted is not None:
         raise interrupted
     if not summary.good:
