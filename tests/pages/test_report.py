@@ -48,7 +48,7 @@ SEEN = {
         ">2.5<",
         "Play",
     ),
-    "footprint": ("3000 B", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
+    "footprint": (">3000<", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
     "sweep": (
         "closest: horizon.prediction 10, horizon.control 1",
         "2 of 6 controllers fit",

@@ -50,13 +50,12 @@ class ResultTable:
 
     def narrow(self) -> "ResultTable":
         """Return the table without the columns `wide`."""
-        kept = [index for index in range(len(self.heads)) if index not in self.wide]
         if not self.wide:
             return self
+        kept = [index for index in range(len(self.heads)) if index not in self.wide]
         heads, *rows = ([row[index] for index in kept] for row in (self.heads, *self.rows))
-        return ResultTable(
-            heads, rows, [kept.index(one) for one in self.text_columns if one in kept], (), self.title
-        )
+        texts = [kept.index(index) for index in self.text_columns if index in kept]
+        return ResultTable(heads, rows, texts, title=self.title)
 
     def markdown(self) -> str:
         """Return the table as Markdown."""

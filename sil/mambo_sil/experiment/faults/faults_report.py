@@ -66,19 +66,15 @@ def faults_markdown(verdicts: Sequence[Verdict]) -> str:
 
 def _table(verdicts: Sequence[Verdict]) -> ResultTable:
     """Return a row per fault; the console has the largest errors and when the drone recovered."""
-    heads = (
-        "fault",
-        *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
-        *("command, rad", "tilt, rad", "at limit, %", "end", "status"),
-    )
+    errors = [f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")]
+    heads = ("fault", "end", "status", *errors, "command, rad", "tilt, rad", "at limit, %")
     rows = []
     for fault, pair in _pairs(verdicts).items():
-        row = [fault, *(cell for flight in pair for cell in _cells(flight))]
+        row = [fault, _worst_end(pair), ", ".join(all_statuses(pair))]
+        row += [cell for flight in pair for cell in _cells(flight)]
         row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
-        row.append(f"{100 * max(verdict.saturated_share for verdict in pair):.1f}")
-        rows.append((*row, _worst_end(pair), ", ".join(all_statuses(pair))))
-    wide = range(len(heads) - 5, len(heads))
-    return ResultTable(heads, rows, (0, -2, -1), wide)
+        rows.append((*row, f"{100 * max(verdict.saturated_share for verdict in pair):.1f}"))
+    return ResultTable(heads, rows, (0, 1, 2), (1, 2, 7, 8, 9))
 
 
 def _cells(flight: Verdict) -> tuple[str, str]:
