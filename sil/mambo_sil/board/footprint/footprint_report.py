@@ -192,7 +192,8 @@ class FootprintSummary(ReportedSummary):
 
     def result(self, _folder: Path, /) -> CommandResult:
         """Return the result: whether it fits each board, and what it takes there."""
-        measured = [board.on_board for board in self.boards if board.on_board is not None]
+        measured = (board.on_board for board in self.boards if board.on_board is not None)
+        different = [f"OTHER BITS on {echo(one.board_says)}" for one in measured if one.different_steps]
         alone = len(self.boards) == 1
         blocks: list[Block] = [ResultTable(_HEAD, [board.row for board in self.boards], (0, -1))]
         for board in self.boards:
@@ -208,8 +209,8 @@ class FootprintSummary(ReportedSummary):
         about = f"{self.generator}, settings {self.digest}, {self.scalar}, {self.optimisation}. {_ABOUT}"
         return CommandResult(
             f"Footprint of {echo(self.source)}",
-            all(board.fits for board in self.boards) and not any(one.different_steps for one in measured),
-            [board.answer for board in self.boards],
+            all(board.fits for board in self.boards) and not different,
+            [*(board.answer for board in self.boards), *different],
             [*blocks, *(board.details(functions=not alone) for board in self.boards), Note(about)],
         )
 
