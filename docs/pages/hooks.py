@@ -39,8 +39,8 @@ _PART: Final = re.compile(r"<!-- outside the manual -->.*?<!-- end -->", re.DOTA
 
 _PLAYGROUND: Final = "playground.md"
 
-_NOT_SEARCHED: Final = "explanation/decisions/"
-"""The folder for developers."""
+_NOT_SEARCHED: Final = "explanation/decisions.md"
+"""The page for developers."""
 
 _WIDE: Final = "evidence/"
 """The folder whose tables need the width of the table of contents."""
@@ -70,7 +70,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
     """Put in what the code writes, and the drawings; raises OSError for one that is not there."""
     name = page.file.src_uri
-    if name.startswith(_NOT_SEARCHED):
+    if name == _NOT_SEARCHED:
         page.meta["search"] = {"exclude": True}
     if name in _WIDEST:
         page.meta["hide"] = ["toc", "navigation"]

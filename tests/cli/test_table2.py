@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_sil.experiment.table2.table2 import Claim, Table2Row, Table2Summary, table2_text
+from mambo_sil.experiment.table2.table2 import Claim, Table2Row, Table2Summary
+from mambo_sil.results.terminal import result_text
 from tests.support.command import run
 
 
@@ -50,7 +51,7 @@ def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     """Ratios are named, and a claim that does not hold is the paper's."""
     row = Table2Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0), 0.0123)
     claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
-    text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
+    text = result_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims).result(Path()))
     lines = text.splitlines()
     assert lines[0] == "mambo on mambo: 1 cm in the mean on Bernoulli 0.5 rad/s"
     assert "improvement: IAE of the flown PD" in text

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.settings.model import Settings
+from mambo_sil.results.terminal import result_text
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
-from mambo_sil.verify.verify_report import Verified, summarise, verdict, verify_text
+from mambo_sil.verify.verify_report import Verified, summarise, verdict
 from tests.support.command import run, unwrapped
 from tests.support.tools import require
 
@@ -110,7 +111,7 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
 def test_the_verdict_is_the_worst_outcome(outcomes: tuple[CheckOutcome, ...], whole: CheckOutcome) -> None:
     """A failure outweighs a gap, and a gap everything that passed."""
     assert verdict(ended(*outcomes)) is whole
-    text = unwrapped(verify_text(summarise(ended(*outcomes), "mambo", Settings())))
+    text = unwrapped(result_text(summarise(ended(*outcomes), "mambo", Settings()).result(Path())))
     passed = outcomes.count(CheckOutcome.PASSED)
     assert text.startswith(f"mambo: {passed} of {len(outcomes)} checks passed")
     assert (", 1 failed" in text) is (whole is CheckOutcome.FAILED)

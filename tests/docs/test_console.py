@@ -18,9 +18,9 @@ LONG = {
         f"tutorials/{name}.md"
         for name in ("crazyflie", "first-flight", "own-drone", "paper", "px4-ardupilot")
     ),
-    *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
+    *(f"how-to/{name}.md" for name in ("campaign", "crazyflie", "design", "footprint", "identify")),
     "how-to/simulators.md",
-    *(f"how-to/{name}.md" for name in ("regress", "replay", "tune", "verify")),
+    *(f"how-to/{name}.md" for name in ("own-firmware", "regress", "replay", "verify")),
 }
 """Pages whose commands take two seconds or more of an idle core."""
 ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")
@@ -39,6 +39,7 @@ NOT_RUN = {
     ),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
+    "how-to/design.md": ("it installs",),
     "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
     "how-to/from-0.1-to-0.2.md": ("needs files of 0.1",),
     "how-to/identify.md": ("needs a Crazyflie",),
@@ -63,7 +64,6 @@ NOT_RUN = {
         *("it installs", "needs PyFlyt"),
         "it installs",
     ),
-    "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),
     "tutorials/crazyflie.md": (
         "needs a Crazyflie",
@@ -92,7 +92,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: 
     """In an empty folder, in order, with the files that the page says to save."""
     for tool, package in [("bash", "bash"), ("cc", "gcc"), ("make", "make"), *TOOLS.get(name, [])]:
         require(tool, package)
-    if name in {"how-to/design.md", "how-to/tune.md"}:
+    if name == "how-to/design.md":
         require_module("optuna")
     if name == "how-to/simulators.md":
         require_module("gymnasium")

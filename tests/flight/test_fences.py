@@ -25,11 +25,13 @@ from mambo_sil.flight.fences import (
     with_limits,
 )
 from mambo_sil.flight.flight_plots import draw_flights, flight_columns
-from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
+from mambo_sil.flight.flight_report import RepeatSummary, judge
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
+from mambo_sil.results.blocks import ResultTable
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.metric_names import titled
+from mambo_sil.results.terminal import result_text
 from tests.support.height_settings import height_settings
 from tests.support.tools import toolchain
 
@@ -203,14 +205,14 @@ def test_a_summary_says_how_a_flight_keeps_its_limits(tmp_path: Path) -> None:
         )
         summary.write(tmp_path)
         again = RepeatSummary.model_validate_json((tmp_path / SUMMARY).read_text("utf-8"))
-        text = flight_text(again)
+        text = result_text(again.result(tmp_path))
         assert ("past the wall" in text) == (name in ("walls", "both"))
         assert ("speed over the limit" in text) == (name in ("fast", "both"))
         assert ("walls_m" in summary.text()) == (again.walls_m is not None) == (name in ("walls", "both"))
         assert again.speed_limit_m_s == (5.0 if name in ("fast", "both") else None)
         shown[name] = {key: again.metrics[key] for key in LIMIT_METRICS if key in again.metrics}
-        section = summary.section(tmp_path).content["metrics"]
-        assert len(section) == len(again.metrics)
+        (table,) = (one for one in summary.result(tmp_path).blocks if isinstance(one, ResultTable))
+        assert len(table.rows) == len(again.metrics)
     assert shown["pd"] == shown["no limits"] == shown["slow"] == {}
     assert shown["fast"] == pytest.approx({"speed_excess": 0.2})
     assert shown["walls"] == {"past_wall_m": 0.0}

@@ -27,7 +27,7 @@ from mambo_sil.cli.options import (
     load,
     load_boards,
     load_drone,
-    show,
+    show_result,
 )
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def footprint(
     With --port also cycles and stack of the same steps on the board there, by default the one that the
     firmware names; exit 1 if its bits differ.
     """
-    from mambo_sil.board.footprint.footprint_report import FootprintSummary, page, summarise, text
+    from mambo_sil.board.footprint.footprint_report import FootprintSummary, summarise
     from mambo_sil.board.footprint.measure import measure_boards
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.results.folders import new_results
@@ -84,11 +84,13 @@ def footprint(
         summary = summarise(measured, source, settings)
         if folder is not None:
             from mambo_sil.board.footprint.footprint_plots import draw_footprints
+            from mambo_sil.results.html_page import results_page
 
             draw_footprints(measured, folder / "footprint")
-            (folder / "footprint.html").write_text(page(summary), "utf-8")
+            shown = [(str(output), summary.result(folder))]
+            (folder / "footprint.html").write_text(results_page(shown, [summary.generator]), "utf-8")
             summary.write(folder)
-    show(summary, text(measured), as_json=as_json)
+    show_result(summary, output, as_json=as_json)
     for message in missing:
         typer.echo(message, err=True)
     if not all(one.good for one in measured):
@@ -128,7 +130,7 @@ def sweep(
     from mambo_codegen import boards
     from mambo_sil.board.emulation.machine import demand_emulator
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
-    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, points_text, write_points
+    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, write_points
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.results.folders import new_results
@@ -161,10 +163,9 @@ def sweep(
             closest_fit=best,
         )
         summary.write(folder)
-    shown = ([] if best is None else [best]) if fit else points
-    text = points_text(shown) if shown else f"nothing fits {chosen.title}"
-    show(summary, text, as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
+    if fit and not as_json:
+        summary = summary.model_copy(update={"points": [] if best is None else [best]})
+    show_result(summary, output, SWEEP_FILES, as_json=as_json)
     if fit and best is None:
         raise typer.Exit(1)
 

@@ -8,7 +8,7 @@ import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.cli.command import output_option
-from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show, show_result
 from mambo_sil.verify.check_list import CHECKS
 
 if TYPE_CHECKING:
@@ -48,9 +48,10 @@ def verify(
     from mambo_codegen.bundle.render import render
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.results.folders import SUMMARY, digests, new_results
+    from mambo_sil.results.html_page import results_page
     from mambo_sil.results.scratch import check_tmpdir
     from mambo_sil.verify.check import CheckOutcome
-    from mambo_sil.verify.verify_report import PAGE, VerifySummary, page, summarise, verify_text
+    from mambo_sil.verify.verify_report import PAGE, VerifySummary, summarise
 
     settings = load(source, scalar)
     chosen = _chosen_checks(only)
@@ -63,11 +64,12 @@ def verify(
         bundle.write(render(settings), folder / CONTROLLER)
         found = _run_checks(chosen, settings, folder, bar)
         summary = summarise(found, source, settings)
-        (folder / PAGE).write_text(page(summary), "utf-8")
+        (folder / PAGE).write_text(
+            results_page([(str(output), summary.result(folder))], [summary.generator]), "utf-8"
+        )
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show(summary, verify_text(summary), as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {PAGE}, {SUMMARY}, {CONTROLLER}, {REPORTS}", err=True)
+    show_result(summary, output, (PAGE, SUMMARY, CONTROLLER, REPORTS), as_json=as_json)
     if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
 
@@ -147,7 +149,6 @@ def regress(
         RegressSummary,
         judge,
         junit_xml,
-        regress_text,
         write_records,
     )
     from mambo_sil.experiment.regress.suite_file import load_suite
@@ -172,7 +173,7 @@ def regress(
         draw_regress(summary.flights, folder / "regress")
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show(summary, regress_text(summary, str(output)), as_json=as_json)
+    show_result(summary, output, as_json=as_json)
     if update:
         record_baseline(chosen, entrant, rows)
         typer.echo(f"{echo(str(path))}: recorded {len(rows)} flights", err=True)
@@ -225,7 +226,6 @@ def table2(
         Table2Summary,
         fly_table2,
         judge_table2,
-        table2_text,
     )
     from mambo_sil.experiment.table2.table2_plots import DRAWN, draw_figure3
     from mambo_sil.flight.names import PD_TITLES
@@ -245,7 +245,7 @@ def table2(
         draw_figure3({name: traces[name] for name in DRAWN}, folder / "figure3")
         summary = judge_table2(traces, scalar)
         summary.write(folder)
-    show(summary, table2_text(summary), as_json=as_json)
+    show_result(summary, output, as_json=as_json)
     typer.echo(f"{echo(str(output))}: {', '.join(TABLE2_PICTURES)} and the traces", err=True)
 
 
@@ -256,7 +256,6 @@ def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> Non
         SensedSummary,
         fly_sensed,
         sensed_markdown,
-        sensed_text,
     )
     from mambo_sil.results.folders import new_results
 
@@ -266,8 +265,7 @@ def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> Non
             summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
         (folder / SENSED_TABLE).write_text(sensed_markdown(summary.rows) + "\n", "utf-8")
         summary.write(folder)
-    show(summary, sensed_text(summary.rows), as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)
+    show_result(summary, output, (SENSED_TABLE,), as_json=as_json)
 
 
 def report(

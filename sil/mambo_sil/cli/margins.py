@@ -15,7 +15,7 @@ from mambo_sil.cli.options import (
     load,
     load_drone,
     sensors_option,
-    show,
+    show_result,
 )
 from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
 
@@ -64,7 +64,6 @@ def margins(
     """
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES
-    from mambo_sil.experiment.margins.margins_report import margins_text
     from mambo_sil.experiment.margins.margins_run import MarginSubject, measure
     from mambo_sil.results.folders import SUMMARY
 
@@ -79,11 +78,9 @@ def margins(
         drawing = _campaign(campaign, vehicle, vehicle_toml.of_settings(source), sensors)
         subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "true")
         summary = _measure_drawn(subject, campaign, drawing, drones, output)
-    show(summary, margins_text(summary), as_json=as_json)
-    if output is not None:
-        drawn = (*PICTURES, RESPONSES) if summary.axes else ()
-        written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
-        typer.echo(f"{echo(str(output))}: {', '.join(written)}", err=True)
+    drawn = (*PICTURES, RESPONSES) if summary.axes else ()
+    written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
+    show_result(summary, output, written, as_json=as_json)
     if not summary.stable:
         raise typer.Exit(1)
 

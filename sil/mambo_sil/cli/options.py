@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from mambo_codegen.errors import echo
 from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
 from mambo_sil.drone.vehicles import VEHICLES
@@ -14,7 +15,7 @@ from mambo_sil.flight.names import present_sensors
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-    from mambo_sil.results.summary import Summary
+    from mambo_sil.results.summary import ReportedSummary, Summary
 
 __all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
 
@@ -128,3 +129,14 @@ def demand_port(port: str | None, baud: int | None) -> None:
 def show(summary: "Summary", text: str, *, as_json: bool) -> None:
     """Print `summary` as JSON, or `text`."""
     typer.echo(summary.text() if as_json else text, nl=not as_json)
+
+
+def show_result(
+    summary: "ReportedSummary", folder: Path | None, files: Sequence[str] = (), *, as_json: bool
+) -> None:
+    """Print `summary` as JSON, or its result as text, and the `files` written into `folder`, if any."""
+    from mambo_sil.results.terminal import result_text
+
+    show(summary, result_text(summary.result(folder or Path())), as_json=as_json)
+    if folder is not None and files:
+        typer.echo(f"{echo(str(folder))}: {', '.join(files)}", err=True)

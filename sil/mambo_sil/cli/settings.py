@@ -21,7 +21,7 @@ from mambo_sil.cli.options import (
     load_drone,
     output_option,
     sensors_option,
-    show,
+    show_result,
 )
 from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind
 from mambo_sil.results.terminal import sentence, table
@@ -148,7 +148,7 @@ def identify(
     from mambo_sil.model.identify.identify import read_logs
     from mambo_sil.model.identify.identify_plots import draw_fit
     from mambo_sil.model.identify.identify_record import CURVES, MODEL, PICTURES, VEHICLE, IdentifySummary
-    from mambo_sil.model.identify.identify_report import identify_text, model_text, vehicle_text
+    from mambo_sil.model.identify.identify_report import model_text, vehicle_text
     from mambo_sil.results.folders import SUMMARY, new_results
 
     chosen = parse_columns(columns)
@@ -164,9 +164,8 @@ def identify(
                 (folder / MODEL).write_text(model_text(summary), "utf-8")
                 (folder / VEHICLE).write_text(vehicle_text(summary, mass_kg), "utf-8")
             summary.write(folder)
-    show(summary, identify_text(summary), as_json=as_json)
     models = (MODEL, VEHICLE) if summary.good else ()
-    typer.echo(f"{echo(str(output))}: {', '.join((*models, CURVES, *PICTURES, SUMMARY))}", err=True)
+    show_result(summary, output, (*models, CURVES, *PICTURES, SUMMARY), as_json=as_json)
     if not summary.good:
         raise typer.Exit(1)
 
@@ -274,12 +273,11 @@ def tune(
     with counting_bar("starting", "trials", trials) as bar:
         count = workers or os.cpu_count() or 1
         summary = _tune(source, vehicle, output, trials, bar, workers=count, storage=storage)
-    from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT, tune_text
+    from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT
     from mambo_sil.results.folders import SUMMARY
 
-    show(summary, tune_text(summary), as_json=as_json)
-    written = f"{CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg, {SUMMARY}"
-    typer.echo(f"{echo(str(output))}: {written}", err=True)
+    written = (CONTROLLER, f"{FRONT}.csv", f"{FRONT}.png", f"{FRONT}.svg", SUMMARY)
+    show_result(summary, output, written, as_json=as_json)
 
 
 def _tune(
@@ -375,15 +373,11 @@ def diff(
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.experiment.compare.compare import compare
     from mambo_sil.experiment.compare.diff_record import PICTURES
-    from mambo_sil.experiment.compare.diff_report import diff_text
     from mambo_sil.results.folders import SUMMARY
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:
         summary = compare(sides[0], sides[1], load_drone(vehicle, a, b), output, bar)
-    show(summary, diff_text(summary), as_json=as_json)
-    if output is not None:
-        pictures = () if summary.same else PICTURES
-        typer.echo(f"{echo(str(output))}: {', '.join((*pictures, SUMMARY))}", err=True)
+    show_result(summary, output, (*(() if summary.same else PICTURES), SUMMARY), as_json=as_json)
     if not summary.same:
         raise typer.Exit(1)

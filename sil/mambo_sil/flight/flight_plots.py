@@ -14,7 +14,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mambo_sil.flight.animation import animate
 from mambo_sil.flight.fences import Walls, nears_limit
 from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, horizontal_speed_m_s
 from mambo_sil.flight.traces import Trace
@@ -147,16 +146,6 @@ def _label_column(column: NDArray[Any], labels: Mapping[str, float]) -> None:
         axes.set_ylabel(label)
     for axes in (column[0], column[-2]):
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
-
-
-def page_pictures(
-    flights: Mapping[str, Trace], walls: Walls | None = None, speed_limit_m_s: float = 0.0
-) -> dict[str, Any]:
-    """Return animation and pictures of flights for a page, if there are any flights."""
-    return {
-        "animation": animate(flights) if flights else None,
-        "columns": flight_columns(flights, walls, speed_limit_m_s) if flights else [],
-    }
 
 
 def flight_columns(

@@ -1,12 +1,14 @@
-"""The summary of a flight as a record, as text and as a section of the report."""
+"""The summary of a flight: record and result."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from mambo_codegen.errors import echo
@@ -16,16 +18,25 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.animation import animate
 from mambo_sil.flight.crashes import Crash, first_crash
-from mambo_sil.flight.fences import measure_limits, nears_limit, walls_m
+from mambo_sil.flight.fences import Walls, measure_limits, nears_limit, walls_m
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
-from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
-from mambo_sil.results.metric_names import named
+from mambo_sil.flight.traces import SensedTrace, Trace, read_npz
+from mambo_sil.results.blocks import (
+    Block,
+    CommandResult,
+    Facts,
+    MovingPicture,
+    Picture,
+    ResultTable,
+    Sentence,
+)
+from mambo_sil.results.metric_names import AS_ESTIMATED, named
 from mambo_sil.results.number_format import digits, distance
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import Number, ReportedSummary
 
 
 class FlightSummary(ReportedSummary):
@@ -65,37 +76,50 @@ class FlightSummary(ReportedSummary):
         controlled = not self.lost and self.crash is None and not self.mostly_refused
         return controlled and self.same_bits_as_host is not False
 
-    def _section(
-        self, folder: Path, names: tuple[str, str], facts: dict[str, str], bad: list[str]
-    ) -> Section:
-        """Return the section of the report; `names` has drone and section, `bad` what is wrong."""
-        from mambo_sil.flight.flight_plots import page_pictures  # noqa: PLC0415 - loaded when drawing
+    def _result(
+        self, folder: Path, name: str, title: str, flown: "FlySummary | Scenario", facts: dict[str, str]
+    ) -> CommandResult:
+        """Return the result of a flight of the drone `name`; `facts` are for a page."""
+        rows = []
+        for key in self.metrics:
+            words, unit = named(key)
+            rows.append((words, *(digits(values.get(key)) for values in self.columns.values()), unit))
+        blocks: list[Block] = [
+            Facts(facts),
+            *flight_pictures(
+                folder,
+                {name: "trace.npz"},
+                "Path, horizontal error, commanded and actual angles.",
+                self.walls_m,
+                self.speed_limit_m_s or 0.0,
+            ),
+            ResultTable(("", *self.columns, ""), rows, (0, -1)),
+        ]
+        if self.metrics_as_seen is not None:
+            blocks.append(Sentence(AS_ESTIMATED))
+        quiet = ("OK", "NOT_CALLED")
+        refused = [f"{count} {name}" for name, count in self.statuses.items() if name not in quiet]
+        if refused:
+            blocks += map(Sentence, (f"refused inputs: {', '.join(refused)}", *self.refusals))
+        mean_m = self.metrics.get("iae_m_s", math.nan) / flown.duration_s
+        most_m = self.metrics.get("max_error_m", math.nan)
+        answer = [f"{distance(mean_m)} in the mean, {distance(most_m)} at most", *self._remarks()]
+        subject = f"{self._source} on {echo(flown.vehicle.name)}"
+        return CommandResult(title, None if self.good else False, answer, blocks, subject)
 
-        flights, missing = read_existing(folder, {names[0]: "trace.npz"})
+    @property
+    def _source(self) -> str:
+        """What flew, in the answer."""
+        return self.controller
+
+    def _remarks(self) -> Iterator[str]:
+        """Yield what else answers the command: what went wrong, and whether the bits are those expected."""
         if self.crash is not None:
-            bad = [*bad, f"the drone crashed at {self.crash.time_s:.2f} s: {self.crash.how}"]
+            yield f"CRASHED at {self.crash.time_s:.2f} s: {self.crash.how}"
         if self.lost:
-            bad = [*bad, "the drone was lost before the end of the flight"]
+            yield "LOST: the drone diverged before the end of the flight"
         elif self.mostly_refused:
-            bad = [*bad, "the controller refused more than half of its inputs"]
-        columns = self.columns
-        tracked = {"rms error": self.metrics.get("rms_error_m"), "largest": self.metrics.get("max_error_m")}
-        tracked |= {"rms of the height": self.metrics.get("rms_height_error_m")}
-        content = {
-            "facts": facts,
-            "refusals": self.refusals,
-            "titles": list(columns),
-            "metrics": [
-                (*named(key), [values.get(key) for values in columns.values()]) for key in self.metrics
-            ],
-            **page_pictures(flights, self.walls_m, self.speed_limit_m_s or 0.0),
-        }
-        finding = "; ".join(bad) or ", ".join(
-            f"{words} {value:.3g} m" for words, value in tracked.items() if value
-        )
-        return Section(
-            "fly", names[1], False if bad else None, finding, content, missing, moves=bool(flights)
-        )
+            yield "NOT CONTROLLED: the controller refused more than half of its inputs"
 
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -136,29 +160,28 @@ class FlySummary(FlightSummary):
     def _flier(self) -> str:
         return PD_TITLES.get(self.controller, f"NMPC, {echo(str(self.source))}")
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this flight; raises TraceError."""
-        facts, bad = {}, []
-        if self.board is not None:
-            bits = ", bit for bit as on the host" if self.same_bits_as_host else ""
-            facts["flown on"] = f"the emulated core of {self.board}{bits}"
-            if self.same_bits_as_host is False:
-                bad = [f"the trace of {self.board} differs from that of the host"]
-        return self._flown_section(folder, facts, bad)
+    @property
+    def _source(self) -> str:
+        source = None if self.controller in PD_TITLES else self.source
+        return self.controller if source is None else echo(source)
 
-    def _flown_section(self, folder: Path, facts: dict[str, str], bad: list[str]) -> Section:
-        """Return the section with the parameters of the flight, further facts and what is wrong."""
-        name = self._flier
-        parameters = {
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this flight; drawing raises TraceError."""
+        facts = {
             **_course(self),
             "controller": _controller(self, f" of {self.source}"),
             "start": f"{self.start}, heading {self.yaw_rad:g} rad",
             "altitude loop": self.altitude_loop,
-            "disturbances": "push {:g}, {:g} m/s²".format(*self.push_m_s2)
+            "disturbances": "push {:g}, {:g} m/s^2".format(*self.push_m_s2)
             + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
         }
-        titles = (name, f"Flight: {name}, {self.trajectory}")
-        return self._section(folder, titles, parameters | facts, bad)
+        return self._result(folder, self._flier, f"Flight: {self._flier}, {self.trajectory}", self, facts)
+
+    def _remarks(self) -> Iterator[str]:
+        yield from super()._remarks()
+        if self.board is not None:
+            same = "equals" if self.same_bits_as_host else "DIFFERS FROM"
+            yield f"emulated core of {self.board}: the trace {same} that of this machine, bit for bit"
 
 
 class RepeatSummary(FlightSummary):
@@ -175,8 +198,8 @@ class RepeatSummary(FlightSummary):
         """Whether the drone stayed under control, and the flight equals the recorded one in every bit."""
         return super().good and self.same_bits_as_recorded is not False
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this flight; raises TraceError."""
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this flight; drawing raises TraceError."""
         name = PD_TITLES.get(self.controller, "NMPC")
         facts = {
             "record": self.repeat,
@@ -184,8 +207,13 @@ class RepeatSummary(FlightSummary):
             "controller": _controller(self),
             "seed": str(self.scenario.seed),
         }
-        bad = ["the trace differs from the recorded one"] if self.same_bits_as_recorded is False else []
-        return self._section(folder, (name, f"Repetition: {name}, {self.repeat}"), facts, bad)
+        return self._result(folder, name, f"Repetition: {name}, {self.repeat}", self.scenario, facts)
+
+    def _remarks(self) -> Iterator[str]:
+        yield from super()._remarks()
+        if self.same_bits_as_recorded is not None:
+            same = "equals" if self.same_bits_as_recorded else "DIFFERS FROM"
+            yield f"repetition: the trace {same} the recorded one, bit for bit"
 
 
 def _controller(summary: FlightSummary, source: str = "") -> str:
@@ -285,47 +313,28 @@ def judge(
     }
 
 
-def flight_text(summary: FlightSummary) -> str:
-    """Format a summary: the answer, then a metric per line, with and without the transient, and estimated."""
-    columns = summary.columns
-    rows = []
-    for key in summary.metrics:
-        name, unit = named(key)
-        shown = (digits(values[key]) if key in values else "-" for values in columns.values())
-        rows.append((name, *shown, unit))
-    lines = [*_answer(summary), *table(("", *columns, ""), rows, (0, -1))]
-    if summary.metrics_as_seen is not None:
-        lines.append("as estimated: error of the estimated position, which the controller knows")
-    quiet = ("OK", "NOT_CALLED")
-    refused = {name: count for name, count in summary.statuses.items() if name not in quiet}
-    if refused:
-        lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
-        lines += [sentence(f"  {one}", "  ") for one in summary.refusals]
-    if isinstance(summary, RepeatSummary) and summary.same_bits_as_recorded is not None:
-        same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
-        lines.append(f"repetition: the trace {same} the recorded one, bit for bit")
-    if isinstance(summary, FlySummary) and summary.board is not None:
-        same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
-        lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
-    return "\n".join(lines)
+def flight_pictures(
+    folder: Path,
+    files: Mapping[str, str],
+    caption: str,
+    walls: Walls | None = None,
+    speed_limit_m_s: float = 0.0,
+) -> list[Picture]:
+    """Return the animation and the pictures of the traces `files`, names in `folder` by title."""
 
+    @cache
+    def flights() -> dict[str, Trace]:
+        return {title: read_npz(folder / name) for title, name in files.items() if (folder / name).is_file()}
 
-def _answer(summary: FlightSummary) -> Iterator[str]:
-    """Yield how close the drone came to its target, and what went wrong."""
-    flown = summary.scenario if isinstance(summary, RepeatSummary) else summary
-    name = summary.controller
-    if isinstance(summary, FlySummary) and name not in PD_TITLES and summary.source is not None:
-        name = echo(summary.source)
-    metrics = summary.metrics
-    if "iae_m_s" in metrics and isinstance(flown, FlySummary | Scenario):
-        mean_m = metrics["iae_m_s"] / flown.duration_s
-        yield sentence(
-            f"{name} on {echo(flown.vehicle.name)}: {distance(mean_m)} in the mean, "
-            f"{distance(metrics['max_error_m'])} at most"
-        )
-    if summary.crash is not None:
-        yield sentence(f"CRASHED at {summary.crash.time_s:.2f} s: {summary.crash.how}")
-    if summary.lost:
-        yield "LOST: the drone diverged before the end of the flight"
-    elif summary.mostly_refused:
-        yield "NOT CONTROLLED: the controller refused more than half of its inputs"
+    def animation() -> list[Markup]:
+        from mambo_sil.results.html_page import render_page  # noqa: PLC0415 - loaded when drawing
+
+        return [Markup(render_page("flight.html.j2", {"animation": animate(flights())}))]
+
+    def columns() -> list[Markup]:
+        from mambo_sil.flight.flight_plots import flight_columns  # noqa: PLC0415 - loaded when drawing
+
+        return flight_columns(flights(), walls, speed_limit_m_s)
+
+    paths = [folder / name for name in files.values()]
+    return [MovingPicture(animation, "", paths), Picture(columns, caption, paths)]

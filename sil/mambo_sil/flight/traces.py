@@ -2,7 +2,6 @@
 
 import hashlib
 import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Self
@@ -196,13 +195,3 @@ def read_npz(path: Path) -> Trace:
     if not (np.diff(trace.time_s) > 0.0).all():
         raise TraceError(f"{path}: is no trace: time must rise")
     return trace
-
-
-def read_existing(folder: Path, files: Mapping[str, str]) -> tuple[dict[str, Trace], list[str]]:
-    """Read the traces of `files`, names by title, that are in `folder`; return them and the missing names.
-
-    Raises TraceError.
-    """
-    here = {path.name: path for path in folder.iterdir()}
-    flights = {title: read_npz(here[name]) for title, name in files.items() if name in here}
-    return flights, [name for name in files.values() if name not in here]

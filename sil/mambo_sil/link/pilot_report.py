@@ -8,8 +8,8 @@ import numpy as np
 
 from mambo_sil.link.life_cycle import LifeCycle
 from mambo_sil.link.steering import Update
-from mambo_sil.results.summary import Number, PageTable, ReportedSummary, Section, plain_section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import CommandResult, ResultTable
+from mambo_sil.results.summary import Number, ReportedSummary
 
 LOG: Final = "flight.csv"
 SETTLES_S: Final = 5.0
@@ -46,15 +46,13 @@ class PilotSummary(ReportedSummary):
     pauses: int
     refused: int
 
-    def section(self, folder: Path, /) -> Section:
-        """Return the section of the report on this flight."""
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result of this flight."""
         drone = "a simulated" if self.simulated else "an"
-        return plain_section(
-            f"{self.source} over {self.link}, {drone} autopilot {self.autopilot or 'that was never heard'}",
-            self.good,
-            self.end,
-            [PageTable(("measure", "value"), _rows(self), {1})] if self.set_points else [],
-            missing=[] if (folder / LOG).is_file() else [LOG],
+        heard = self.autopilot or "that was never heard"
+        title = f"{self.source} over {self.link}, {drone} autopilot {heard}"
+        return CommandResult(
+            title, self.good, [self.end], [ResultTable((), _rows(self) if self.set_points else [])]
         )
 
     @classmethod
@@ -105,14 +103,6 @@ def _measures(updates: Sequence[Update]) -> dict[str, object]:
         "vertical_rms_m": float(np.sqrt(np.mean(errors[:, 2] ** 2))),
         "command_rms_rad_s": float(np.sqrt(np.mean(np.sum(rates**2, axis=1)))),
     }
-
-
-def pilot_text(summary: PilotSummary) -> str:
-    """Return the record in words."""
-    lines = [sentence(summary.end)]
-    if summary.set_points:
-        lines += ["", *table((), _rows(summary), (0, 1))]
-    return "\n".join(lines)
 
 
 def _rows(summary: PilotSummary) -> list[tuple[str, str]]:

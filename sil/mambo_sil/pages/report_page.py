@@ -27,8 +27,8 @@ from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.replay.replay_report import LogReplaySummary
 from mambo_sil.model.tune.tuning_report import TuneSummary
 from mambo_sil.results.folders import SUMMARY
-from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import ReportedSummary, Section, Summary
+from mambo_sil.results.html_page import results_page
+from mambo_sil.results.summary import ReportedSummary, Summary
 from mambo_sil.verify.verify_report import VerifySummary
 
 RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
@@ -86,20 +86,12 @@ def report_page(folders: Sequence[Path], progress: Callable[[int], None]) -> tup
     Calls `progress` with the number of folders that are done. Raises ResultsError and TraceError.
     """
     summaries = [read_summary(folder) for folder in folders]
-    sections: list[Section] = []
-    for folder, summary in zip(folders, summaries, strict=True):
-        progress(len(sections))
-        sections.append(summary.section(folder))
-    context = {
-        "shown": [(str(folder), one) for folder, one in zip(folders, sections, strict=True)],
-        "generators": sorted({summary.generator for summary in summaries}),
-        "moves": any(one.moves for one in sections),
-    }
+    shown = [(str(folder), one.result(folder)) for folder, one in zip(folders, summaries, strict=True)]
     overview = [
-        ReportedFolder(str(folder), summary.command, one.title, one.good, one.finding, list(one.missing))
-        for folder, summary, one in zip(folders, summaries, sections, strict=True)
+        ReportedFolder(folder, summary.command, one.title, one.good, one.finding, one.missing)
+        for (folder, one), summary in zip(shown, summaries, strict=True)
     ]
-    return render_page("report.html.j2", context), overview
+    return results_page(shown, {summary.generator for summary in summaries}, progress), overview
 
 
 def read_summary(folder: Path) -> ReportedSummary:

@@ -4,9 +4,10 @@ import base64
 import contextlib
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import jinja2
 from markupsafe import Markup
@@ -14,10 +15,35 @@ from markupsafe import Markup
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
 from mambo_codegen.plain_file import find_obstacle
-from mambo_sil.results.number_format import digits_or_dash, fixed_or_dash, three_digits_or_dash
+from mambo_sil.results.blocks import Block, CommandResult, MovingPicture
 
 _MARK: Final = b'<meta name="generator" content="mambo-nmpc">'
 """Marks a page of ours, which may be overwritten."""
+_LOOKS: Final = (
+    *("passed", "holds", "fits", "recovered", "good", "failed", "crashed", "over", "broken", "refused"),
+    *("incomplete", "not-recovered", "weak"),
+)
+"""Words of a table that have a colour of their own."""
+
+
+def results_page(
+    shown: Sequence[tuple[str, CommandResult]],
+    generators: Collection[str],
+    progress: Callable[[int], None] = lambda _: None,
+) -> str:
+    """Return results, each with its folder, as a page; call `progress` with the number of those drawn.
+
+    Raises what the drawing of a picture raises.
+    """
+
+    def drawn() -> Iterator[tuple[str, CommandResult]]:
+        for number, one in enumerate(shown):
+            progress(number)
+            yield one
+
+    moving = (one for _, result in shown for one in result.pictures if isinstance(one, MovingPicture))
+    context = {"shown": shown, "drawn": drawn(), "generators": sorted(generators)}
+    return render_page("report.html.j2", context | {"moves": any(one.drawable for one in moving)})
 
 
 def render_page(
@@ -43,13 +69,24 @@ def render_page(
         autoescape=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"digits": digits_or_dash, "three": three_digits_or_dash, "fixed": fixed_or_dash}
+    environment.filters["signs"] = _with_signs
+    environment.tests |= {kind.__name__.lower(): _is_a(kind) for kind in (*get_args(Block), MovingPicture)}
+    environment.globals["looks"] = _LOOKS
     style, script = (
         "".join(loader.get_source(environment, name)[0] for name in names) for names in (styles, scripts)
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     own = {"style": Markup(style), "script": Markup(script), "script_digest": digest}
     return environment.get_template(template).render({**context, **own})
+
+
+def _with_signs(text: str) -> str:
+    """Return text with the signs of print: m² for m^2, and a plus over its minus."""
+    return re.sub(r"(?<=\b[ms])\^2", "²", text).replace(" +- ", " ± ")
+
+
+def _is_a(kind: type) -> Callable[[object], bool]:
+    return lambda one: isinstance(one, kind)
 
 
 @contextlib.contextmanager

@@ -4,6 +4,7 @@ from typing import Final
 
 SEEN: Final = "seen_"
 """Begins the key of a metric of the estimated flight, which is all that a controller knows of."""
+AS_ESTIMATED: Final = "as estimated: error of the estimated position, which the controller knows"
 
 _UNITS: Final = {
     "_m2_s2": "m^2 s^2",

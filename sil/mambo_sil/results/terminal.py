@@ -1,8 +1,10 @@
 """What commands print: tables and sentences within the width of a terminal."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final
+
+from mambo_sil.results.blocks import Block, CommandResult, Commands, ResultTable, Sentence
 
 WIDTH: Final = 80
 """Columns of a line; a word or a command of its own may be longer."""
@@ -10,7 +12,29 @@ WIDTH: Final = 80
 _GAP: Final = "  "
 
 
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]], texts: Sequence[int] = (0,)) -> list[str]:
+def result_text(result: CommandResult) -> str:
+    """Return a result as text: the answer, then the blocks that the console shows."""
+    first, *others = result.answer
+    lines = [sentence(one) for one in (f"{result.subject}: {first}" if result.subject else first, *others)]
+    return "\n".join([*lines, *(line for block in result.blocks for line in _lines(block))])
+
+
+def _lines(block: Block) -> Iterator[str]:
+    """Yield the lines of a block; an empty one comes before tables and commands."""
+    match block:
+        case Sentence(text):
+            yield sentence(text, "  ")
+        case ResultTable(rows=[_, *_]):
+            narrow = block.narrow()
+            yield from ("", sentence(block.title)) if block.title else ("",)
+            yield from table(narrow.heads, narrow.rows, narrow.text_columns)
+        case Commands(title, [_, *_] as rows):
+            yield from ("", sentence(title)) if title else ("",)
+            for words, command in rows:
+                yield from (sentence(words, "    "), f"    {command}")
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]], texts: Collection[int] = (0,)) -> list[str]:
     """Return a table as lines of at most `WIDTH`; without `heads` its rows only.
 
     texts: indices of the columns of text, flush left; the others hold numbers, flush right.

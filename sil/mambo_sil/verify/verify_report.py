@@ -1,4 +1,4 @@
-"""The results of a verification as a record, as text, as an HTML page and as a section of the report."""
+"""The results of a verification: record and result."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,9 @@ from pydantic import Field
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
-from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import CommandResult, Details, Facts, Listing, Note, ResultTable
+from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.summary import ReportedSummary
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.check_list import CHECKS
 
@@ -47,10 +47,25 @@ class VerifySummary(ReportedSummary):
     settings: str
     files: dict[str, str] = Field(default_factory=dict)
 
-    def section(self, _folder: Path) -> Section:
-        """Return the section of the report on this verification."""
-        title = f"Verification of {self.source}"
-        return Section("verify", title, self.verdict is CheckOutcome.PASSED, finding(self), self)
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: a row for each check."""
+        rows = [(one.name, one.outcome, one.evidence, one.about) for one in self.checks]
+        tools = {tool: version or "version unknown" for tool, version in self.tools.items()}
+        about = (
+            f"{self.generator}, settings {self.digest}, {self.scalar}. The checked C is in controller/, the "
+        )
+        about += f"output of the tools in checks/, the SHA-256 of every file in {SUMMARY}."
+        return CommandResult(
+            f"Verification of {echo(self.source)}",
+            self.verdict is CheckOutcome.PASSED,
+            [_finding(self)],
+            [
+                Note(about),
+                ResultTable(("check", "result", "evidence", "what it shows"), rows, range(4), (3,)),
+                Details("Tools and settings", [Facts(tools), Listing(self.settings)]),
+            ],
+            echo(self.source),
+        )
 
 
 def verdict(found: Sequence[Verified]) -> CheckOutcome:
@@ -60,20 +75,13 @@ def verdict(found: Sequence[Verified]) -> CheckOutcome:
     return next(outcome for outcome in worst_first if outcome in outcomes)
 
 
-def finding(summary: VerifySummary) -> str:
+def _finding(summary: VerifySummary) -> str:
     """Return the result in one line: how many checks passed, failed, lacked a tool, and which did not run."""
     counted = Counter(one.outcome for one in summary.checks)
     said = f"{counted[CheckOutcome.PASSED]} of {len(summary.checks)} checks passed"
     for outcome in (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE):
         said += f", {counted[outcome]} {outcome}" if counted[outcome] else ""
     return said + (f"; not run: {', '.join(summary.not_run)}" if summary.not_run else "")
-
-
-def verify_text(summary: VerifySummary) -> str:
-    """Return a summary as text: the answer, then a row for each check."""
-    rows = [(one.name, one.outcome, one.evidence) for one in summary.checks]
-    answer = sentence(f"{echo(summary.source)}: {finding(summary)}")
-    return "\n".join([answer, "", *table(("check", "result", "evidence"), rows, (0, 1, 2))])
 
 
 def summarise(found: Sequence[Verified], source: str, settings: Settings) -> VerifySummary:
@@ -88,11 +96,6 @@ def summarise(found: Sequence[Verified], source: str, settings: Settings) -> Ver
         tools=dict(sorted((tool, version) for one in found for tool, version in one.tools.items())),
         settings=to_toml(settings),
     )
-
-
-def page(summary: VerifySummary) -> str:
-    """Render the summary as one HTML page that needs no other file."""
-    return render_page("verify.html.j2", {"summary": summary})
 
 
 def _left_out(found: Sequence[Verified]) -> list[str]:

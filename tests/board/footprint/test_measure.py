@@ -1,6 +1,7 @@
 """Footprints of the presets on the boards, and reports of exceeded budgets."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -17,6 +18,8 @@ from mambo_sil.board.firmware.elf import load
 from mambo_sil.board.firmware.gate import Forbidden, find_forbidden
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint, measure_footprint
+from mambo_sil.results.html_page import results_page
+from mambo_sil.results.terminal import result_text
 from tests.support.command import unwrapped
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, only
@@ -35,6 +38,12 @@ def measure_once(board: str, preset: str = "mambo", steps: int = 300) -> Footpri
     """Measure a preset on a board, once."""
     board_builder(board)
     return measure_footprint(presets.load(preset), boards.load(board), counted_ticks=steps)
+
+
+def text_of(footprints: Sequence[Footprint]) -> str:
+    """Return what the command prints of footprints."""
+    summary = footprint_report.summarise(footprints, "mambo", presets.load("mambo"))
+    return result_text(summary.result(Path()))
 
 
 @pytest.mark.long
@@ -97,7 +106,7 @@ def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     assert estimated.counts is not None
     cycles = modelled.counts.cycles
     assert cycles is not None
-    text = footprint_report.text([modelled, estimated])
+    text = text_of([modelled, estimated])
     text = unwrapped(text)
     assert f" {cycles.most_met} " in text
     bounds = f"{cycles.fewest} to {cycles.most_with_wait} with the wait states of the flash"
@@ -108,8 +117,8 @@ def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
     summary = footprint_report.summarise([modelled, estimated], "mambo", presets.load("mambo"))
     assert [board.cycles for board in summary.boards] == [cycles, None]
     assert [board.cycles_source.partition(":")[0] for board in summary.boards] == ["model", "estimate"]
-    page = footprint_report.page(summary)
-    assert f"which takes {bounds}" in page
+    page = results_page([("out", summary.result(Path()))], [summary.generator])
+    assert f"takes {bounds}" in page
     assert "an estimate: 1 per instruction, +/- 40 %" in page
 
 
@@ -144,7 +153,7 @@ def test_a_missing_measurement_is_reported(
     assert footprint.stack is not None
     assert (footprint.counts, footprint.time_s) == (None, None)
     assert [limit.name for limit in footprint.limits] == ["flash", "RAM", "stack"]
-    text = footprint_report.text([footprint])
+    text = text_of([footprint])
     assert re.search(f" mega: instructions, cycles and time are not measured: .*{missing}", unwrapped(text))
     assert "incomplete" in text
 
@@ -156,7 +165,7 @@ def test_a_tiny_budget_is_exceeded_everywhere() -> None:
     small = {"name": "tiny", "budget": whole.board.budget.model_copy(update=tiny)}
     footprint = replace(whole, board=whole.board.model_copy(update=small))
     assert not footprint.fits
-    text = footprint_report.text([footprint])
+    text = text_of([footprint])
     assert re.search(r"^tiny .* OVER$", text, re.MULTILINE)
     for limit, budget in (("flash", 2000), ("RAM", 100), ("stack", 50)):
         found = re.search(rf"^tiny: {limit} (\d+) B is over its budget of {budget} B by (\d+) B$", text, re.M)
@@ -228,7 +237,7 @@ def test_what_must_not_be_linked_is_over_whatever_the_sizes() -> None:
     found = Forbidden("__aeabi_dmul", "double precision", ("cost_evaluate",))
     wrong = replace(footprint, forbidden=(found,))
     assert not wrong.fits
-    text = footprint_report.text([wrong])
+    text = text_of([wrong])
     assert "__aeabi_dmul (double precision) must not be linked; called by cost_evaluate" in unwrapped(text)
     assert "OVER" in text
 
@@ -238,7 +247,7 @@ def test_sizes_of_five_digits_are_written_out() -> None:
     footprint = measure_once("crazyflie")
     added = footprint.added
     large = replace(added, flash=replace(added.flash, own=123_456, helpers=0, grown=0, unnamed=0))
-    text = footprint_report.text([replace(footprint, added=large)])
+    text = text_of([replace(footprint, added=large)])
     assert "crazyflie: flash 123456 B is over its budget of 16384 B by 107072 B" in text
 
 

@@ -21,7 +21,7 @@ from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES
-from tests.support.command import run
+from tests.support.command import run, unwrapped
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
 from tests.support.tools import require_module
 
@@ -283,7 +283,7 @@ def test_other_bits_are_told_and_fail(
 
     with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil", edited(path, *edit))) as line:
         said, _ = run("fly", "--port", line.port, "--duration-s", "0.2", "--no-pictures", code=1)
-        assert message in said
+        assert message in unwrapped(said)
     run("report", "flight", "-o", "page.html")
     assert message.lower() in (tmp_path / "page.html").read_text("utf-8").lower()
 

@@ -363,7 +363,7 @@ def test_the_table_has_one_row_per_fault() -> None:
     worse = replace(VERDICT, largest_command_rad=0.35, saturated_share=0.5, end=End.NOT_RECOVERED)
     text = faults_markdown([VERDICT, replace(worse, course="hover")])
     assert (
-        "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | not recovered |"
+        "| state NaN, 1 s | not recovered | BAD_STATE | 1.00 | 2.0 | 1.00 | never | 0.35 | 0.40 | 50.0 |"
         in text
     )
     assert "eight 0.100 m, hover 0.100 m" in text

@@ -16,6 +16,7 @@ from mambo_sil.experiment.margins.axis_margins import (
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.margin_figures import figure_rows, figure_table, number, verdict
 from mambo_sil.experiment.margins.margins_record import RESPONSES, ManyDrones, MarginSpread, MarginsSummary
+from mambo_sil.results.blocks import ResultTable
 
 LOOP = LoopMargins(
     gain_up=2.04,
@@ -172,7 +173,9 @@ def test_a_row_of_many_drones_has_worst_and_median() -> None:
     """Delays in milliseconds, the others as they are; with the place where the loop is broken."""
     delay = tuple(number(1e3 * value) for value in (0.0125, 0.25))
     plain = tuple(number(value) for value in (0.0125, 0.25))
-    assert many_drones().table == [
+    table = many_drones().blocks[1]
+    assert isinstance(table, ResultTable)
+    assert table.rows == [
         ("roll: delay margin at the command, ms", *delay, "3"),
         ("pitch: gain margin at the motors' torque", *plain, "3"),
         ("height: least damping", *plain, "3"),
@@ -207,18 +210,19 @@ def test_a_summary_is_stable_if_all_axes_are(
     """It has a verdict for each axis, or a reason."""
     assert summary_of(axes).stable == stable
     assert summary_of(axes).verdicts == verdicts
-    assert summary_of(axes).section(Path("missing")).good == (None if axes is None else stable)
+    assert summary_of(axes).result(Path("missing")).good == (None if axes is None else stable)
 
 
-def test_a_section_of_the_report_has_figures_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_result_has_figures_and_says_what_is_missing(tmp_path: Path) -> None:
     """Without the responses it has no pictures; without axes it needs none; many drones have a table."""
-    section = summary_of([roll(), height()], many_drones()).section(tmp_path)
-    assert section.missing == [RESPONSES]
-    assert section.content["pictures"] == []
-    assert section.content["axes"] == ["roll", "height"]
-    assert section.content["rows"] == figure_table([roll(), height()])
-    assert section.content["spreads"] == many_drones().table
-    assert summary_of([roll()]).section(tmp_path).content["spreads"] == []
-    without = summary_of(None).section(tmp_path)
-    assert (without.missing, without.content["pictures"], without.content["axes"]) == ([], [], [])
-    assert without.content["rows"] == figure_table([])
+    result = summary_of([roll(), height()], many_drones()).result(tmp_path)
+    assert result.missing == [RESPONSES]
+    assert not result.pictures[0].drawable
+    figures, spreads = (one for one in result.blocks if isinstance(one, ResultTable))
+    assert figures.heads == ("broken at", "roll", "height", "")
+    rows = figure_table([roll(), height()])
+    assert figures.rows == [(name, *values, unit) for name, values, unit in rows]
+    assert spreads == many_drones().blocks[1]
+    assert len(summary_of([roll()]).result(tmp_path).blocks) == 2
+    without = summary_of(None).result(tmp_path)
+    assert (without.missing, without.blocks) == ([], [])

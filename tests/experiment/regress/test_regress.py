@@ -26,12 +26,12 @@ from mambo_sil.experiment.regress.regress_report import (
     group_rows,
     judge,
     junit_xml,
-    regress_text,
     write_records,
 )
 from mambo_sil.experiment.regress.suite_file import FlightSuite, load_suite
 from mambo_sil.flight.names import PD_NAMES
 from mambo_sil.flight.scenario import Scenario, read_record
+from mambo_sil.results.terminal import result_text
 from tests.support.scenarios import CRAZYFLIE
 
 SUITE = """
@@ -62,6 +62,11 @@ def row(iae_m_s: float, **others: float | str) -> Row:
     return plain | dict.fromkeys(INDICES, 1.0) | {"iae_m_s": iae_m_s} | others
 
 
+def text_of(summary: RegressSummary) -> str:
+    """Return what the command prints."""
+    return result_text(summary.result(Path("out")))
+
+
 def judged(found: FlightSuite, rows: list[Row]) -> RegressSummary:
     """Compare rows with bounds and baseline."""
     path = baseline_path(found, "mambo")
@@ -74,7 +79,7 @@ def test_without_a_baseline_only_bounds_hold(tmp_path: Path) -> None:
     assert [flight.failures for flight in summary.flights] == [[], ["IAE 3.001 m s (bound 3)"], []]
     assert [flight.name for flight in summary.failed] == ["eight/yaw_rad=0.5"]
     assert summary.baseline is None
-    assert "compared with the bounds only" in regress_text(summary, "out")
+    assert "compared with the bounds only" in text_of(summary)
 
 
 def test_a_recorded_value_limits_with_its_tolerance(tmp_path: Path) -> None:
@@ -88,7 +93,7 @@ def test_a_recorded_value_limits_with_its_tolerance(tmp_path: Path) -> None:
         ["IAE 3.1 m s (bound 3; recorded 2.9)"],
     ]
     assert summary.baseline == str(tmp_path / "mine.mambo.baseline.json")
-    assert "settings have changed" not in regress_text(summary, "out")
+    assert "settings have changed" not in text_of(summary)
 
 
 def test_a_better_flight_passes_and_is_said(tmp_path: Path) -> None:
@@ -99,9 +104,7 @@ def test_a_better_flight_passes_and_is_said(tmp_path: Path) -> None:
     assert summary.failed == []
     assert summary.better == 2
     assert judged(found, [row(1.8)] * 3).better == 0
-    assert "2 flights are better than recorded by more than the tolerance; --update" in regress_text(
-        summary, "out"
-    )
+    assert "2 flights are better than recorded by more than the tolerance; --update" in text_of(summary)
 
 
 @pytest.mark.parametrize("tolerated", ["ise_m2_s = 0.0", ""])
@@ -197,12 +200,12 @@ def test_the_text_has_a_row_for_each_group_and_metric_and_then_what_failed(tmp_p
     rows += [row(1.0, ise_m2_s=2.5, crashed=1), row(0.9, refused_updates=5), row(9.0)]
     assert path == baseline_path(found, "mambo")
     summary = judge(found, mambo(), rows, read_baseline(found, "mambo"), Path("here.json"))
-    assert regress_text(summary, "out") == TEXT
+    assert text_of(summary) == TEXT
 
 
 def test_the_text_of_a_suite_that_passed_is_its_table_and_one_line(tmp_path: Path) -> None:
     """Without what failed or was recorded."""
-    text = regress_text(judged(suite(tmp_path), [row(1.0)] * 3), "out")
+    text = text_of(judged(suite(tmp_path), [row(1.0)] * 3))
     assert text.splitlines() == [
         "mine with mambo on mambo: 3 of 3 flights passed",
         "compared with the bounds only; --update records this run for later ones",
@@ -264,7 +267,7 @@ def test_other_settings_than_recorded_are_said(tmp_path: Path) -> None:
     table1 = load_entrant("table1", Path(), "test")
     path = record_baseline(found, Entrant("mambo", "nmpc", table1.settings), [row(2.0)] * 3)
     assert table1.settings.digest in path.read_text("utf-8")
-    assert "settings have changed" in regress_text(judged(found, [row(2.0)] * 3), "out")
+    assert "settings have changed" in text_of(judged(found, [row(2.0)] * 3))
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"generator": "x"}', "<<<<<<< HEAD\n"])
@@ -413,7 +416,7 @@ def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) 
         "[flights.eight]\nseed = { from = 1, to = 30, count = 30 }\nbounds.iae_m_s = 1.0", "utf-8"
     )
     found = load_suite(str(path))
-    text = regress_text(judge(found, mambo(), [row(2.0)] * 30, None, path), "out")
+    text = text_of(judge(found, mambo(), [row(2.0)] * 30, None, path))
     assert text.count("fly --repeat out/flights/") == MOST_SHOWN
     assert "and 20 more failed flights, all in junit.xml" in text
     assert "many with mambo on mambo: 0 of 30 flights passed, 30 failed" in text

@@ -11,8 +11,9 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.model.identify.estimator import estimator_errors
 from mambo_sil.model.identify.identify import identify, read_logs
-from mambo_sil.model.identify.identify_report import identify_text, vehicle_text
+from mambo_sil.model.identify.identify_report import vehicle_text
 from mambo_sil.model.identify.signals import POSITION, SEEN, FlightLog, Signal
+from mambo_sil.results.terminal import result_text
 from tests.support.logs import Flown, Truth, fly, ulog
 
 DURATION_S, STEP_S, CAMERA_M = 90.0, 0.02, 0.002
@@ -60,7 +61,7 @@ def test_a_ulog_gives_a_vehicle_with_its_sensors(tmp_path: Path) -> None:
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog(columns | seen, quaternion=True))
     summary = identify(read_logs([path], {})[0])[0]
-    assert "error of the estimated velocity" in identify_text(summary)
+    assert "error of the estimated velocity" in result_text(summary.result(tmp_path))
     written = tmp_path / "vehicle.toml"
     written.write_text(vehicle_text(summary, 0.5), "utf-8")
     found = vehicle_toml.load(str(written)).sensors

@@ -1,10 +1,11 @@
-"""The results of a flight of an app on the desk: summary, text, table and picture."""
+"""The results of a flight of an app on the desk: summary, result and picture."""
 
 import csv
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mambo_codegen.errors import echo
@@ -12,11 +13,11 @@ from mambo_sil.board.desk.desk_events import DeskTrace
 from mambo_sil.board.desk.events_file import BoundSection, EventsFile, MeasureName
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
+from mambo_sil.results.blocks import CommandResult, Picture, ResultTable, Sentence
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
-from mambo_sil.results.summary import Number, PageTable, ReportedSummary, Section, plain_section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import Number, ReportedSummary
 
 DESK_FILES: Final = ("trace.csv", "flight.png", "flight.svg")
 COLUMNS: Final = (
@@ -57,35 +58,28 @@ class DeskSummary(ReportedSummary):
         """Whether every measure is within the bounds of the events file."""
         return not self.broken
 
-    def section(self, folder: Path, /) -> Section:
-        """Return the section of the report on this flight; raises ResultsError."""
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this flight; drawing raises ResultsError."""
         path = folder / DESK_FILES[0]
-        pictures = []
-        if path.is_file():
+        flown = self.flight.trajectory if self.events is None else echo(self.events)
+        name = f"of {echo(self.source)} on the desk's Crazyflie, {flown}"
+
+        def picture() -> list[Markup]:
             with style():
                 figure = _figure(read_trace(path), self.flight, "")
-                words = "Height, distance to the target and command over time"
-                pictures = [inline(figure, words)]
-        return plain_section(
-            f"App of {self.source} on the desk's Crazyflie, {_flown(self)}",
+                return [inline(figure, "Height, distance to the target and command over time")]
+
+        return CommandResult(
+            f"App {name}",
             self.good if self.flight.bounds else None,
-            _verdict(self),
-            [PageTable(("measure", "value", "unit", "bound", ""), _rows(self), {2, 3, 4})],
-            sentences=[f"console: {line}" for line in _console(self)],
-            pictures=pictures,
-            missing=[] if pictures else [path.name],
+            [_verdict(self)],
+            [
+                Picture(picture, "Height, distance to the target and command.", [path]),
+                ResultTable(("", "", "", "bound", ""), _rows(self), (0, 2, 3, 4)),
+                *(Sentence(f"console: {line}") for line in self.console.splitlines() if line),
+            ],
+            f"app {name}",
         )
-
-
-def desk_text(summary: DeskSummary) -> str:
-    """Format a summary: the answer, a measure per line with its bound, and what the app printed."""
-    answer = f"app of {echo(summary.source)} on the desk's Crazyflie, {_flown(summary)}: {_verdict(summary)}"
-    lines = [sentence(answer), *table(("", "", "", "bound", ""), _rows(summary), (0, 2, 3, 4))]
-    return "\n".join([*lines, *(f"console: {line}" for line in _console(summary))])
-
-
-def _flown(summary: DeskSummary) -> str:
-    return summary.flight.trajectory if summary.events is None else echo(summary.events)
 
 
 def _verdict(summary: DeskSummary) -> str:
@@ -104,10 +98,6 @@ def _rows(summary: DeskSummary) -> list[tuple[str, ...]]:
             name, unit = WORDS[key]
             rows.append((name, digits(value), unit, _bound(bound), "BROKEN" if key in summary.broken else ""))
     return rows
-
-
-def _console(summary: DeskSummary) -> list[str]:
-    return [line for line in summary.console.splitlines() if line]
 
 
 def _bound(bound: BoundSection | None) -> str:

@@ -1,10 +1,11 @@
-"""Footprints as a record, as text, as a page and as a section of the report."""
+"""Footprints: record and result."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
+from mambo_codegen.errors import echo
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.gate import Forbidden
 from mambo_sil.board.firmware.sizes import Parts
@@ -12,11 +13,15 @@ from mambo_sil.board.firmware.stack import Frame
 from mambo_sil.board.footprint.counts import CycleCounts, InstructionCounts
 from mambo_sil.board.footprint.measure import Footprint, Limit
 from mambo_sil.board.footprint.on_board import BoardMeasurement
-from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import Block, CommandResult, Details, Facts, Note, ResultTable, Sentence
+from mambo_sil.results.number_format import digits
+from mambo_sil.results.summary import ReportedSummary
 
 _FUNCTION_HEAD = ("function", "size B", "own frame B", "deepest B", "instructions")
+_ABOUT = (
+    "Sizes are the difference to the same program without the controller. Instructions are counted on an "
+    "emulated core, including conditional ones that are not executed; times are estimates."
+)
 _HEAD = (
     "board",
     "flash B",
@@ -66,6 +71,47 @@ class BoardFootprint:
     functions: list[FunctionFootprint]
     notes: list[str]
     on_board: BoardMeasurement | None = None
+    period_share: float | None = None
+    """The time of the most expensive step over the update period."""
+
+    @property
+    def verdict(self) -> str:
+        """Whether the controller fits."""
+        return ("fits" if self.complete else "incomplete") if self.fits else "OVER"
+
+    @property
+    def answer(self) -> str:
+        """Whether the controller fits, and what it takes."""
+        found = f"{self.name}: {self.verdict}, {self.flash_bytes.total / 1000:.3g} KB of flash"
+        return found if self.period_share is None else f"{found}, {self._period} of the period"
+
+    @property
+    def _period(self) -> str:
+        return "-" if self.period_share is None else f"{100 * self.period_share:.2g} %"
+
+    @property
+    def _stack(self) -> str:
+        return str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """What the controller takes, as a row of a table."""
+        counts, time_s, cycles = self.instructions, self.time_s_estimate, "-"
+        if self.cycles is not None:
+            cycles = str(self.cycles.most_met)
+        elif self.cycles_estimate is not None:
+            cycles = f"~{sum(self.cycles_estimate) / 2:.0f}"
+        return (
+            self.name,
+            str(self.flash_bytes.total),
+            str(self.ram_bytes.total),
+            self._stack,
+            "-" if counts is None else f"{counts.mean:.0f} / {counts.most_met}",
+            cycles,
+            "-" if time_s is None else f"{1000 * time_s[1]:.3g}",
+            self._period,
+            self.verdict,
+        )
 
     @property
     def cycles_sentence(self) -> str:
@@ -97,15 +143,40 @@ class BoardFootprint:
             per_instruction = f"{board.mean_cycles / counts.mean:.3g}"
         cycles = (board.cycles.least, board.cycles.median, board.cycles.most)
         time_ms = [1000 * one / board.clock_hz for one in cycles]
-        stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
         return [
             ("a step", "measured: least / median / most", "counted: least / mean / largest; estimated"),
             ("instructions", "-", counted[0]),
             ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
             ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),
             ("cycles per instruction", per_instruction, counted[3]),
-            ("stack, B", str(board.stack_bytes), stack),
+            ("stack, B", str(board.stack_bytes), self._stack),
         ]
+
+    @property
+    def function_table(self) -> ResultTable:
+        """Size, frame, depth and instructions of every symbol."""
+        return ResultTable(_FUNCTION_HEAD, [tuple(map(str, astuple(one))) for one in self.functions])
+
+    def details(self, *, functions: bool) -> Details:
+        """Return what only a page shows of the board: budgets, counts, and functions."""
+        limits = [
+            (f"{one.name}, {one.unit}", digits(one.value), digits(one.budget), f"{one.percent} %")
+            for one in self.limits
+        ]
+        facts = {"core": self.core, "compiler": self.compiler}
+        if self.instructions is not None:
+            counts = self.instructions
+            facts["instructions per step"] = (
+                f"{counts.least} at least and {digits(counts.mean)} on average over {counts.ticks} "
+                f"ticks of a flight; {counts.most_met} the most found, in {counts.searched} steps of a search"
+            )
+        if self.cycles is not None:
+            facts["cycles per step"] = (
+                f"a {self.cycles_source}, without wait states: {digits(self.cycles.least)} at least, "
+                f"{digits(self.cycles.mean)} on average, {digits(self.cycles.most_met)} the most found"
+            )
+        table = ResultTable(("quantity", "measured", "budget", "share"), limits)
+        return Details(self.title, [Facts(facts), table, *([self.function_table] if functions else [])])
 
 
 class FootprintSummary(ReportedSummary):
@@ -119,16 +190,29 @@ class FootprintSummary(ReportedSummary):
     optimisation: str
     boards: list[BoardFootprint]
 
-    def section(self, _folder: Path) -> Section:
-        """Return the section of the report on these footprints."""
-        fits = sum(board.fits for board in self.boards)
-        finding = f"fits {fits} of {len(self.boards)} boards"
-        measured = [board.on_board for board in self.boards if board.on_board is not None]
-        different = [one.board_says for one in measured if one.different_steps]
-        if different:
-            finding += f"; other bits on {different[0]}"
-        good = fits == len(self.boards) and not different
-        return Section("footprint", f"Footprint of {self.source}", good, finding, self)
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: whether it fits each board, and what it takes there."""
+        measured = (board.on_board for board in self.boards if board.on_board is not None)
+        different = [f"OTHER BITS on {echo(one.board_says)}" for one in measured if one.different_steps]
+        alone = len(self.boards) == 1
+        blocks: list[Block] = [ResultTable(_HEAD, [board.row for board in self.boards], (0, -1))]
+        for board in self.boards:
+            if board.on_board is not None:
+                head, *rows = board.compared
+                blocks += [Sentence(board.on_board.sentence), ResultTable(head, rows)]
+        if alone:
+            blocks.append(self.boards[0].function_table)
+        blocks += [
+            Sentence(board.cycles_sentence) for board in self.boards if board.cycles_estimate is not None
+        ]
+        blocks += [Sentence(note) for board in self.boards for note in board.notes]
+        about = f"{self.generator}, settings {self.digest}, {self.scalar}, {self.optimisation}. {_ABOUT}"
+        return CommandResult(
+            f"Footprint of {echo(self.source)}",
+            all(board.fits for board in self.boards) and not different,
+            [*(board.answer for board in self.boards), *different],
+            [*blocks, *(board.details(functions=not alone) for board in self.boards), Note(about)],
+        )
 
 
 def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) -> FootprintSummary:
@@ -140,58 +224,6 @@ def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) 
         optimisation=footprints[0].optimisation,
         boards=[_board(footprint) for footprint in footprints],
     )
-
-
-def text(footprints: Sequence[Footprint]) -> str:
-    """Return the answer, a table of the boards, the functions if there is one board, and notes."""
-    lines = [*map(_answer, footprints), "", *table(_HEAD, list(map(_row, footprints)), (0, -1))]
-    if len(footprints) == 1:
-        if footprints[0].on_board is not None:
-            compared = _board(footprints[0]).compared
-            lines += ["", sentence(footprints[0].on_board.sentence), *table(compared[0], compared[1:])]
-        functions = [tuple(map(str, astuple(one))) for one in _functions(footprints[0])]
-        lines += ["", *table(_FUNCTION_HEAD, functions)]
-    cycles = [_board(footprint).cycles_sentence for footprint in footprints if footprint.cycles]
-    lines += ["", *map(sentence, cycles)] if cycles else []
-    notes = [note for footprint in footprints for note in _notes(footprint)]
-    return "\n".join([*lines, *(["", *map(sentence, notes)] if notes else [])])
-
-
-def _answer(footprint: Footprint) -> str:
-    """Return whether the controller fits a board, and what it takes."""
-    verdict = ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER"
-    found = f"{footprint.board.name}: {verdict}, {footprint.added.flash.total / 1000:.3g} KB of flash"
-    if footprint.time_s is None:
-        return found
-    return f"{found}, {100 * footprint.time_s[1] / footprint.update_period_s:.2g} % of the period"
-
-
-def page(summary: FootprintSummary) -> str:
-    """Render the summary as one HTML page that needs no other file."""
-    return render_page("footprint.html.j2", {"summary": summary})
-
-
-def _row(footprint: Footprint) -> tuple[str, ...]:
-    counts, time_s = footprint.counts, footprint.time_s
-    return (
-        footprint.board.name,
-        str(footprint.added.flash.total),
-        str(footprint.added.ram.total),
-        "-" if footprint.stack is None else str(footprint.stack.bytes),
-        "-" if counts is None else f"{counts.mean:.0f} / {counts.most_met}",
-        _cycles_cell(footprint),
-        "-" if time_s is None else f"{1000 * time_s[1]:.3g}",
-        "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
-        ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",
-    )
-
-
-def _cycles_cell(footprint: Footprint) -> str:
-    """Return the modelled cycles of the most expensive step, or their estimate."""
-    modelled = _modelled(footprint)
-    if modelled is not None:
-        return str(modelled.most_met)
-    return "-" if footprint.cycles is None else f"~{sum(footprint.cycles) / 2:.0f}"
 
 
 def _modelled(footprint: Footprint) -> CycleCounts | None:
@@ -221,6 +253,7 @@ def _board(footprint: Footprint) -> BoardFootprint:
         functions=_functions(footprint),
         notes=_notes(footprint),
         on_board=footprint.on_board,
+        period_share=None if footprint.time_s is None else footprint.time_s[1] / footprint.update_period_s,
     )
 
 

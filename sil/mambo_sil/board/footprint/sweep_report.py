@@ -1,17 +1,26 @@
-"""A sweep as a record, as text, as CSV and as a section of the report."""
+"""A sweep: record, result and CSV."""
 
 import csv
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Final
+
+from markupsafe import Markup
 
 from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.results.blocks import CommandResult, Picture, ResultTable, Sentence
 from mambo_sil.results.number_format import digits
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import Number, ReportedSummary
+
+CAPTION: Final = (
+    "Resources of the board and tracking error of each controller. Dots fit the budget; the dashed line is "
+    "the budget, if in range; crosses are refused settings."
+)
+_HEADS: Final = ("settings", "flash B", "RAM B", "stack B", "instructions", "time, ms", "IAE, m s", "")
 
 
 class SweepSummary(ReportedSummary):
@@ -28,15 +37,36 @@ class SweepSummary(ReportedSummary):
     points: list[Point]
     closest_fit: Point | None
 
-    def section(self, _folder: Path) -> Section:
-        """Return the section of the report on this sweep."""
-        from mambo_sil.board.footprint.footprint_plots import sweep_panels  # noqa: PLC0415 - loaded when drawing
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: a table of the points, then why others were refused."""
 
+        def panels() -> list[Markup]:
+            from mambo_sil.board.footprint.footprint_plots import sweep_panels  # noqa: PLC0415 - loaded when drawing
+
+            return sweep_panels(self.points, self.axes, self.budget)
+
+        flown = [point for point in self.points if point.refusal is None]
         best = self.closest_fit
-        finding = "nothing fits" if best is None else f"closest tracking that fits: {values_text(best)}"
-        pictures = sweep_panels(self.points, self.axes, self.budget) if self.points else []
-        title = f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}"
-        return Section("sweep", title, best is not None, finding, {"summary": self, "pictures": pictures})
+        answer = [f"nothing fits {self.board}"]
+        if best is not None:
+            answer = [
+                f"{sum(point.fits for point in flown)} of {len(self.points)} controllers fit",
+                f"closest: {_values(best)}, IAE {digits(best.iae_m_s)} m s",
+            ]
+        return CommandResult(
+            f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}",
+            best is not None,
+            answer,
+            [
+                *([Picture(panels, CAPTION)] if self.points else []),
+                ResultTable(_HEADS, list(map(_row, flown)), (0, -1), (5,)),
+                *(
+                    Sentence(f"{_values(point)} is refused: {point.refusal}")
+                    for point in self.points
+                    if point.refusal is not None
+                ),
+            ],
+        )
 
 
 def closest_fit(points: Sequence[Point]) -> Point | None:
@@ -56,30 +86,18 @@ def write_points(points: Sequence[Point], path: Path) -> None:
             writer.writerow(row.pop("values") | row)
 
 
-def values_text(point: Point) -> str:
+def _values(point: Point) -> str:
     """Spell the varied keys of a point."""
     return ", ".join(f"{key} {value:g}" for key, value in point.values.items())
 
 
-def points_text(points: Sequence[Point]) -> str:
-    """Return the answer and a table of the points, then why others were refused."""
-    flown = [point for point in points if point.refusal is None]
-    refused = [point for point in points if point.refusal is not None]
-    lines = [f"{sum(point.fits for point in flown)} of {len(points)} controllers fit"]
-    best = closest_fit(flown)
-    if best is not None:
-        lines.append(sentence(f"closest: {values_text(best)}, IAE {digits(best.iae_m_s)} m s"))
-    if flown:
-        heads = ("settings", "flash B", "RAM B", "stack B", "instructions", "IAE, m s", "")
-        lines += ["", *table(heads, [_row(point) for point in flown], (0, -1))]
-    return "\n".join(lines + [sentence(f"{values_text(one)} is refused: {one.refusal}") for one in refused])
-
-
 def _row(point: Point) -> tuple[str, ...]:
+    sizes = (point.flash_bytes, point.ram_bytes, point.stack_bytes, point.instructions)
+    verdict = "fits" if point.fits else "not shown to fit"
     return (
-        values_text(point),
-        *(f"{value:g}" for value in (point.flash_bytes, point.ram_bytes, point.stack_bytes)),
-        f"{point.instructions:g}",
+        _values(point),
+        *(f"{one:g}" for one in sizes),
+        digits(point.time_ms),
         digits(point.iae_m_s),
-        "fits" if point.fits else "not shown to fit",
+        verdict,
     )

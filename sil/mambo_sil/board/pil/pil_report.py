@@ -1,7 +1,8 @@
-"""The summary of a flight with the controller on a board: record, text and section of the report."""
+"""The summary of a flight with the controller on a board: record and result."""
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Self
 
@@ -11,8 +12,8 @@ from mambo_codegen.errors import echo
 from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.timed import Arrival, TimedController
-from mambo_sil.flight.flight_report import FlySummary, flight_text
-from mambo_sil.results.summary import Section
+from mambo_sil.flight.flight_report import FlySummary
+from mambo_sil.results.blocks import CommandResult, ResultTable
 
 CLOCK_TOLERANCE: Final = 0.01
 """Share by which the clocks of board and desk may differ: a ceramic resonator is half as bad."""
@@ -96,23 +97,33 @@ class BoardFlightSummary(FlySummary):
     """On the link: damaged, repeated, reconnected, restarts; in real time damaged and doubled."""
     real_time: RealTime | None = None
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this flight; raises TraceError."""
-        found, cycles, trip = difference(self), self.cycles, self.round_trip_s
-        facts = {
-            "flown on": f"{self.board_says}, {self.port}"
-            + (", bit for bit as on this machine" if found is None else ""),
-            "cycles of a step": f"{cycles.least:.0f} / {cycles.median:.0f} / {cycles.most:.0f} "
-            f"(least, median, most) at {self.clock_hz / 1e6:g} MHz",
-            "stack of a step": f"{self.stack_bytes} B",
-            "link": link_text(self)
-            + ("" if trip is None else f"; request to reply {1e3 * trip.median:.3g} ms (median)"),
-        }
-        if self.emulated is not None:
-            facts["emulated"] = emulated_text(self)
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this flight; drawing raises TraceError."""
+        cycles, trip = self.cycles, self.round_trip_s
+        rows = [
+            (
+                "cycles a step",
+                f"{cycles.least:.0f} / {cycles.median:.0f} / {cycles.most:.0f} (least, median, most), "
+                f"{1e6 * cycles.median / self.clock_hz:.3g} us at {self.clock_hz / 1e6:g} MHz",
+            )
+        ]
+        if self.emulated is not None or self.not_emulated:
+            rows.append(("emulated", emulated_text(self)))
+        rows.append(("stack of a step", f"{self.stack_bytes} B"))
+        if trip is not None:
+            milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
+            rows.append(("request to reply", f"{milliseconds} ms"))
         if self.real_time is not None:
-            facts["real time"] = "; ".join(real_time_text(self.real_time, self.steps))
-        return self._flown_section(folder, facts, [] if found is None else [found])
+            rows += zip(("real time", "", ""), real_time_text(self.real_time, self.steps), strict=True)
+        rows.append(("link", link_text(self)))
+        flown = super().result(folder)
+        return replace(flown, blocks=[*flown.blocks, ResultTable((), rows)])
+
+    def _remarks(self) -> Iterator[str]:
+        yield from super()._remarks()
+        found = difference(self)
+        same = f"all bits of {self.steps} steps equal those of this machine"
+        yield f"{self.board_says}, {self.port}: {same if found is None else found.upper()}"
 
 
 def board_fields(board: Connection, controller: BoardController | TimedController) -> dict[str, object]:
@@ -212,28 +223,3 @@ def real_time_text(timed: RealTime, steps: int) -> list[str]:
         f"{timed.late_inputs} of {made} steps with late inputs, {timed.lost_replies} replies lost, "
         f"{timed.overruns} periods without a step",
     ]
-
-
-def board_text(summary: BoardFlightSummary) -> str:
-    """Format the summary of a flight with a board."""
-    found, cycles, trip = difference(summary), summary.cycles, summary.round_trip_s
-    bits = (
-        f"all bits of {summary.steps} steps equal those of this machine" if found is None else found.upper()
-    )
-    lines = [
-        flight_text(summary),
-        f"{summary.board_says}, {summary.port}: {bits}",
-        f"  cycles a step      {cycles.least:.0f} / {cycles.median:.0f} / {cycles.most:.0f} "
-        f"(least, median, most), {1e6 * cycles.median / summary.clock_hz:.3g} us at "
-        f"{summary.clock_hz / 1e6:g} MHz",
-    ]
-    if summary.emulated is not None or summary.not_emulated:
-        lines.append(f"  emulated           {emulated_text(summary)}")
-    lines.append(f"  stack of a step    {summary.stack_bytes} B")
-    if trip is not None:
-        milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
-        lines.append(f"  request to reply   {milliseconds} ms")
-    if summary.real_time is not None:
-        first, *others = real_time_text(summary.real_time, summary.steps)
-        lines += [f"  real time          {first}", *(f"{'':21}{sentence}" for sentence in others)]
-    return "\n".join([*lines, f"  link               {link_text(summary)}"])

@@ -9,10 +9,10 @@ from mambo_codegen.errors import echo
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.desk import desk_library, events_file
 from mambo_sil.board.desk.desk_events import broken, fly_events, measure
-from mambo_sil.board.desk.desk_report import DESK_FILES, DeskSummary, desk_text, draw_flight, write_trace
+from mambo_sil.board.desk.desk_report import DESK_FILES, DeskSummary, draw_flight, write_trace
 from mambo_sil.board.desk.events_file import EventsFile, SensorsSection
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, OtherFlight, Output, Runner
-from mambo_sil.cli.options import load, show
+from mambo_sil.cli.options import load, show_result
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CurveName
 from mambo_sil.results.folders import new_results
@@ -62,9 +62,8 @@ def fly_app(
             console=trace.console,
         )
         summary.write(folder)
-    show(summary, desk_text(summary), as_json=output.as_json)
     written = DESK_FILES[:1] if output.no_pictures else DESK_FILES
-    typer.echo(f"{echo(str(output.output))}: {', '.join(written)}", err=True)
+    show_result(summary, output.output, written, as_json=output.as_json)
     if not summary.good:
         raise typer.Exit(1)
 

@@ -20,7 +20,7 @@ from mambo_sil.cli.options import (
     load,
     load_drone,
     output_option,
-    show,
+    show_result,
 )
 
 if TYPE_CHECKING:
@@ -88,12 +88,12 @@ def campaign(
     with counting_bar("starting", "flights", flights) as bar:
         summary = _fly_campaign(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
     from mambo_sil.experiment.campaign.campaign_records import RECORDS
-    from mambo_sil.experiment.campaign.campaign_report import PICTURE, campaign_text
+    from mambo_sil.experiment.campaign.campaign_report import PICTURE
     from mambo_sil.experiment.campaign.store import TABLE
     from mambo_sil.results.folders import SUMMARY
 
-    show(summary, campaign_text(summary, str(output)), as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {TABLE}, {SUMMARY}, {PICTURE}.png, {PICTURE}.svg, {RECORDS}/", err=True)
+    files = (TABLE, SUMMARY, f"{PICTURE}.png", f"{PICTURE}.svg", f"{RECORDS}/")
+    show_result(summary, output, files, as_json=as_json)
 
 
 def _fly_campaign(
@@ -152,7 +152,7 @@ def faults(
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.errors import FlightError
     from mambo_sil.experiment.faults.fault_flights import fly_faults
-    from mambo_sil.experiment.faults.faults_report import FaultsSummary, faults_text, write_csv
+    from mambo_sil.experiment.faults.faults_report import FaultsSummary, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
 
@@ -172,7 +172,7 @@ def faults(
             source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
         )
         summary.write(folder)
-    show(summary, faults_text(summary), as_json=as_json)
+    show_result(summary, output, as_json=as_json)
     if summary.crashed:
         raise typer.Exit(1)
 
@@ -208,7 +208,6 @@ def replay(
         CURVES,
         PICTURES,
         LogReplaySummary,
-        replay_text,
         summarise,
     )
     from mambo_sil.results.folders import SUMMARY, new_results
@@ -220,7 +219,6 @@ def replay(
         write_curves(replayed, folder / CURVES)
         draw_replay(folder / CURVES, folder / "replay")
         summary.write(folder)
-    show(summary, replay_text(summary), as_json=as_json)
-    typer.echo(f"{echo(str(output))}: {', '.join((CURVES, *PICTURES, SUMMARY))}", err=True)
+    show_result(summary, output, (CURVES, *PICTURES, SUMMARY), as_json=as_json)
     if not summary.good:
         raise typer.Exit(2 if summary.good is None else 1)

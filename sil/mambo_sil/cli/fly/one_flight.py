@@ -14,7 +14,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.model import Settings
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
-from mambo_sil.cli.options import load, load_drone, show
+from mambo_sil.cli.options import load, load_drone, show_result
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.gusts import LIGHT_M_S
@@ -27,7 +27,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import Walls, walls_m
-from mambo_sil.flight.flight_report import FlightSummary, FlySummary, flight_text, judge
+from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PD_TITLES, SIZED, TIMED
 from mambo_sil.flight.polynomials import read_course
@@ -77,7 +77,7 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         summary = FlySummary(**fields)
         write_flight(trace, summary, settings, output, folder)
         summary.write(folder)
-    finish(summary, flight_text(summary), output, written(output))
+    finish(summary, output, written(output))
 
 
 def load_settings(runner: Runner) -> Settings:
@@ -188,10 +188,9 @@ def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None, spe
     draw_flights({title: trace}, folder / "flight", walls, speed_limit_m_s)
 
 
-def finish(summary: FlightSummary, text: str, output: Output, files: tuple[str, ...]) -> None:
-    """Print the results, as `text` or JSON, and the files written; exit 1 unless the summary is good."""
-    show(summary, text, as_json=output.as_json)
-    typer.echo(f"{echo(str(output.output))}: {', '.join(files)}", err=True)
+def finish(summary: FlightSummary, output: Output, files: tuple[str, ...]) -> None:
+    """Print the results and the files written; exit 1 unless the summary is good."""
+    show_result(summary, output.output, files, as_json=output.as_json)
     if not summary.good:
         raise typer.Exit(1)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from mambo_sil.cli.fly.fly_options import CurveChoice, CurveRate, CurveSize, CurveTime
-from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show_result
 
 if TYPE_CHECKING:
     from mambo_sil.cli.progress import Bar
@@ -52,7 +52,7 @@ def pilot(
     from mambo_sil.errors import PilotError
     from mambo_sil.link.flight_log import write_log
     from mambo_sil.link.pilot import Pilot
-    from mambo_sil.link.pilot_report import LOG, PilotSummary, pilot_text
+    from mambo_sil.link.pilot_report import LOG, PilotSummary
     from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
@@ -81,8 +81,7 @@ def pilot(
             trajectory=trajectory,
         )
         summary.write(folder)
-    show(summary, pilot_text(summary), as_json=as_json)
-    typer.echo(f"{output}: {LOG}", err=True)
+    show_result(summary, output, (LOG,), as_json=as_json)
     if interrupted is not None:
         raise interrupted
     if not summary.good:

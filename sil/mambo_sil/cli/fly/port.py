@@ -14,7 +14,7 @@ from mambo_sil.board.firmware.elf import FootprintError
 from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
-from mambo_sil.board.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields, board_text
+from mambo_sil.board.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields
 from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.board.pil.timed import TimedController
 from mambo_sil.cli.fly.fly_options import Conditions, Course, Output, Runner
@@ -80,7 +80,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
         )
         write_flight(trace, summary, settings, output, folder)
         summary.write(folder)
-    finish(summary, board_text(summary), output, written(output))
+    finish(summary, output, written(output))
 
 
 def _emulated(settings: Settings, says: str) -> dict[str, object]:

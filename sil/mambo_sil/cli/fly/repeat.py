@@ -12,7 +12,7 @@ from mambo_sil.flight.controllers.inner_steps import WatchedController, write_in
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import fenced, walls_m
-from mambo_sil.flight.flight_report import RepeatSummary, flight_text, flight_title, judge
+from mambo_sil.flight.flight_report import RepeatSummary, flight_title, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, flight_of, read_record
@@ -60,7 +60,7 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
         )
         summary.write(folder)
     written = TRACE_FILES if output.no_pictures else FLIGHT_FILES
-    finish(summary, flight_text(summary), output, written if watched is None else (*written, INNER_STEPS))
+    finish(summary, output, written if watched is None else (*written, INNER_STEPS))
 
 
 def _controllers(record: Record, flight: Flight) -> tuple[WatchedController | None, PositionController]:

@@ -1,10 +1,11 @@
-"""Results of a campaign: summary, text, and section of the report."""
+"""Results of a campaign: summary and result."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from markupsafe import Markup
 from pydantic import BaseModel
 
 from mambo_codegen.atomic import put
@@ -25,13 +26,17 @@ from mambo_sil.experiment.campaign.statistics import (
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
 from mambo_sil.flight.names import PD_TITLES
+from mambo_sil.results.blocks import Block, CommandResult, Commands, Facts, Picture, ResultTable, Sentence
 from mambo_sil.results.folders import SUMMARY
-from mambo_sil.results.metric_names import SEEN, named, titled
+from mambo_sil.results.metric_names import AS_ESTIMATED, SEEN, named, titled
 from mambo_sil.results.number_format import digits, distance
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import Number, ReportedSummary
 
 PICTURE: Final = "campaign"
+CAPTION: Final = (
+    "Cumulative distributions over the flights: a curve further left is better. The value of a crashed "
+    "flight is infinite, so the curve of a controller that crashes ends below 100 %."
+)
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
@@ -51,10 +56,41 @@ class Drawn(BaseModel, extra="allow", frozen=True):
     flight: FlightSection
     controllers: list[NamedController]
 
-    @property
-    def title(self) -> str:
-        """The title of the campaign's section of the report."""
-        return f"Campaign, {self.flight.trajectory.text()}"
+    def shown(
+        self, folder: Path, good: bool | None, answer: list[str], blocks: Sequence[Block]
+    ) -> CommandResult:
+        """Return a result with what a page shows of every campaign: its parameters and distributions.
+
+        Raises ResultsError for flights of version 0.1.
+        """
+        flight = self.flight
+        facts = {
+            "trajectory": f"{flight.trajectory.text()}, {flight.size_m.text()} m, "
+            f"{flight.rate_rad_s.text()} rad/s, {flight.duration_s:g} s",
+            "vehicle": str(flight.vehicle),
+            "sensors": str(flight.sensors),
+            "seed": str(self.seed),
+        }
+        if (folder / TABLE).is_file() and not (folder / DATABASE).is_file():
+            raise ResultsError(
+                f"{echo(str(folder))}: has {TABLE} without {DATABASE}, as mambo-nmpc 0.1 wrote it; "
+                "report it with that version, or run campaign again in another folder"
+            )
+
+        def panels() -> list[Markup]:
+            from mambo_sil.experiment.campaign.campaign_plots import distribution_panels  # noqa: PLC0415 - loaded when drawing
+
+            return distribution_panels(self.flights_in(folder), [one.name for one in self.controllers])
+
+        pictures = Picture(panels, CAPTION, [folder / DATABASE])
+        title = f"Campaign, {flight.trajectory.text()}"
+        return CommandResult(title, good, answer, [Facts(facts), pictures, *blocks])
+
+    def flights_in(self, folder: Path) -> Table:
+        """Read the flights in `folder`, none if there is no database; raises ResultsError."""
+        if not (folder / DATABASE).is_file():
+            return {}
+        return read_table(folder / DATABASE, [one.name for one in self.controllers])
 
 
 @dataclass(frozen=True)
@@ -79,23 +115,38 @@ class CampaignSummary(ReportedSummary):
     improvements: list[Improvement]
     worst: dict[str, list[WorstFlight]]
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report; raises ResultsError for flights that cannot be read."""
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result: statistics, improvements, and commands to repeat the worst flights."""
         found = self.controllers
-        content = {
-            **_content(folder, self.campaign, _flights(folder, self.campaign)),
-            "summary": self,
-            "indices": {
-                name: [(*named(index), values) for index, values in one.quantiles.items()]
-                for name, one in found.items()
-            },
-            "improvements": [(named(one.index)[0], one) for one in self.improvements],
-        }
-        crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
-        finding = f"{self.flights} flights; crashed: {crashes}"
         crashed = any(one.crashed.count for name, one in found.items() if name not in PD_TITLES)
+        blocks = [block for name, one in found.items() for block in _statistics(name, one)]
+        if any(key.startswith(SEEN) for one in found.values() for key in one.quantiles):
+            blocks.append(Sentence(AS_ESTIMATED))
+        improvement = ResultTable(
+            ("the other", "index", "median", "95 % interval", "better in", "95 % interval"),
+            [
+                (
+                    one.controller,
+                    named(one.index)[0],
+                    digits(one.median),
+                    f"{digits(one.low)} .. {digits(one.high)}",
+                    f"{one.better.count} of {one.better.flights}",
+                    _interval(one.better),
+                )
+                for one in self.improvements
+            ],
+            (0, 1),
+            title=f"improvement on {next(iter(found))}: its index divided by the other's, flight by flight",
+        )
+        worst = [
+            (f"{name}, {_end(flight)}", f"mambo-nmpc fly --repeat {echo(str(folder))}/{flight.record}")
+            for name, flights in self.worst.items()
+            for flight in flights
+        ]
+        commands = Commands("worst flights by IAE; these commands repeat them", worst)
+        answer = [_answer(self, name) for name in reversed(found)]
         good = False if crashed else None
-        return Section("campaign", self.campaign.title, good, finding, content, _missing(folder))
+        return self.campaign.shown(folder, good, answer, [*blocks, improvement, commands])
 
 
 class UnfinishedCampaign(Drawn, ReportedSummary):
@@ -103,38 +154,12 @@ class UnfinishedCampaign(Drawn, ReportedSummary):
 
     command = "campaign"
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report; raises ResultsError for flights that cannot be read."""
-        flights = _flights(folder, self)
-        so_far = len(next(iter(flights.values()), ()))
-        finding = f"not finished, {so_far} flights so far; the same command resumes it"
-        nothing: dict[str, Any] = {"summary": None, "indices": {}, "improvements": []}
-        content = _content(folder, self, flights) | nothing
-        return Section("campaign", self.title, None, finding, content, _missing(folder))
-
-
-def _missing(folder: Path) -> list[str]:
-    return [] if (folder / DATABASE).is_file() else [DATABASE]
-
-
-def _flights(folder: Path, drawn: Drawn) -> Table:
-    """Read the flights in `folder`, none if there is no database; raises ResultsError."""
-    if not _missing(folder):
-        return read_table(folder / DATABASE, [controller.name for controller in drawn.controllers])
-    if (folder / TABLE).is_file():
-        raise ResultsError(
-            f"{echo(str(folder))}: has {TABLE} without {DATABASE}, as mambo-nmpc 0.1 wrote it; "
-            "report it with that version, or run campaign again in another folder"
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result so far; raises ResultsError for flights that cannot be read."""
+        so_far = len(next(iter(self.flights_in(folder).values()), ()))
+        return self.shown(
+            folder, None, [f"not finished, {so_far} flights so far; the same command resumes it"], []
         )
-    return {}
-
-
-def _content(folder: Path, drawn: Drawn, flights: Table) -> dict[str, Any]:
-    """Return what the page shows of every campaign: its parameters, and pictures of its flights."""
-    from mambo_sil.experiment.campaign.campaign_plots import distribution_panels  # noqa: PLC0415 - loaded when drawing
-
-    pictures = distribution_panels(flights, [controller.name for controller in drawn.controllers])
-    return {"drawn": drawn, "folder": str(folder), "pictures": pictures}
 
 
 def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
@@ -182,52 +207,28 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
     return summary
 
 
-def campaign_text(summary: CampaignSummary, folder: str) -> str:
-    """Return a summary as text: the answer, statistics, improvements, commands to repeat the worst."""
-    lines = [_answer(summary, name) for name in reversed(summary.controllers)]
-    for name, found in summary.controllers.items():
-        rows = [
-            (titled(index), *(digits(quantiles[share]) for share in _SHOWN))
-            for index, quantiles in found.quantiles.items()
-        ]
-        lines += ["", *table((name, *_SHOWN.values()), rows)]
-        lines.append(f"crashed: {_spelled(found.crashed)}")
-        if found.refused_an_input.count:
-            lines.append(f"rejected an input: {_spelled(found.refused_an_input)}")
-    if any(key.startswith(SEEN) for found in summary.controllers.values() for key in found.quantiles):
-        lines += ["", sentence("as estimated: error of the estimated position, which the controller knows")]
-    if summary.improvements:
-        first = next(iter(summary.controllers))
-        lines += ["", f"improvement on {first}: its index divided by that of the other, flight by flight"]
-        lines += table(
-            ("the other", "index", "median", "95 % interval", "better in", "95 % interval"),
-            [
-                (
-                    one.controller,
-                    named(one.index)[0],
-                    digits(one.median),
-                    f"{digits(one.low)} .. {digits(one.high)}",
-                    f"{one.better.count} of {one.better.flights}",
-                    _interval(one.better),
-                )
-                for one in summary.improvements
-            ],
-            (0, 1),
-        )
-    lines += ["", "worst flights by IAE; these commands repeat them"]
-    for name, flights in summary.worst.items():
-        for flight in flights:
-            what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
-            lines.append(f"{name}, {what}: mambo-nmpc fly --repeat {echo(folder)}/{flight.record}")
-    return "\n".join(lines)
+def _statistics(name: str, found: Distributions) -> list[Block]:
+    """Return the quantiles of a controller's metrics, and how many of its flights failed."""
+    rows = [
+        (titled(index), *(digits(quantiles[share]) for share in _SHOWN))
+        for index, quantiles in found.quantiles.items()
+    ]
+    blocks: list[Block] = [ResultTable((name, *_SHOWN.values()), rows)]
+    blocks.append(Sentence(f"crashed: {_spelled(found.crashed)}"))
+    if found.refused_an_input.count:
+        blocks.append(Sentence(f"rejected an input: {_spelled(found.refused_an_input)}"))
+    return blocks
 
 
 def _answer(summary: CampaignSummary, name: str) -> str:
     """Return how close a controller flies, by the median of the flights, and how many crashed."""
     found = summary.controllers[name]
     mean_m = found.quantiles["iae_m_s"]["0.5"] / summary.campaign.flight.duration_s
-    crashed = f"{found.crashed.count} of {found.crashed.flights} crashed"
-    return sentence(f"{name}: {distance(mean_m)} in the mean, {crashed}")
+    return f"{name}: {distance(mean_m)} in the mean, {found.crashed.count} of {found.crashed.flights} crashed"
+
+
+def _end(flight: WorstFlight) -> str:
+    return "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
 
 
 def _interval(one: Proportion) -> str:

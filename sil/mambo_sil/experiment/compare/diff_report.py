@@ -1,4 +1,4 @@
-"""A comparison of two controllers as a record, as text and as a section of the report."""
+"""A comparison of two controllers: record and result."""
 
 import re
 from collections.abc import Iterator
@@ -11,9 +11,9 @@ from mambo_sil.experiment.compare.compared_flights import EIGHT_S, SETTLED_SHARE
 from mambo_sil.experiment.compare.control_terms import AXES
 from mambo_sil.experiment.compare.diff_record import ControllerFigures, SettingDifference
 from mambo_sil.experiment.margins.axis_margins import Margins
-from mambo_sil.results.number_format import distance, three_digits_or_dash
-from mambo_sil.results.summary import PageTable, ReportedSummary, Section, plain_section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import CommandResult, ResultTable
+from mambo_sil.results.number_format import distance, three_digits
+from mambo_sil.results.summary import ReportedSummary
 
 _DASH = "\N{EN DASH}"
 
@@ -40,42 +40,23 @@ class DiffSummary(ReportedSummary):
         """Whether the C is the same."""
         return self.settings_a == self.settings_b
 
-    def section(self, _folder: Path, /) -> Section:
-        """Return the section of the report: what differs in the settings, and figures of both."""
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: what differs in the settings, and figures of both, unless they are the same."""
         title = f"{self.a} and {self.b} compared, vehicle {self.vehicle.name}"
-        return plain_section(title, None, "; ".join(_answers(self)), _tables(self))
-
-
-def diff_text(summary: DiffSummary) -> str:
-    """Format a comparison."""
-    lines = [sentence(words) for words in _answers(summary)]
-    for one in _tables(summary):
-        lines += ["", *table(one.heads, list(map(tuple, one.rows)), (0, -1))]
-    return "\n".join(lines)
-
-
-def _answers(summary: DiffSummary) -> list[str]:
-    """Return what both controllers are, or that they are the same."""
-    if summary.same:
-        both = f"{echo(summary.a)} and {echo(summary.b)} are the same controller"
-        return [f"{both}: settings {summary.settings_a[:16]}"]
-    return [
-        f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}{_answer(summary.figures_a)}",
-        f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}{_answer(summary.figures_b)}",
-    ]
-
-
-def _tables(summary: DiffSummary) -> list[PageTable]:
-    """Return what differs in the settings, and figures of both; nothing for the same controller."""
-    if summary.same:
-        return []
-    heads = ("setting", "A", "B", "meaning")
-    found = [PageTable(heads, [_setting(one) for one in summary.differences], {3})]
-    a, b = summary.figures_a, summary.figures_b
-    if a is not None and b is not None:
-        heads = (f"on vehicle {echo(summary.vehicle.name)}", "A", "B", "")
-        found.append(PageTable(heads, list(_figures(a, b)), {3}))
-    return found
+        a, b = echo(self.a), echo(self.b)
+        if self.same:
+            both = f"{a} and {b} are the same controller: settings {self.settings_a[:16]}"
+            return CommandResult(title, None, [both])
+        answer = [
+            f"A: {a}, settings {self.settings_a[:16]}{_answer(self.figures_a)}",
+            f"B: {b}, settings {self.settings_b[:16]}{_answer(self.figures_b)}",
+        ]
+        heads = ("setting", "A", "B", "meaning")
+        tables = [ResultTable(heads, list(map(_setting, self.differences)), (0, 3))]
+        if self.figures_a is not None and self.figures_b is not None:
+            heads = (f"on vehicle {echo(self.vehicle.name)}", "A", "B", "")
+            tables.append(ResultTable(heads, list(_figures(self.figures_a, self.figures_b)), (0, 3)))
+        return CommandResult(title, None, answer, tables)
 
 
 def _answer(figures: ControllerFigures | None) -> str:
@@ -100,7 +81,7 @@ def _figures(a: ControllerFigures, b: ControllerFigures) -> Iterator[tuple[str, 
     """Yield a row for each figure that one of them has."""
     left, right = ({name: (value, unit) for name, value, unit in figure_rows(one)} for one in (a, b))
     for name, (_, unit) in (left | right).items():
-        old, new = (three_digits_or_dash(side.get(name, (None, ""))[0]) for side in (left, right))
+        old, new = (three_digits(side.get(name, (None, ""))[0]) for side in (left, right))
         yield name, old, new, unit
 
 

@@ -1,8 +1,7 @@
-"""Verdicts on flights with faults: record, text, Markdown table, CSV and section of the report."""
+"""Verdicts on flights with faults: record, result, Markdown table and CSV."""
 
 import csv
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Final
@@ -11,11 +10,15 @@ from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.faults.fault_flights import COURSES, ORDER, End, Verdict, all_statuses
-from mambo_sil.results.summary import ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import CommandResult, Note, ResultTable, Sentence
+from mambo_sil.results.summary import ReportedSummary
 
 _LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
-_SHORTEST_BAR_M: Final = 0.01
+_ABOUT: Final = (
+    "The error is the largest distance to the true target since the onset of the fault. Recovered after: "
+    "from the end of the fault until the error stays within 1.5 times that of the fault-free flight. At "
+    "limit: the share of the time since the onset with a command at the tilt limit."
+)
 
 
 class FaultsSummary(ReportedSummary):
@@ -33,54 +36,21 @@ class FaultsSummary(ReportedSummary):
         """Whether the drone crashed in a flight."""
         return any(flight.end is End.CRASHED for flight in self.flights)
 
-    def section(self, _folder: Path) -> Section:
-        """Return the section of the report: one row per fault, both courses side by side."""
-        courses = list(dict.fromkeys(flight.course for flight in self.flights))
-        errors_m = [flight.largest_error_m for flight in self.flights]
-        largest_m = max((error_m for error_m in errors_m if math.isfinite(error_m)), default=0.0)
-        rows: dict[str, list[tuple[Verdict, float]]] = {}
-        for flight in self.flights:
-            percent = _bar_percent(flight.largest_error_m, largest_m)
-            rows.setdefault(flight.fault, []).append((flight, percent))
-        content = {"summary": self, "courses": courses, "rows": list(rows.items())}
-        title = f"Faults in flight, {self.source}, vehicle {self.vehicle.name}"
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: how many faults ended how, then a row per fault, both courses side by side."""
         recovered = all(flight.end is End.RECOVERED for flight in self.flights)
-        good = False if self.crashed else recovered or None
-        return Section("faults", title, good, _counts(self), content)
+        return CommandResult(
+            f"Faults in flight, {self.source}, vehicle {self.vehicle.name}",
+            False if self.crashed else recovered or None,
+            [_counts(self.flights)],
+            [Note(_ABOUT), _table(self.flights), Sentence(_bands(self.flights))],
+            f"{echo(self.source)} on {echo(self.vehicle.name)}",
+        )
 
 
-def _bar_percent(error_m: float, largest_m: float) -> float:
-    """Return the length of a bar in % on a logarithmic scale from 0.01 m to the largest error."""
-    if not error_m > _SHORTEST_BAR_M or largest_m <= _SHORTEST_BAR_M:
-        return 0.0
-    return round(100.0 * math.log(error_m / _SHORTEST_BAR_M) / math.log(largest_m / _SHORTEST_BAR_M), 1)
-
-
-_HEADS: Final = (
-    *("fault", "status", "command, rad", "tilt, rad", "at limit, %"),
-    *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
-    "end",
-)
-
-
-def faults_text(summary: FaultsSummary) -> str:
-    """Return the verdicts as text: how many faults ended how, then a row per fault."""
-    answer = f"{echo(summary.source)} on {echo(summary.vehicle.name)}: {_counts(summary)}"
-    heads = [
-        "fault",
-        *(f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")),
-    ]
-    rows = [
-        [fault, *(cell for flight in pair for cell in _cells(flight))]
-        for fault, pair in _pairs(summary.flights).items()
-    ]
-    lines = [sentence(answer), "", *table(heads, rows)]
-    return "\n".join([*lines, "", sentence(_bands(summary.flights))])
-
-
-def _counts(summary: FaultsSummary) -> str:
+def _counts(verdicts: Sequence[Verdict]) -> str:
     """Return how many faults ended how; the worse of the two courses counts."""
-    ends = [_worst_end(pair) for pair in _pairs(summary.flights).values()]
+    ends = [_worst_end(pair) for pair in _pairs(verdicts).values()]
     return f"{len(ends)} faults, " + ", ".join(f"{ends.count(end)} {end}" for end in ORDER if end in ends)
 
 
@@ -91,8 +61,20 @@ def _pairs(verdicts: Sequence[Verdict]) -> dict[str, list[Verdict]]:
 
 def faults_markdown(verdicts: Sequence[Verdict]) -> str:
     """Return the verdicts as a Markdown table with one row per fault and both courses side by side."""
-    lines = [_HEADS, ("---",) * len(_HEADS), *_rows(verdicts)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + f"\n\n{_bands(verdicts)}"
+    return f"{_table(verdicts).markdown()}\n\n{_bands(verdicts)}"
+
+
+def _table(verdicts: Sequence[Verdict]) -> ResultTable:
+    """Return a row per fault; the console has the largest errors and when the drone recovered."""
+    errors = [f"{course}: {what}" for course in COURSES for what in ("error, m", "recovered after, s")]
+    heads = ("fault", "end", "status", *errors, "command, rad", "tilt, rad", "at limit, %")
+    rows = []
+    for fault, pair in _pairs(verdicts).items():
+        row = [fault, _worst_end(pair), ", ".join(all_statuses(pair))]
+        row += [cell for flight in pair for cell in _cells(flight)]
+        row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
+        rows.append((*row, f"{100 * max(verdict.saturated_share for verdict in pair):.1f}"))
+    return ResultTable(heads, rows, (0, 1, 2), (1, 2, 7, 8, 9))
 
 
 def _cells(flight: Verdict) -> tuple[str, str]:
@@ -104,17 +86,6 @@ def _cells(flight: Verdict) -> tuple[str, str]:
 def _worst_end(pair: Sequence[Verdict]) -> End:
     """Return how the flights with a fault ended."""
     return max((flight.end for flight in pair), key=ORDER.index)
-
-
-def _rows(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, ...]]:
-    for fault, pair in _pairs(verdicts).items():
-        row = [fault, ", ".join(all_statuses(pair))]
-        row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
-        row.append(f"{100 * max(verdict.saturated_share for verdict in pair):.1f}")
-        for verdict in pair:
-            never = math.isnan(verdict.recovery_s)
-            row += [f"{verdict.largest_error_m:.2f}", "-" if never else f"{verdict.recovery_s:.1f}"]
-        yield (*row, _worst_end(pair))
 
 
 def _bands(verdicts: Sequence[Verdict]) -> str:

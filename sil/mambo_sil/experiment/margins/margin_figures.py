@@ -6,7 +6,7 @@ from typing import Final
 
 from mambo_sil.experiment.margins.axis_margins import PLACES, HeightMargins, Margins
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
-from mambo_sil.results.number_format import three_digits, three_digits_or_dash
+from mambo_sil.results.number_format import three_digits
 
 _INFINITE: Final = "\N{INFINITY}"
 _DASH: Final = "\N{EN DASH}"
@@ -39,7 +39,7 @@ def figure_table(axes: Sequence[Margins]) -> list[tuple[str, list[str], str]]:
 def verdict(axis: Margins) -> str:
     """Return in words how far an axis is from instability."""
     if not axis.stable:
-        return f"{axis.axis}: UNSTABLE, grows e-fold in {three_digits_or_dash(1.0 / axis.poles.growth_1_s)} s"
+        return f"{axis.axis}: UNSTABLE, grows e-fold in {three_digits(1.0 / axis.poles.growth_1_s)} s"
     parts = []
     for place, loop in axis.loops.items():
         gain = "any gain" if math.isinf(loop.gain_up) else f"{loop.gain_up:.2g} times the gain"

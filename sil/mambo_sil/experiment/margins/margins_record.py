@@ -3,18 +3,25 @@
 from pathlib import Path
 from typing import Final
 
+from markupsafe import Markup
 from pydantic import BaseModel, ConfigDict
 
+from mambo_codegen.errors import echo
 from mambo_sil.experiment.margins.axis_margins import PLACES, AxisName, Margins, PlaceName
 from mambo_sil.experiment.margins.margin_figures import figure_table, number, verdict
 from mambo_sil.flight.names import SensorsName
-from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.blocks import Block, CommandResult, Picture, ResultTable, Sentence
+from mambo_sil.results.summary import Number, ReportedSummary
 
 PICTURES: Final = tuple(
     f"{name}.{kind}" for name in ("bode", "nyquist", "sensitivity") for kind in ("png", "svg")
 )
 RESPONSES: Final = "response.csv"
 DRONES: Final = "drones.csv"
+CAPTION: Final = (
+    "The loop of each axis, broken at the command, roll and pitch also at the motors' torque. The circle "
+    "encloses all loops with a sensitivity above 2."
+)
 
 
 class MarginSpread(BaseModel):
@@ -48,15 +55,24 @@ class ManyDrones(BaseModel):
     """What was drawn or changed for it."""
 
     @property
-    def table(self) -> list[tuple[str, str, str, str]]:
-        """Return name, worst, median and the worst drone of every figure."""
+    def blocks(self) -> list[Block]:
+        """How many are unstable, every figure, and the drone with the worst."""
         rows = []
         for one in self.spreads:
             where = "" if one.place is None else f" at {PLACES[one.place]}"
             scale, unit = (1e3, ", ms") if one.figure == "delay margin" else (1.0, "")
             worst, median = (number(scale * value) for value in (one.worst, one.median))
             rows.append((f"{one.axis}: {one.figure}{where}{unit}", worst, median, str(one.drone)))
-        return rows
+        changed = ", ".join(f"{name} = {_spelled(value)}" for name, value in self.worst_values.items())
+        return [
+            Sentence(f"{self.drones} drones, {self.origin}; {self.unstable} unstable"),
+            ResultTable(("", "worst", "median", "worst drone"), rows),
+            Sentence(f"drone {self.worst_drone}: {changed}"),
+        ]
+
+
+def _spelled(value: float | str) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 class MarginsSummary(ReportedSummary):
@@ -86,30 +102,27 @@ class MarginsSummary(ReportedSummary):
             return [self.reason or ""]
         return [verdict(axis) for axis in self.axes]
 
-    def section(self, folder: Path, /) -> Section:
-        """Return the section of the report on these margins."""
-        missing, pictures = [], []
-        if self.axes is not None and (folder / RESPONSES).is_file():
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result: a verdict for each axis, every figure, and those of many drones."""
+
+        def panels() -> list[Markup]:
             from mambo_sil.experiment.margins.margins_plots import margin_panels  # noqa: PLC0415 - slow to load
             from mambo_sil.experiment.margins.response_file import read_responses  # noqa: PLC0415
 
-            pictures = margin_panels(read_responses(folder / RESPONSES))
-        elif self.axes is not None:
-            missing = [RESPONSES]
-        content = {
-            "verdicts": self.verdicts,
-            "pictures": pictures,
-            "axes": [axis.axis for axis in self.axes or ()],
-            "rows": figure_table(self.axes or []),
-            "many": self.many,
-            "spreads": self.many.table if self.many else [],
-        }
+            return [Markup("\n").join(margin_panels(read_responses(folder / RESPONSES)))]
+
         state = "the true state" if self.sensors == "true" else f"sensors {self.sensors}"
-        return Section(
-            template="margins",
-            title=f"Margins of {self.source} on {self.vehicle}, {state}",
-            good=None if self.axes is None else self.stable,
-            finding="; ".join(self.verdicts),
-            content=content,
-            missing=missing,
+        period = f"{1e3 * self.update_period_s:g} ms an update"
+        blocks: list[Block] = []
+        if self.axes is not None:
+            heads = ("broken at", *(axis.axis for axis in self.axes), "")
+            rows = [(name, *values, unit) for name, values, unit in figure_table(self.axes)]
+            blocks = [Picture(panels, CAPTION, [folder / RESPONSES]), ResultTable(heads, rows, (0, -1))]
+        if self.many is not None:
+            blocks += self.many.blocks
+        return CommandResult(
+            f"Margins of {self.source} on {self.vehicle}, {state}",
+            None if self.axes is None else self.stable,
+            [f"{echo(self.source)} on {echo(self.vehicle)}, {state}, {period}", *self.verdicts],
+            blocks,
         )

@@ -1,4 +1,4 @@
-"""Results of a suite: summary, text, section of the report, JUnit XML, and records to repeat flights."""
+"""Results of a suite: summary, result, JUnit XML, and records to repeat flights."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,6 +8,7 @@ from statistics import median
 from typing import Final
 from xml.etree import ElementTree
 
+from markupsafe import Markup
 from pydantic import Field
 
 from mambo_codegen.errors import echo
@@ -18,15 +19,20 @@ from mambo_sil.experiment.regress.baseline import Baseline
 from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Record, write_record
+from mambo_sil.results.blocks import CommandResult, Commands, Facts, Picture, ResultTable, Sentence
 from mambo_sil.results.metric_names import titled
 from mambo_sil.results.number_format import digits
-from mambo_sil.results.summary import ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import ReportedSummary
 
 JUNIT: Final = "junit.xml"
 PICTURES: Final = ("regress.png", "regress.svg")
 MOST_SHOWN: Final = 10
-"""Failed flights that text and page list; the summary has all."""
+"""Failed flights that are listed; the summary has all."""
+CAPTION: Final = (
+    "Each flight's metrics divided by their limits, one row per group and metric; what lies outside the axis "
+    "is drawn at its end. A metric fails above its limit: its bound, or the recorded value with tolerance."
+)
+_HEADS: Final = ("group", "metric", "bound", "median", "worst", "over recorded", "at limit", "failed")
 
 
 class RegressSummary(ReportedSummary):
@@ -53,22 +59,37 @@ class RegressSummary(ReportedSummary):
         """The flights that failed."""
         return [flight for flight in self.flights if flight.failures]
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this suite."""
-        from mambo_sil.experiment.regress.regress_plots import limits_panel  # noqa: PLC0415 - loaded when drawing
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result: a row per group and metric, then the failed flights."""
 
-        content = {
-            "folder": str(folder),
-            "controller": f"{self.controller}, settings {self.settings[:16]}, "
-            f"vehicle {' and '.join(self.vehicles)}",
-            "rows": list(group_rows(self)),
-            "failed": self.failed[:MOST_SHOWN],
-            "more": max(len(self.failed) - MOST_SHOWN, 0),
-            "remarks": remarks(self),
-            "picture": limits_panel(self.flights),
-        }
-        title = f"Regression tests, {self.suite} with {self.controller}"
-        return Section("regress", title, not self.failed, finding(self), content)
+        def picture() -> list[Markup]:
+            from mambo_sil.experiment.regress.regress_plots import limits_panel  # noqa: PLC0415 - loaded when drawing
+
+            return [limits_panel(self.flights)]
+
+        shown, more = self.failed[:MOST_SHOWN], len(self.failed) - MOST_SHOWN
+        no_ratio = (5,) if self.baseline is None else ()
+        commands = [
+            (
+                f"{one.name}: {'; '.join(one.failures)}",
+                f"mambo-nmpc fly --repeat {echo(str(folder))}/{one.record}",
+            )
+            for one in shown
+        ]
+        return CommandResult(
+            f"Regression tests, {self.suite} with {self.controller}",
+            not self.failed,
+            [_finding(self)],
+            [
+                *map(Sentence, _remarks(self)),
+                Facts({"settings": self.settings[:16]}),
+                Picture(picture, CAPTION),
+                ResultTable(_HEADS, list(map(_cells, group_rows(self))), (0, 1), no_ratio),
+                Commands("", commands),
+                *([Sentence(f"and {more} more failed flights, all in {JUNIT}")] if more > 0 else []),
+            ],
+            f"{echo(self.suite)} with {self.controller} on {' and '.join(map(echo, self.vehicles))}",
+        )
 
 
 def judge(
@@ -126,11 +147,6 @@ class GroupRow:
     failed: int
     flights: int
 
-    @property
-    def title(self) -> str:
-        """The metric with its unit."""
-        return titled(self.metric)
-
 
 def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
     """Yield a row for each metric that is checked in a group; for `crashed` only if it failed or is alone."""
@@ -156,13 +172,13 @@ def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
             )
 
 
-def finding(summary: RegressSummary) -> str:
+def _finding(summary: RegressSummary) -> str:
     """Return the result in one line."""
     failed, flights = len(summary.failed), len(summary.flights)
     return f"{flights - failed} of {flights} flights passed" + (f", {failed} failed" if failed else "")
 
 
-def remarks(summary: RegressSummary) -> list[str]:
+def _remarks(summary: RegressSummary) -> list[str]:
     """Return what a reader should know of the baseline."""
     if summary.baseline is None:
         return ["compared with the bounds only; --update records this run for later ones"]
@@ -177,30 +193,12 @@ def remarks(summary: RegressSummary) -> list[str]:
     return found
 
 
-def regress_text(summary: RegressSummary, folder: str) -> str:
-    """Return a summary as text: a row per group and metric, then the failed flights."""
-    flown = f"{echo(summary.suite)} with {summary.controller} on {' and '.join(map(echo, summary.vehicles))}"
-    lines = [sentence(f"{flown}: {finding(summary)}")]
-    lines += [sentence(one) for one in remarks(summary)]
-    ratio = () if summary.baseline is None else ("over recorded",)
-    heads = ("group", "metric", "bound", "median", "worst", *ratio, "at limit", "failed")
-    rows = [_cells(row, has_ratio=bool(ratio)) for row in group_rows(summary)]
-    lines += ["", *table(heads, rows, (0, 1))]
-    if summary.failed:
-        lines.append("")
-    for flight in summary.failed[:MOST_SHOWN]:
-        lines.append(sentence(f"{flight.name}: {'; '.join(flight.failures)}", "    "))
-        lines.append(f"    mambo-nmpc fly --repeat {echo(folder)}/{flight.record}")
-    if len(summary.failed) > MOST_SHOWN:
-        lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
-    return "\n".join(lines)
-
-
-def _cells(row: GroupRow, *, has_ratio: bool) -> tuple[str, ...]:
-    numbers = (row.bound, row.middle, row.worst, *([row.over_recorded] if has_ratio else []))
-    shown = ("-" if number is None else digits(number) for number in numbers)
-    failed = f"{row.failed} of {row.flights}"
-    return (row.group, row.title, *shown, f"{100.0 * row.saturated_share:.1f} %", failed)
+def _cells(row: GroupRow) -> tuple[str, ...]:
+    numbers = (
+        "-" if one is None else digits(one) for one in (row.bound, row.middle, row.worst, row.over_recorded)
+    )
+    at_limit, failed = f"{100.0 * row.saturated_share:.1f} %", f"{row.failed} of {row.flights}"
+    return (row.group, titled(row.metric), *numbers, at_limit, failed)
 
 
 def junit_xml(summary: RegressSummary) -> bytes:

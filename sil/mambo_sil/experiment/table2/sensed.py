@@ -27,9 +27,9 @@ from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.results.blocks import CommandResult, Note, ResultTable
 from mambo_sil.results.number_format import digits, distance
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import table
+from mambo_sil.results.summary import Number, ReportedSummary
 
 PRESETS: Final = ("mambo", "table1")
 """Presets that are compared with the PDs."""
@@ -72,12 +72,15 @@ class SensedSummary(ReportedSummary):
     """Scalar type in place of the presets', if any."""
     rows: list[SensedRow]
 
-    def section(self, _folder: Path) -> Section:
-        """Return the section of the report on these flights."""
-        lost, flown = (sum(getattr(row, key) for row in self.rows) for key in ("lost", "flights"))
-        content = {"rows": self.rows, "indices": INDICES}
-        good = False if lost else None
-        return Section("sensed", "Table II with sensors", good, f"{flown} flights, {lost} lost", content)
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: the rows below those printed in the paper."""
+        answer = [
+            f"{row.controller}, sensors {row.view}: {distance(row.tracked[0] / DURATION_S)} in the mean"
+            for row in self.rows
+            if row.flights > 1
+        ]
+        good = False if any(row.lost for row in self.rows) else None
+        return CommandResult("Table II with sensors", good, answer, [_table(self.rows), Note(_ABOUT)])
 
 
 def fly_sensed(
@@ -125,28 +128,21 @@ def _judge(name: str, view: str, trace: Trace) -> SensedRow:
     )
 
 
-_HEADS = ("controller", "sensors", "flights", *INDICES, "worst IAE", "IAE as estimated", "drift, m")
-
-
-_SHOWN = (0, 1, 2, 3, 7, 8, 9)
-"""The columns that the text has; the Markdown table has all."""
-
-
-def sensed_text(rows: Sequence[SensedRow]) -> str:
-    """Return the rows as text, below those printed in the paper."""
-    lines = [
-        f"{row.controller}, sensors {row.view}: {distance(row.tracked[0] / DURATION_S)} in the mean"
-        for row in rows
-        if row.flights > 1
-    ]
-    shown = [[row[index] for index in _SHOWN] for row in (_HEADS, *_cells(rows))]
-    return "\n".join([*lines, "", *table(shown[0], shown[1:], (0, 1))])
+_HEADS: Final = ("controller", "sensors", "flights", *INDICES, "worst IAE", "IAE as estimated", "drift, m")
+_ABOUT: Final = (
+    "The Table II case, medians over the flights of a row. Indices are of the true error, those as estimated "
+    "of the error of the estimated position; drift is the error of the position estimate at the end. IAE in "
+    "m s, ISE in m^2 s, ITSE in m^2 s^2, ITAE in m s^2."
+)
 
 
 def sensed_markdown(rows: Sequence[SensedRow]) -> str:
-    """Return the same rows as a Markdown table."""
-    lines = [_HEADS, ("---",) * 3 + ("---:",) * 7, *_cells(rows)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    """Return the rows as a Markdown table."""
+    return _table(rows).markdown()
+
+
+def _table(rows: Sequence[SensedRow]) -> ResultTable:
+    return ResultTable(_HEADS, list(_cells(rows)), (0, 1, 2), (4, 5, 6))
 
 
 def _cells(rows: Sequence[SensedRow]) -> Iterator[tuple[str, ...]]:

@@ -12,21 +12,22 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.flight_report import flight_pictures
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
-from mambo_sil.flight.traces import Trace, read_existing
+from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
+from mambo_sil.results.blocks import CommandResult, ResultTable, Sentence
 from mambo_sil.results.number_format import digits, distance, three_digits
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import Number, ReportedSummary
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
 UNITS: Final = ("m s", "m^2 s", "m^2 s^2", "m s^2")
 PRINTED_PD: Final = (63.02, 47.86, 2460.0, 3200.0)
 PRINTED_NMPC: Final = (19.11, 5.27, 204.23, 862.77)
 PRINTED_IMPROVEMENT: Final = (3.3, 9.1, 12.0, 3.7)
-_PRINTED: Final = [(PD, PRINTED_PD, None), ("NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
+CAPTION: Final = "Fig. 3 of the paper, reproduced: path, horizontal error, commanded and actual angles."
 
 CASES: Final[dict[str, Trajectory]] = {
     "Bernoulli 0.5 rad/s": Bernoulli(2.0, 0.5),
@@ -77,31 +78,57 @@ class Table2Summary(ReportedSummary):
     rows: list[Table2Row]
     claims: list[Claim]
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report, with the flights of the PDs and of `mambo`; raises TraceError."""
-        from mambo_sil.flight.flight_plots import page_pictures  # noqa: PLC0415 - loaded when drawing
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result: a table for each case, printed above flown, and the claims.
 
+        A page has the flights of the PDs and of `mambo`; drawing raises TraceError.
+        """
         controllers = list(dict.fromkeys(row.controller for row in self.rows))
         pds = PD_TITLES.values()
         nmpc = [name for name in controllers if name not in pds]
-        shown = next((name for name in ("mambo", *nmpc) if name in nmpc), None)
-        wanted = {name: name for name in pds if name in controllers}
-        if shown is not None:
-            wanted[f"NMPC, {shown}"] = shown
-        flights, missing = read_existing(
-            folder, {title: f"{name.lower()}.npz" for title, name in wanted.items()}
-        )
-        cases = list(dict.fromkeys(row.case for row in self.rows))
-        tables = [
-            (case, _PRINTED if case == cases[0] else [], [row for row in self.rows if row.case == case])
-            for case in cases
+        shown = "mambo" if "mambo" in nmpc else next(iter(nmpc), None)
+        drawn = {name: f"{name.lower()}.npz" for name in pds if name in controllers}
+        drawn |= {} if shown is None else {f"NMPC, {shown}": f"{shown.lower()}.npz"}
+        claims = [
+            ("holds" if claim.holds else "does not hold", f"{claim.text}: {claim.evidence}")
+            for claim in self.claims
         ]
-        held = sum(claim.holds for claim in self.claims)
-        finding = f"{held} of {len(self.claims)} claims of the paper hold as flown here"
-        content = {"indices": INDICES, "tables": tables, "claims": self.claims, **page_pictures(flights)}
-        return Section(
-            "table2", "Table II of the paper", None, finding, content, missing, moves=bool(flights)
+        return CommandResult(
+            "Table II of the paper",
+            None,
+            [
+                f"{row.controller} on {vehicle_toml.DEFAULT}: "
+                f"{distance(row.measured[0] / DURATION_S)} in the mean on {row.case}"
+                for row in self.rows
+                if row.case == self.cases[0]
+            ],
+            [
+                *(_case_table(case, self.rows) for case in self.cases),
+                Sentence("printed: in the paper; flown: here, 100 s along a figure of eight of 4 m"),
+                Sentence("improvement: IAE of the flown PD, or the printed one, divided by the row's"),
+                Sentence("variation: the mean change of the command from one update to the next"),
+                ResultTable(("verdict", "the paper's claims, as flown here"), claims, (0, 1)),
+                *flight_pictures(folder, drawn, CAPTION),
+            ],
         )
+
+
+def _case_table(case: str, rows: Sequence[Table2Row]) -> ResultTable:
+    """Return what is printed for a case, if anything, above what was flown."""
+    printed = [("printed PD", PRINTED_PD, None, ""), ("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
+    lines: list[tuple[str, Four, Four | None, str]] = printed if case == next(iter(CASES)) else []
+    lines += [
+        (f"flown {row.controller}", row.measured, row.improvement, f"{row.command_variation_rad:.4f}")
+        for row in rows
+        if row.case == case
+    ]
+    units = [f"{index}, {unit}" for index, unit in zip(INDICES, UNITS, strict=True)]
+    heads = (case, *units, "improvement", *(f"of {index}" for index in INDICES[1:]), "variation, rad")
+    cells = [
+        (name, *map(digits, values), *map(digits, ratios or ()), *[""] * (0 if ratios else 4), variation)
+        for name, values, ratios, variation in lines
+    ]
+    return ResultTable(heads, cells, (0,), (6, 7, 8))
 
 
 def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:
@@ -132,47 +159,6 @@ def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summa
     presets = [row for row in rows if row.controller not in PD_TITLES.values()]
     claims += [_improvement_claim(row) for row in presets if row.case == next(iter(CASES))]
     return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=claims)
-
-
-def table2_text(summary: Table2Summary) -> str:
-    """Return Table II as text: the answer, a table for each case, printed above flown, then the claims."""
-    shortest = next(iter(CASES))
-    drone = vehicle_toml.DEFAULT
-    lines = [
-        f"{row.controller} on {drone}: {distance(row.measured[0] / DURATION_S)} in the mean on {shortest}"
-        for row in summary.rows
-        if row.case == shortest
-    ]
-    for case in CASES:
-        rows = []
-        if case == shortest:
-            rows += [_line("printed PD", PRINTED_PD, None, "")]
-            rows += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
-        rows += [
-            _line(
-                f"flown {row.controller}", row.measured, row.improvement, f"{row.command_variation_rad:.4f}"
-            )
-            for row in summary.rows
-            if row.case == case
-        ]
-        units = (f"{index}, {unit}" for index, unit in zip(INDICES, UNITS, strict=True))
-        lines += ["", *table((case, *units, "improvement", "variation, rad"), rows)]
-    lines += [
-        "",
-        sentence("printed: in the paper; flown: here, 100 s along a figure of eight of 4 m"),
-        sentence("improvement: IAE of the flown PD, or of the printed one, divided by that of the row"),
-        sentence("variation: the mean change of the command from one update to the next"),
-        "",
-    ]
-    claims = [
-        ("holds" if claim.holds else "does not hold", f"{claim.text}: {claim.evidence}")
-        for claim in summary.claims
-    ]
-    return "\n".join([*lines, *table(("verdict", "the paper's claims, as flown here"), claims, (0, 1))])
-
-
-def _line(name: str, values: Four, improvement: Four | None, variation: str) -> tuple[str, ...]:
-    return (name, *map(digits, values), "" if improvement is None else digits(improvement[0]), variation)
 
 
 def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:

@@ -1,15 +1,18 @@
-"""The record of an identification: its summary, what it found in words, and the section of the report."""
+"""The record of an identification: its summary and its result."""
 
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from markupsafe import Markup
+
 from mambo_sil.model.identify.estimator import VelocityErrors
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.model.identify.signals import DEGREE
+from mambo_sil.results.blocks import CommandResult, Note, Picture, ResultTable, Sentence
 from mambo_sil.results.number_format import three_digits
-from mambo_sil.results.summary import Number, ReportedSummary, Section
+from mambo_sil.results.summary import Number, ReportedSummary
 
 Verdict = Literal["good", "weak", "refused"]
 
@@ -20,6 +23,14 @@ PICTURES: Final = ("fit.png", "fit.svg")
 AXIS_ROWS: Final = (
     *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
     *("without it, vehicle.toml", "held-out R2", "verdict"),
+)
+ADVICE: Final = (
+    "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
+    "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
+)
+FIT_CAPTION: Final = (
+    "Twelve seconds of the longest stretch. The model is driven by the command alone; it was fitted to the "
+    "first half of each stretch, and predicts the second, shaded half."
 )
 
 
@@ -125,24 +136,48 @@ class IdentifySummary(ReportedSummary):
         """The verdict on each axis by name."""
         return {name: axis.verdict for name, axis in self.axes.items()}
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this identification; raises ResultsError."""
-        from mambo_sil.model.identify.identify_plots import fit_panel  # noqa: PLC0415 - loaded when drawing
+    @property
+    def answer(self) -> list[str]:
+        """The model of each axis in a line."""
+        found = {name: axis_cells(axis) for name, axis in self.axes.items()}
+        return [
+            f"{name}: {one[-1]}; gain {one[0]}, lag + dead time {one[1]} ms" for name, one in found.items()
+        ]
 
-        curves = folder / CURVES
-        there = curves.is_file()
-        content = {
-            "heads": AXIS_ROWS,
-            "axes": [(name, axis, axis_cells(axis)) for name, axis in self.axes.items()],
-            "facts": dict([*motion_rows(self), *thrust_rows(self), *noise_rows(self)]),
-            "thrust": self.thrust,
-            "logs": self.logs,
-            "remarks": self.remarks,
-            "picture": fit_panel(curves, self.split_s, self.verdicts) if there else None,
-        }
-        missing = [] if there else [CURVES]
-        title = f"Identification from {', '.join(log.name for log in self.logs)}"
-        return Section("identify", title, self.good, finding(self), content, missing)
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result: the model with its 95 % intervals, then what the logs showed."""
+
+        def picture() -> list[Markup]:
+            from mambo_sil.model.identify.identify_plots import fit_panel  # noqa: PLC0415 - loaded when drawing
+
+            return [fit_panel(folder / CURVES, self.split_s, self.verdicts)]
+
+        cells = {name: axis_cells(axis) for name, axis in self.axes.items()}
+        parts: dict[str, AxisResult | ThrustResult] = {**self.axes}
+        parts |= {} if self.thrust is None else {"thrust": self.thrust}
+        said = [f"{name} is {one.verdict}: {reason}" for name, one in parts.items() for reason in one.reasons]
+        advice = [] if all(axis.verdict == "good" for axis in self.axes.values()) else [ADVICE]
+        return CommandResult(
+            f"Identification from {', '.join(log.name for log in self.logs)}",
+            self.good,
+            self.answer,
+            [
+                *map(Sentence, said),
+                Picture(picture, FIT_CAPTION, [folder / CURVES]),
+                ResultTable(("", *self.axes), list(zip(AXIS_ROWS, *cells.values(), strict=True)), (0, 1, 2)),
+                Note("With 95 % intervals. Lag plus dead time is known better than either."),
+                ResultTable((), [*motion_rows(self), *thrust_rows(self), *noise_rows(self)]),
+                *(Sentence(_log(log)) for log in self.logs),
+                *map(Sentence, [*self.remarks, *advice]),
+            ],
+        )
+
+
+def _log(log: LogResult) -> str:
+    """Return how much of a log was used, and its columns with another name than their signal."""
+    renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
+    used = f"{log.name}: {log.duration_s:.1f} s used"
+    return f"{used}; {', '.join(renamed)}" if renamed else used
 
 
 def axis_cells(axis: AxisResult) -> list[str]:
@@ -208,19 +243,6 @@ def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         words = f"{error} m/s, correlated for {lasts} s"
         rows.append(("error of the estimated velocity", words))
     return rows
-
-
-def finding(summary: IdentifySummary) -> str:
-    """Return the result in one line."""
-    parts = []
-    for name, axis in summary.axes.items():
-        fit = axis.fitted
-        parts.append(
-            f"{name} refused"
-            if fit is None
-            else f"{name} {axis.verdict}: gain {fit.gain.value:.2f}, {1e3 * fit.sum_s.value:.0f} ms"
-        )
-    return "; ".join(parts)
 
 
 def _plus_minus(estimate: Interval, factor: float, decimals: int) -> str:

@@ -1,55 +1,14 @@
-"""An identification as text, as section [model] of a controller.toml, and as vehicle.toml."""
+"""An identification as section [model] of a controller.toml, and as vehicle.toml."""
 
 from typing import Final
 
-from mambo_sil.model.identify.identify_record import (
-    AXIS_ROWS,
-    IdentifySummary,
-    axis_cells,
-    finding,
-    motion_rows,
-    noise_rows,
-    thrust_rows,
-)
+from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.identify.response import Interval
 from mambo_sil.results.number_format import three_digits
-from mambo_sil.results.terminal import sentence, table
-
-ADVICE: Final = (
-    "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
-    "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
-)
 
 UNKNOWN_MASS: Final = (
     "# mass_kg =  # with battery: no log shows it; write it here, or identify with --mass-kg"
 )
-
-
-def identify_text(summary: IdentifySummary) -> str:
-    """Return an identification as text: the model with its 95 % intervals, then what the logs showed."""
-    cells = list(zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True))
-    lines = [
-        f"{name}: {axis.verdict}; gain {gain}, lag + dead time {lag} ms"
-        for (name, axis), gain, lag, *_ in zip(summary.axes.items(), *cells[:2], strict=True)
-    ]
-    for name, axis in summary.axes.items():
-        lines += [sentence(f"{name} is {axis.verdict}: {reason}") for reason in axis.reasons]
-    if summary.thrust is not None:
-        lines += [
-            sentence(f"thrust is {summary.thrust.verdict}: {reason}") for reason in summary.thrust.reasons
-        ]
-    rows = [(words, *row) for words, row in zip(AXIS_ROWS, cells, strict=True)]
-    lines += ["", *table(("", *summary.axes), rows, range(len(summary.axes) + 1)), ""]
-    lines += table((), [*motion_rows(summary), *thrust_rows(summary), *noise_rows(summary)], (0, 1))
-    lines.append("")
-    for log in summary.logs:
-        renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
-        used = f"{log.name}: {log.duration_s:.1f} s used"
-        lines.append(sentence(f"{used}; {', '.join(renamed)}" if renamed else used, "  "))
-    lines += [sentence(remark, "  ") for remark in summary.remarks]
-    if any(axis.verdict != "good" for axis in summary.axes.values()):
-        lines.append(sentence(ADVICE))
-    return "\n".join(lines)
 
 
 def model_text(summary: IdentifySummary) -> str:
@@ -149,10 +108,11 @@ def _sensors_lines(summary: IdentifySummary) -> list[str]:
 
 def _heading(summary: IdentifySummary) -> list[str]:
     """Return the first comment lines of a file: what it describes, and from which logs."""
-    first = (
-        f"# Identified by {summary.generator} on {summary.duration_s:.0f} s of flight: {finding(summary)}."
-    )
-    return [first, *(f"# {log.name}, {log.duration_s:.0f} s" for log in summary.logs)]
+    flown = f"# Identified by {summary.generator} on {summary.duration_s:.0f} s of flight"
+    return [
+        f"{flown}: {'; '.join(summary.answer)}.",
+        *(f"# {log.name}, {log.duration_s:.0f} s" for log in summary.logs),
+    ]
 
 
 def _half_widths(summary: IdentifySummary) -> dict[str, float]:

@@ -1,18 +1,22 @@
-"""How the replayed commands differ from the log's: record, text, section of the report."""
+"""How the replayed commands differ from the log's: record and result."""
 
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from markupsafe import Markup
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.replay.log_replay import AXES, SETTLING_S, LogReplay
 from mambo_sil.model.replay.replay_verdict import SAME, ReplayVerdict, errors_of, judge
-from mambo_sil.results.summary import Number, ReportedSummary, Section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.blocks import CommandResult, Facts, Picture, ResultTable, Sentence
+from mambo_sil.results.summary import Number, ReportedSummary
 
 CURVES: Final = "replay.csv"
 PICTURES: Final = ("replay.png", "replay.svg")
+CAPTION: Final = (
+    "The logged commands, those of the compiled controller on the logged inputs, and their difference."
+)
 
 
 class LogReplaySummary(ReportedSummary):
@@ -54,22 +58,25 @@ class LogReplaySummary(ReportedSummary):
         """Whether the log is one of this controller; None if that cannot be told."""
         return None if self.verdict is ReplayVerdict.CANNOT_TELL else self.verdict is ReplayVerdict.YES
 
-    def section(self, folder: Path) -> Section:
-        """Return the section of the report on this replay; raises ResultsError."""
-        from mambo_sil.model.replay.replay_plots import replay_panel  # noqa: PLC0415 - loaded when drawing
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this replay; drawing raises ResultsError."""
 
-        curves = folder / CURVES
-        there = curves.is_file()
-        content = {
-            "facts": {
-                "controller": f"settings {self.settings[:16]} of {self.source}",
-                **dict(rows(self)),
-            },
-            "remarks": self.remarks,
-            "picture": replay_panel(curves) if there else None,
-        }
-        missing = [] if there else [CURVES]
-        return Section("replay", f"Replay of {self.log}", self.good, finding(self), content, missing)
+        def picture() -> list[Markup]:
+            from mambo_sil.model.replay.replay_plots import replay_panel  # noqa: PLC0415 - loaded when drawing
+
+            return [replay_panel(folder / CURVES)]
+
+        return CommandResult(
+            f"Replay of {self.log}",
+            self.good,
+            [_finding(self)],
+            [
+                Picture(picture, CAPTION, [folder / CURVES]),
+                Facts({"controller": f"settings {self.settings[:16]} of {self.source}"}),
+                ResultTable((), _rows(self)),
+                *map(Sentence, self.remarks),
+            ],
+        )
 
 
 def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogReplaySummary:
@@ -122,7 +129,7 @@ def _of(difference_rad: FloatArray, time_s: FloatArray) -> tuple[Pair, Pair, Pai
     )
 
 
-def finding(summary: LogReplaySummary) -> str:
+def _finding(summary: LogReplaySummary) -> str:
     """Say in one line whether the log is one of this controller."""
     miss = f"{100.0 * max(summary.miss):.2g} % of the logged command's motion"
     match summary.verdict:
@@ -136,8 +143,8 @@ def finding(summary: LogReplaySummary) -> str:
     return f"the commands of the log are those of this controller: it misses {miss}"
 
 
-def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
-    """Return name and value of what text and page show."""
+def _rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
+    """Return name and value of what was compared."""
     first = summary.first_different_s
     later = "" if first is None else f", the first other one after {first:.2f} s"
     lines = [
@@ -167,9 +174,3 @@ def rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
     if summary.resampled:
         lines.append(("rate", "the log has another rate than the controller: its inputs are interpolated"))
     return lines
-
-
-def replay_text(summary: LogReplaySummary) -> str:
-    """Format a summary."""
-    lines = [sentence(finding(summary)), "", *table((), rows(summary), (0, 1))]
-    return "\n".join([*lines, *map(sentence, summary.remarks)])

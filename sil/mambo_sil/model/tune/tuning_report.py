@@ -1,4 +1,4 @@
-"""The record of a study: what the command prints, and the summary in its folder."""
+"""The record of a study: its result, and the summary in its folder."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,10 +12,10 @@ from mambo_sil.experiment.campaign.store import convert_os_errors
 from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv, pareto_front
 from mambo_sil.model.tune.study import FinishedTrial, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
+from mambo_sil.results.blocks import CommandResult, Details, Facts, ResultTable, Sentence
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.number_format import digits, distance
-from mambo_sil.results.summary import PageTable, ReportedSummary, Section, plain_section
-from mambo_sil.results.terminal import sentence, table
+from mambo_sil.results.summary import ReportedSummary
 
 CONTROLLER: Final = "controller.toml"
 FRONT: Final = "front"
@@ -41,14 +41,32 @@ class TuneSummary(ReportedSummary):
     rule: str
     front: list[FinishedTrial]
 
-    def section(self, _folder: Path, /) -> Section:
-        """Return the section of the report: base and chosen trial, and the trials of the front."""
-        values = [f"{key} {value:g}" for key, value in self.chosen.values.items()]
-        front = [_row(self, "front", one) for one in self.front]
-        named = PageTable(_HEADS, [*_rows(self), *front])
-        title = f"Tuning with {self.trials} trials, vehicle {self.vehicle.name}"
-        said = [f"Chosen: {self.rule}.", f"Its settings: {', '.join(values)}."]
-        return plain_section(title, None, _answer(self), [named], sentences=said)
+    def result(self, _folder: Path, /) -> CommandResult:
+        """Return the result: base, chosen trial, and on a page the trials of the front."""
+        chosen, base = self.chosen, self.base
+        mean = distance(chosen.iae_m_s / self.duration_s)
+        answer = f"trial {chosen.number} of {self.trials}: {mean} in the mean"
+        answer += f", the base {distance(base.iae_m_s / self.duration_s)}" if base is not None else ""
+        answer += f"; {chosen.crashed} of {self.flights} flights crashed"
+        values = ", ".join(f"{key} {value:g}" for key, value in chosen.values.items())
+        named = {"base": base, "chosen": chosen}
+        rows = [self._row(name, one) for name, one in named.items() if one is not None]
+        front = [self._row("front", one) for one in self.front]
+        return CommandResult(
+            f"Tuning with {self.trials} trials, vehicle {self.vehicle.name}",
+            None,
+            [answer],
+            [
+                Sentence(f"chosen: {self.rule}"),
+                Facts({"its settings": values}),
+                ResultTable(_HEADS, rows),
+                Details("Pareto front", [ResultTable(_HEADS, front)]),
+            ],
+        )
+
+    def _row(self, name: str, one: FinishedTrial) -> tuple[str, ...]:
+        figures = (digits(one.iae_m_s), digits(one.command_variation_rad))
+        return (name, str(one.number), *figures, f"{one.crashed} of {self.flights}")
 
 
 def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
@@ -85,36 +103,6 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
         put(folder / CONTROLLER, controller_text(tuning, trials).encode())
         put(folder / SUMMARY, summary.text().encode())
     return summary
-
-
-def tune_text(summary: TuneSummary) -> str:
-    """Return base and chosen trial as text: the answer, the rule of the choice, and a table."""
-    lines = [sentence(_answer(summary)), sentence(f"chosen: {summary.rule}"), ""]
-    return "\n".join([*lines, *table(_HEADS, _rows(summary))])
-
-
-def _answer(summary: TuneSummary) -> str:
-    """Return how closely the chosen trial flies, and the base, if it has flown."""
-    chosen, base = summary.chosen, summary.base
-    answer = f"trial {chosen.number} of {summary.trials}: {distance(chosen.iae_m_s / summary.duration_s)}"
-    answer += " in the mean"
-    answer += f", the base {distance(base.iae_m_s / summary.duration_s)}" if base is not None else ""
-    return f"{answer}; {chosen.crashed} of {summary.flights} flights crashed"
-
-
-def _rows(summary: TuneSummary) -> list[tuple[str, ...]]:
-    named = {"base": summary.base, "chosen": summary.chosen}
-    return [_row(summary, name, one) for name, one in named.items() if one is not None]
-
-
-def _row(summary: TuneSummary, name: str, one: FinishedTrial) -> tuple[str, ...]:
-    return (
-        name,
-        str(one.number),
-        digits(one.iae_m_s),
-        digits(one.command_variation_rad),
-        f"{one.crashed} of {summary.flights}",
-    )
 
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:
