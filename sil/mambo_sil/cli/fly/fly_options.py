@@ -26,7 +26,8 @@ RATE_RAD_S: Final = 0.5
 CurveChoice = Annotated[
     str,
     typer.Option(
-        help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m.", metavar="CURVE"
+        help=f"{', '.join(CURVE_NAMES)}, or a CSV file with time_s, x_m, y_m, or duration, x^0, x^1 ...",
+        metavar="CURVE",
     ),
 ]
 CurveSize = Annotated[
