@@ -99,7 +99,7 @@ ROOMS: Final = {
     "derive": Room(
         source=("sil/mambo_sil/model/derive/*.py",),
         tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "settings")),
-        without=("derived_margins.py", "derived_flight.py"),
+        without=("derived_margins.py", "derived_flight.py", "chosen_tilt.py"),
     ),
     "design": Room(
         source=("sil/mambo_sil/model/derive/derived_margins.py",),
@@ -144,7 +144,7 @@ ROOMS: Final = {
         ),
     ),
     "derived flight": Room(
-        source=("sil/mambo_sil/model/derive/derived_flight.py",),
+        source=tuple(f"sil/mambo_sil/model/derive/{name}.py" for name in ("derived_flight", "chosen_tilt")),
         tests=("tests/model/derive/test_derived_flight.py",),
         longest_s=4.0,
     ),
