@@ -15,7 +15,7 @@ from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text
+from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, is_strong
 from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.scenarios import changed
 
@@ -238,6 +238,30 @@ def test_a_flow_deck_has_a_noise_of_its_own() -> None:
     )
     assert deck.position_noise > 10 * captured.position_noise
     assert deck.age_s == 0.01
+
+
+@pytest.mark.parametrize(("ratio", "found"), [(2.49, False), (2.5, True), (2.6, True), (11.0, True)])
+def test_a_strong_drone_has_thrust_and_a_height(ratio: float, found: bool) -> None:
+    """From 2.5 times its weight on; not without a known thrust, nor behind a Mambo's optical flow."""
+    lag = {"lag_s": 0.05}
+    assert is_strong(strong(ratio, thrust=lag)) is found
+    assert not is_strong(strong(ratio))
+    mambo = vehicle_toml.preset("mambo")
+    assert not is_strong(changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n}))
+
+
+@pytest.mark.parametrize("ratio", [2.6, 4.0, 10.0])
+def test_exact_settings_have_half_of_the_possible_tilt(ratio: float) -> None:
+    """And brake as small angles do, whose limit is 0.5."""
+    drone = strong(ratio, thrust={"lag_s": 0.05})
+    exact = controller_toml.parse(controller_text(drone, "mine", exact=True), "mine")
+    small = settings_for(drone)
+    assert (exact.model.tilt, small.model.tilt) == ("exact", "small-angle")
+    assert exact.limits.tilt_rad == pytest.approx(math.acos(1.0 / ratio) / 2.0, rel=ROUNDED)
+    assert (small.limits.tilt_rad, exact.limits.braking_m_s2) == (0.5, small.limits.braking_m_s2)
+    assert exact.guard is not None
+    assert exact.guard.tilt_rad == pytest.approx(3.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
+    assert exact.guard.tilt_rad_s == pytest.approx(12.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
 
 
 def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -17,7 +18,12 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.model.derive.chosen_tilt import chosen_text
-from mambo_sil.model.derive.derived_flight import _fault, flies_quick_circle, fly_derived
+from mambo_sil.model.derive.derived_flight import (
+    _fault,
+    flies_quick_circle,
+    fly_derived,
+    quick_rate_rad_s,
+)
 from mambo_sil.model.derive.derived_settings import controller_text, is_strong
 from tests.support.scenarios import CRAZYFLIE
 
@@ -86,6 +92,13 @@ def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survi
     assert chosen == (exact if survives else settings_for(drone))
     found = (chosen.model.tilt, chosen.limits.tilt_rad)
     assert found == (("exact", 0.74) if survives else ("small-angle", 0.5))
+
+
+def test_the_quick_circle_asks_for_more_than_the_tilt_limit() -> None:
+    """Its acceleration, r w^2, is 1.2^2 times g tan of the limit."""
+    for tilt_rad in (0.4, 0.74):
+        acceleration_m_s2 = 1.0 * quick_rate_rad_s(tilt_rad) ** 2
+        assert acceleration_m_s2 == pytest.approx(1.44 * GRAVITY_M_S2 * math.tan(tilt_rad))
 
 
 def test_the_quick_circle_has_slower_rotors() -> None:

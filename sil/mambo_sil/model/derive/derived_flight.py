@@ -12,11 +12,11 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.crashes import detect_crashes, first_crash
+from mambo_sil.flight.crashes import first_crash
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.metrics import height_error_m
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import SENSORS_OF, SensorsName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.flight.trajectories import Circle, Hover, Trajectory
@@ -54,7 +54,7 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
 
     A height is judged only if the settings hold it. Raises BuildError, CacheError.
     """
-    sensors = SENSORS_OF[drone.sensors.kind][-1]
+    sensors = _own_sensors(drone)
     trace = _flown(settings, drone, Hover(), START)
     where = "true state" if sensors == "true" else f"through sensors {sensors}"
     fault = _fault(trace, drone, axes=2 if settings.height is None else 3)
@@ -63,21 +63,30 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
     return FlownSettings(good=True, words=f"flown for {DURATION_S:g} s: stays at its target ({where})")
 
 
-def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
-    """Return whether a drone with slower rotors survives a circle of 1 m that asks for more than its tilt.
+def quick_rate_rad_s(tilt_rad: float) -> float:
+    """Return the rate of a circle of 1 m that asks for more than a tilt limit."""
+    return QUICK_CIRCLE * math.sqrt(GRAVITY_M_S2 * math.tan(tilt_rad))
 
-    Lost is a drone that crashes, or whose height is a metre off. Raises BuildError, CacheError.
+
+def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
+    """Return whether a drone with slower rotors survives a circle that asks for more than its tilt limit.
+
+    Lost is a drone whose height is a metre off, as that of one that lies on the ground is.
+    Raises BuildError, CacheError.
     """
-    rate_rad_s = QUICK_CIRCLE * math.sqrt(GRAVITY_M_S2 * math.tan(settings.limits.tilt_rad))
     parts = {name: getattr(drone, name) for name in ("rotors", "thrust")}
     slower = {
         name: part.model_copy(update={"lag_s": SLOWER_ROTORS * part.lag_s})
         for name, part in parts.items()
         if part is not None
     }
-    trace = _flown(settings, drone.model_copy(update=slower), Circle(1.0, rate_rad_s), Offset())
-    off_m = np.abs(height_error_m(trace))
-    return not detect_crashes(trace, drone).any() and bool((off_m < LOST_HEIGHT_M).all())
+    circle = Circle(1.0, quick_rate_rad_s(settings.limits.tilt_rad))
+    trace = _flown(settings, drone.model_copy(update=slower), circle, Offset())
+    return bool((np.abs(height_error_m(trace)) < LOST_HEIGHT_M).all())
+
+
+def _own_sensors(drone: VehicleFile) -> SensorsName:
+    return SENSORS_OF[drone.sensors.kind][-1]
 
 
 def _flown(settings: Settings, drone: VehicleFile, trajectory: Trajectory, offset: Offset) -> Trace:
@@ -91,7 +100,7 @@ def _flown(settings: Settings, drone: VehicleFile, trajectory: Trajectory, offse
         update_period_s=settings.horizon.update_period_s,
         seeds=tuple(range(HEADINGS)),
         offset=offset,
-        sensors=choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone),
+        sensors=choose_sensors(_own_sensors(drone), drone),
     )
     return fly(flight, CompiledController(settings, HEADINGS))
 
