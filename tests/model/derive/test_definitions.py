@@ -126,6 +126,10 @@ def test_the_height_is_what_thrust_and_lag_allow(ratio: float, lag_s: float, dea
     most_m_s2 = min(0.95 * drone.altitude.thrust_max_n / drone.body.mass_kg, 100.0)
     assert height.thrust_max_m_s2 == pytest.approx(most_m_s2, rel=ROUNDED)
     assert height.thrust_min_m_s2 == pytest.approx(0.3 * GRAVITY_M_S2, rel=0.02)
+    swing_m_s2 = height.thrust_max_m_s2 - height.thrust_min_m_s2
+    assert settings.guard is not None
+    assert settings.guard.thrust_m_s2 == pytest.approx(swing_m_s2, rel=ROUNDED)
+    assert settings.guard.thrust_m_s3 == pytest.approx(8.0 * swing_m_s2, rel=ROUNDED)
     constants = method_of(settings)
     braked_m_s = getattr(constants, "height").most_m_s[1]  # noqa: B009 - of the quadratic cost only
     assert height.descent_m_s <= braked_m_s

@@ -311,7 +311,7 @@ def _guard(drone: VehicleFile, height: list[Derived], *, exact: bool) -> Iterato
     words = f"{TILT_SWINGS:g} times limits.tilt_rad: swings are free, and a mixer keeps its thrust"
     yield Derived("guard", "tilt_rad", _round(TILT_SWINGS * tilt_rad), words)
     words = f"{TILT_SWINGS_1_S:g} times limits.tilt_rad in a second: commands that rattle by more are bounded"
-    yield Derived("guard", "tilt_rad_s", _round(max(TILT_SWINGS_1_S * tilt_rad, 0.1)), words)
+    yield Derived("guard", "tilt_rad_s", _round(TILT_SWINGS_1_S * tilt_rad), words)
     found = {each.key: float(each.value) for each in height}
     if not found:
         return
