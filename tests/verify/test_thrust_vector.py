@@ -1,19 +1,14 @@
 """A controller with the thrust vector: every check passes it, and a fault in it is found."""
 
-from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 
 import pytest
 
-from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import fuzzing, rules
-from mambo_sil.verify.calls import Outcomes, Tape, answers
-from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
 from tests.support import proven
 from tests.support.height import height_case
-from tests.support.subjects import Harm, played_fault, subject
+from tests.support.subjects import Harm, few_played, played_fault, subject
 from tests.support.tools import require
 
 VECTOR = 6
@@ -37,19 +32,12 @@ FAULTS = {
 }
 
 
-@lru_cache(maxsize=1)
-def played(settings: Settings) -> tuple[Sequence[Tape], Sequence[Outcomes]]:
-    """Return few random tapes, and what the reference answers."""
-    tapes = random_tapes(settings, 60)
-    return tapes, answers(settings, tapes)
-
-
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_random_calls_have_the_bits_of_the_reference(scalar: str, tmp_path: Path) -> None:
     """Commands, what limits act, and all that is stored."""
     settings = height_case(VECTOR, scalar)
-    assert played_fault(subject(settings, tmp_path), "-O0", played=played(settings)) is None
+    assert played_fault(subject(settings, tmp_path), "-O0", played=few_played(settings)) is None
 
 
 @pytest.mark.first_is_quick
@@ -57,7 +45,7 @@ def test_random_calls_have_the_bits_of_the_reference(scalar: str, tmp_path: Path
 def test_a_fault_in_the_thrust_vector_is_found(fault: str, tmp_path: Path) -> None:
     """By other bits than those of the reference."""
     settings = height_case(VECTOR, "float32")
-    found = played_fault(subject(settings, tmp_path, FAULTS[fault]), "-O0", played=played(settings))
+    found = played_fault(subject(settings, tmp_path, FAULTS[fault]), "-O0", played=few_played(settings))
     assert found is not None
     assert found.startswith("tape ")
 
