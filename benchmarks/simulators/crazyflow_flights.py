@@ -190,7 +190,7 @@ def challengers_of(world: SimulatedCrazyflie, folder: Path) -> dict[str, Challen
     drone = vehicle_toml.preset(world.vehicle)
     text = identified(fly_log(world), folder / f"{name}.csv", world.mass_kg, drone)
     (folder / f"{name}.toml").write_text(text, "utf-8")
-    best, factors = tuned(world, {searched: MISSIONS[searched] for searched in TUNED_ON})
+    best, factors = tuned(world, TUNED_ON)
     (folder / f"{name}-found.txt").write_text(f"{factors}\n", "utf-8")
     return {
         "Mellinger": Mellinger(world.drone),

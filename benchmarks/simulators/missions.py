@@ -112,7 +112,7 @@ MISSIONS: Final = {
     "push": Mission("push, mm", Hover(), 11.0, largest_mm, push_m_s2=1.0),
     "mass": Mission("mass +20 %, mm", EIGHT, 16.0, rms_mm, weight_m_s2=0.2 * 9.81),
 }
-TUNED_ON: Final = ("space", "step", "push")
+TUNED_ON: Final = {name: MISSIONS[name] for name in ("space", "step", "push")}
 """Missions on which opponents are tuned, with scores that count alike."""
 DISTANCE_MM: Final = 30.0
 SCALES: Final = {"step": 1.0, "push": 80.0}

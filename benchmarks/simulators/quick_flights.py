@@ -1,15 +1,21 @@
-"""Quick curves in crazyflow: its Mellinger controller, what `design` derives, and the exact thrust vector."""
+"""Quick curves in crazyflow and RotorPy: their controllers, `design`, the exact thrust vector."""
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
+from benchmarks.simulators import rotorpy_flights
 from benchmarks.simulators.crazyflow_flights import SEEDS, Mellinger, fly, tuned
 from benchmarks.simulators.crazyflow_worlds import FITTED, SimulatedCrazyflie
 from benchmarks.simulators.missions import Mission, Score, rms_mm
 from benchmarks.simulators.pilots import Challenger, Designed, OurPilot, SimulatorPilot
+from benchmarks.simulators.rotorpy_flights import HUMMINGBIRD, RotorpyDrone
+from benchmarks.simulators.single import measure, search
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_nmpc.curves import Circle, Gerono
@@ -30,7 +36,7 @@ QUICK: Final = {
     "eight 1.2": Mission("eight 1.2 rad/s, mm", Gerono(2.0, 1.2), 18.0, rms_mm),
     "circle 2.4": Mission("circle 2.4 rad/s, mm", Circle(1.0, 2.4), 12.0, rms_mm),
 }
-TUNED_ON: Final = ("eight 1.0", "circle 2.0")
+TUNED_ON: Final = {name: QUICK[name] for name in ("eight 1.0", "circle 2.0")}
 POSSIBLE: Final = 0.7
 """Tilt limit over the tilt at which the largest thrust still carries the weight."""
 
@@ -60,15 +66,11 @@ class Exact:
 def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
     """Yield title, scores and paths (none) of each drone with each model."""
     for drone, model, vehicle in WORLDS:
-        world, file = SimulatedCrazyflie(drone, model, vehicle), vehicle_toml.preset(vehicle)
-        best, factors = tuned(world, {name: QUICK[name] for name in TUNED_ON})
+        world = SimulatedCrazyflie(drone, model, vehicle)
+        best, factors = tuned(world, TUNED_ON)
         (folder / f"{drone}-{model}-found.txt").write_text(f"{factors}\n", "utf-8")
-        challengers: dict[str, Challenger] = {
-            "Mellinger": Mellinger(drone),
-            "Mellinger, tuned": best,
-            "ours, by the page": Designed(file),
-            "ours, exact tilt, acceleration given": Exact(file),
-        }
+        challengers = {"Mellinger": Mellinger(drone), "Mellinger, tuned": best}
+        challengers |= _ours(vehicle_toml.preset(vehicle))
         figures: dict[str, dict[str, list[Score]]] = {title: {} for title in challengers}
         for name, mission in QUICK.items():
             flown, _ = fly(world, list(challengers.values()), mission, SEEDS)
@@ -77,3 +79,17 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
                 figures[title][name] = scores[len(SEEDS) * number : len(SEEDS) * (number + 1)]
             print(f"{world.title}: {name}", flush=True)
         yield world.title, figures, {}
+    yield from _hummingbird(folder)
+
+
+def _hummingbird(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
+    noise = rotorpy_flights.noise()
+    _, factors = search(RotorpyDrone, 6, noise, TUNED_ON)
+    (folder / "hummingbird-found.txt").write_text(f"{factors}\n", "utf-8")
+    challengers = {"SE3Control": np.ones(6), "SE3Control, tuned": np.array(factors)} | _ours(HUMMINGBIRD)
+    contestants = {who: partial(RotorpyDrone, each) for who, each in challengers.items()}
+    yield from measure(rotorpy_flights.TITLE, contestants, noise, missions=QUICK)
+
+
+def _ours(drone: VehicleFile) -> dict[str, Challenger]:
+    return {"ours, by the page": Designed(drone), "ours, exact tilt, acceleration given": Exact(drone)}

@@ -19,7 +19,7 @@ from rotorpy.vehicles.multirotor import Multirotor
 from scipy.spatial.transform import Rotation
 
 from benchmarks.simulators.missions import MISSIONS, STEP_S
-from benchmarks.simulators.pilots import Designed, Sight, SimulatorPilot
+from benchmarks.simulators.pilots import Challenger, Designed, Sight, SimulatorPilot
 from benchmarks.simulators.single import fly_alone, measure, search
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -29,6 +29,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 HUMMINGBIRD: Final = vehicle_toml.preset("hummingbird")
 MASS_KG: Final = float(quad_params["mass"])
 SEEDS: Final = (101, 102)
+TITLE: Final = "RotorPy, Hummingbird"
 MEAN_WIND_M_S, GUSTS_M_S, WIND_HEIGHT_M = (2.0, 1.0, 0.0), (1.0, 1.0, 0.5), 2.0
 
 
@@ -55,9 +56,9 @@ class RotorpyDrone:
 
     period_s = STEP_S
 
-    def __init__(self, factors: FloatArray | None = None, *, windy: bool = False) -> None:
-        self._factors, self._windy = factors, windy
-        abstraction = "cmd_ctatt" if factors is None else "cmd_motor_speeds"
+    def __init__(self, challenger: FloatArray | Challenger, *, windy: bool = False) -> None:
+        self._challenger, self._windy = challenger, windy
+        abstraction = "cmd_motor_speeds" if isinstance(challenger, np.ndarray) else "cmd_ctatt"
         self._body = Multirotor(quad_params, control_abstraction=abstraction)
         self._pilot: SimulatorPilot | None = None
 
@@ -68,11 +69,11 @@ class RotorpyDrone:
         upright = {"q": np.array([0.0, 0.0, 0.0, 1.0]), "rotor_speeds": np.full(4, hover_rad_s)}
         self._state: dict[str, Any] = {"x": np.array(position_m), **rest, **upright}
         self._time_s, self._wind = 0.0, dryden_wind(seed or 0) if self._windy else None
-        if self._factors is None:
-            self._pilot = Designed(HUMMINGBIRD).pilot(1, MASS_KG, noisy=seed is not None)
+        if not isinstance(self._challenger, np.ndarray):
+            self._pilot = self._challenger.pilot(1, MASS_KG, noisy=seed is not None)
             return
         self._law = law = SE3Control(quad_params)
-        level, up, slow_level, slow_up, angle, rate = self._factors
+        level, up, slow_level, slow_up, angle, rate = self._challenger
         law.kp_pos = law.kp_pos * np.array([level, level, up])
         law.kd_pos = law.kd_pos * np.array([slow_level, slow_level, slow_up])
         law.kp_att, law.kd_att = law.kp_att * angle, law.kd_att * rate
@@ -110,15 +111,15 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
     """Yield title, scores and paths; of each the eight in wind, too."""
     _, factors = search(RotorpyDrone, 6, noise())
     (folder / "found.txt").write_text(f"{factors}\n", "utf-8")
-    gains = {
+    challengers: dict[str, FloatArray | Challenger] = {
         "SE3Control": np.ones(6),
         "SE3Control, tuned": np.array(factors),
-        "ours, by the page": None,
+        "ours, by the page": Designed(HUMMINGBIRD),
     }
-    contestants = {who: partial(RotorpyDrone, own) for who, own in gains.items()}
-    ((title, figures, paths),) = measure("RotorPy, Hummingbird", contestants, noise(), SEEDS)
-    for who, own in gains.items():
-        eight, windy = MISSIONS["eight"], RotorpyDrone(own, windy=True)
+    contestants = {who: partial(RotorpyDrone, each) for who, each in challengers.items()}
+    ((title, figures, paths),) = measure(TITLE, contestants, noise(), SEEDS)
+    for who, each in challengers.items():
+        eight, windy = MISSIONS["eight"], RotorpyDrone(each, windy=True)
         flights = [fly_alone(windy, eight, seed, noise()) for seed in SEEDS]
         figures[who]["wind"] = [eight.scores(flown)[0] for flown in flights]
     yield title, figures, paths

@@ -74,7 +74,10 @@ def _through(suite: MocapSuite | None, true: Sight) -> Sight:
 
 
 def search(
-    made: Callable[[FloatArray], Contestant], factors: int, noise: MocapSensors | None
+    made: Callable[[FloatArray], Contestant],
+    factors: int,
+    noise: MocapSensors | None,
+    missions: Mapping[str, Mission] = TUNED_ON,
 ) -> tuple[Contestant, list[float]]:
     """Return the best of 30 random candidates, the first of which has its own gains, and its factors.
 
@@ -85,8 +88,8 @@ def search(
     for number in range(CANDIDATES):
         tried = np.exp(draws.uniform(-1.1, 1.1, factors)) if number else np.ones(factors)
         scores: dict[str, Score] = {}
-        for name in TUNED_ON:
-            mission, one = MISSIONS[name], made(tried)
+        for name, mission in missions.items():
+            one = made(tried)
             scores[name] = mission.scores(fly_alone(one, mission, SEARCH_SEED, noise), one.period_s)[0]
             if best is not None and cost_of(scores) > best[0]:
                 break
@@ -101,13 +104,14 @@ def measure(
     contestants: Mapping[str, Callable[[], Contestant]],
     noise: MocapSensors | None,
     seeds: Sequence[int] = SEEDS,
+    missions: Mapping[str, Mission] = MISSIONS,
 ) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
     """Yield title, scores by controller and mission, and the paths of the first seed on the eight (k, 3)."""
     figures: dict[str, dict[str, Any]] = {who: {} for who in contestants}
     paths: dict[str, Any] = {}
     for who, made in contestants.items():
         one = made()
-        for name, mission in MISSIONS.items():
+        for name, mission in missions.items():
             flights = [fly_alone(one, mission, seed, noise) for seed in seeds]
             scores = [mission.scores(flown, one.period_s)[0] for flown in flights]
             figures[who][name] = scores
