@@ -79,6 +79,8 @@ _MEASURES: Final = (
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
 _STYLE: Final = "sil/mambo_sil/results/style.py"
+TOLD: Final = ("given", "preview")
+"""What a program can say of the acceleration of its target."""
 _FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
 
 
@@ -226,8 +228,8 @@ ITEMS: Final = (
     Item(
         name="height",
         commands=(f"python -m benchmarks.flights.height {RESULTS}/height/pictures",),
-        controllers=(f"{_HERE}/height.toml",),
-        paths=(*_FLIGHT, "benchmarks/flights/height.py", f"{_HERE}/height.toml", _STYLE),
+        controllers=("design crazyflie",),
+        paths=(*_FLIGHT, "benchmarks/flights/height.py", _STYLE),
         read=read_printed,
         tables={"height": printed},
         pictures={"height-helix.png": "pictures/height-helix.png"},
@@ -235,8 +237,8 @@ ITEMS: Final = (
     Item(
         name="fast",
         commands=(f"python -m benchmarks.flights.fast {RESULTS}/fast/pictures",),
-        controllers=("design crazyflie", f"{_HERE}/fast.toml"),
-        paths=(*_FLIGHT, "benchmarks/flights/fast.py", f"{_HERE}/fast.toml", _STYLE),
+        controllers=("design crazyflie", *(f"design crazyflie --acceleration {name}" for name in TOLD)),
+        paths=(*_FLIGHT, "benchmarks/flights/fast.py", _STYLE),
         read=read_printed,
         tables={"fast": printed},
         pictures={"fast-eight.png": "pictures/fast-eight.png"},
@@ -348,7 +350,11 @@ ITEMS: Final = (
     Item(
         name="quick",
         commands=(f"python -m benchmarks.simulators quick {RESULTS}/quick/quick",),
-        controllers=tuple(f"design {drone}" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500")),
+        controllers=tuple(
+            f"design {drone}{words}"
+            for drone in ("crazyflie-l250", "crazyflie-brushless", "x500", "hummingbird")
+            for words in ("", " --acceleration given")
+        ),
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
         read=read_quick,
         tables={"quick": quick},

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
@@ -37,11 +37,15 @@ def plain_c(source: str) -> str:
 
 
 def _settings(source: str) -> Settings:
-    """Return the settings of a preset, a file, or `design DRONE [--sensors KIND]`."""
+    """Return the settings of a preset, a file, or `design DRONE [--sensors KIND] [--acceleration NAME]`."""
     if source.startswith(_DESIGN):
-        name, _, sensors = source.removeprefix(_DESIGN).partition(" --sensors ")
+        name, *words = source.removeprefix(_DESIGN).split()
+        options: dict[str, Any] = dict(zip(words[::2], words[1::2], strict=True))
         drone = vehicle_toml.load(name)
-        return parse(chosen_text(drone.with_sensors(sensors) if sensors else drone, name), source)
+        if "--sensors" in options:
+            drone = drone.with_sensors(options["--sensors"])
+        acceleration = options.get("--acceleration", "tracked")
+        return parse(chosen_text(drone, name, acceleration=acceleration), source)
     return presets.load(source if source in presets.names() else str(ROOT / source))
 
 
@@ -49,7 +53,8 @@ def _settings(source: str) -> Settings:
 def generated(controller: str) -> str:
     """Return update period and C of settings, without their names.
 
-    `controller` is a preset, a file, or `design DRONE [--sensors KIND]`, with or without `--scalar TYPE`.
+    `controller` is a preset, a file, or `design DRONE [--sensors KIND] [--acceleration NAME]`, with or
+    without `--scalar TYPE`.
     """
     source, _, scalar = controller.partition(" --scalar ")
     settings = _settings(source)

@@ -22,14 +22,13 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import height_error_m, measure
-from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.names import CurveName, TargetAcceleration
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 
-SETTINGS: Final = Path(__file__).parents[1] / "evidence" / "fast.toml"
 DRONE: Final = vehicle_toml.load("crazyflie")
 SEEDS: Final = (101, 102, 103)
 DRONES: Final = 16
@@ -63,13 +62,17 @@ CASES: Final = (
 
 def settings() -> dict[str, Settings]:
     """Return what is compared, by the words of the table."""
-    told = controller_toml.read(SETTINGS)
-    given = controller_toml.with_option(told, "target.acceleration", "given")
+
+    def derived(acceleration: TargetAcceleration) -> Settings:
+        text = chosen_text(DRONE, "crazyflie", acceleration=acceleration)
+        return controller_toml.parse(text, "derived")
+
+    preview = derived("preview")
     return {
-        "small angles": controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived"),
-        "thrust vector": controller_toml.with_option(told, "target.acceleration", "tracked"),
-        "and acceleration given": controller_toml.with_option(given, "target.tracker_gain", 1.0),
-        "and preview": told,
+        "tracked: small angles": derived("tracked"),
+        "tracked: thrust vector": controller_toml.with_option(preview, "target.acceleration", "tracked"),
+        "given": derived("given"),
+        "preview": preview,
     }
 
 
@@ -145,8 +148,7 @@ def draw_eight(stem: Path) -> None:
             target = trace.target[late, 0]
             axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=BROAD, label="target")
             axes.plot(*trace.position_m[late, 0, :2].T, color=colour, label="drone")
-            title = "thrust vector and preview" if colour == BLUE else words
-            axes.set(xlabel="x, m", aspect="equal", title=title)
+            axes.set(xlabel="x, m", aspect="equal", title=words)
         panels[0].set_ylabel("y, m")
         save(figure, stem)
 

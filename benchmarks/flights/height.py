@@ -42,10 +42,10 @@ from mambo_sil.flight.names import AltitudeName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Circle, Hover, InSpace, PositionStep, Trajectory
+from mambo_sil.model.derive.derived_settings import controller_text
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 
-SETTINGS: Final = Path(__file__).parents[1] / "evidence" / "height.toml"
 HEADINGS: Final = 8
 SEEN_HEIGHT, GROUNDED = 7, 9
 """Columns of the states of controllers of the height."""
@@ -102,8 +102,8 @@ class AppTakeOff:
 
 
 def settings_of(*, height: bool) -> Settings:
-    """Return the settings of `SETTINGS`, or the same without a height."""
-    settings = controller_toml.read(SETTINGS)
+    """Return the settings that `design` derives, or the same without a height."""
+    settings = controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived")
     return settings if height else without_height(settings)
 
 

@@ -12,6 +12,7 @@ from mambo_sil.api.options import with_options
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.chosen_tilt import chosen_text
 
 
@@ -50,11 +51,13 @@ class Designed:
     """What `design` derives from a drone: for its sensors through noise, else for the true state."""
 
     drone: VehicleFile
+    acceleration: TargetAcceleration = "tracked"
 
     def controller(self, drones: int, *, noisy: bool) -> Controller:
         """Return the C for new drones."""
         drone = self.drone if noisy else self.drone.with_sensors("true")
-        return Controller(controller_toml.parse(chosen_text(drone, drone.name), drone.name), drones)
+        text = chosen_text(drone, drone.name, acceleration=self.acceleration)
+        return Controller(controller_toml.parse(text, drone.name), drones)
 
     def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return the C for new drones."""

@@ -23,7 +23,7 @@ from mambo_sil.cli.options import (
     sensors_option,
     show_result,
 )
-from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind
+from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind, TargetAcceleration
 from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
@@ -188,6 +188,14 @@ def design(
             "What measures, in place of the file's sensors: true, mocap, flow-deck, autopilot, mambo.",
         ),
     ] = None,
+    acceleration: Annotated[
+        TargetAcceleration,
+        typer.Option(
+            help="What the controller knows of the target's acceleration: tracked, what its velocity shows; "
+            "given, what your program says; preview, that and the next 0.3 s. For quick curves.",
+            metavar="NAME",
+        ),
+    ] = "tracked",
 ) -> None:
     """Derive settings from a drone, write them with reasons, fly them; exit 1 if they do not fly well.
 
@@ -201,7 +209,7 @@ def design(
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
         drone = drone.with_sensors(sensors)
-    text = chosen_text(drone, source, _relative(vehicle, output))
+    text = chosen_text(drone, source, _relative(vehicle, output), acceleration)
     settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
         name = echo(str(output))

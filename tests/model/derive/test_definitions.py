@@ -15,7 +15,8 @@ from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, is_strong
+from mambo_sil.flight.names import TargetAcceleration
+from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
 from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.scenarios import changed
 
@@ -245,13 +246,34 @@ def test_a_flow_deck_has_a_noise_of_its_own() -> None:
 
 
 @pytest.mark.parametrize(("ratio", "found"), [(2.49, False), (2.5, True), (2.6, True), (11.0, True)])
-def test_a_strong_drone_has_thrust_and_a_height(ratio: float, found: bool) -> None:
-    """From 2.5 times its weight on; not without a known thrust, nor behind a Mambo's optical flow."""
-    lag = {"lag_s": 0.05}
-    assert is_strong(strong(ratio, thrust=lag)) is found
-    assert not is_strong(strong(ratio))
+def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
+    ratio: float, found: bool
+) -> None:
+    """From 2.5 times the weight on; never without a known thrust, nor behind a Mambo's optical flow."""
+    known = strong(ratio, thrust={"lag_s": 0.05})
+    assert wants_exact(known) is found
     mambo = vehicle_toml.preset("mambo")
-    assert not is_strong(changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n}))
+    flowing = changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n})
+    for name in ("given", "preview"):
+        assert wants_exact(known, name)
+        assert not wants_exact(strong(ratio), name)
+        assert not wants_exact(flowing, name)
+    assert not wants_exact(strong(ratio))
+    assert not wants_exact(flowing)
+
+
+@pytest.mark.parametrize("name", ["given", "preview"])
+def test_a_target_that_says_more_has_more_of_the_possible_tilt(name: TargetAcceleration) -> None:
+    """0.7 of it with the exact tilt, and half with small angles; what is given is not smoothed."""
+    drone = strong(2.0, thrust={"lag_s": 0.05})
+    exact, small = (
+        controller_toml.parse(controller_text(drone, "mine", exact=exact, acceleration=name), "mine")
+        for exact in (True, False)
+    )
+    assert exact.target.acceleration == small.target.acceleration == name
+    assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 2.0), rel=ROUNDED)
+    assert small.limits.tilt_rad == 0.5
+    assert (exact.target.tracker_gain == 1.0) is (name == "given")
 
 
 @pytest.mark.parametrize("ratio", [2.6, 4.0, 10.0])

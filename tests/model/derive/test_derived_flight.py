@@ -24,7 +24,7 @@ from mambo_sil.model.derive.derived_flight import (
     fly_derived,
     quick_rate_rad_s,
 )
-from mambo_sil.model.derive.derived_settings import controller_text, is_strong
+from mambo_sil.model.derive.derived_settings import controller_text, wants_exact
 from tests.support.scenarios import CRAZYFLIE
 
 
@@ -85,7 +85,7 @@ def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survi
     """Both have ten times their weight in thrust; the mixer of one loses the height in large swings."""
     drone = vehicle_toml.preset(name)
     exact = controller_toml.parse(controller_text(drone, name, exact=True), name)
-    assert (exact.model.tilt, is_strong(drone)) == ("exact", strong)
+    assert (exact.model.tilt, wants_exact(drone)) == ("exact", strong)
     assert exact.limits.tilt_rad > 0.7
     assert flies_quick_circle(exact, drone) is survives
     chosen = controller_toml.parse(chosen_text(drone, name), name)
@@ -118,10 +118,17 @@ def test_the_quick_circle_has_slower_rotors() -> None:
 
 @pytest.mark.parametrize("name", ["crazyflie", "x500", "mambo", "generic"])
 def test_a_drone_with_less_thrust_keeps_small_angles(name: str) -> None:
-    """Below 2.5 times its weight."""
+    """Below 2.5 times its weight, if its target is tracked."""
     drone = vehicle_toml.preset(name)
-    assert not is_strong(drone)
+    assert not wants_exact(drone)
     assert chosen_text(drone, name) == controller_text(drone, name)
+
+
+@pytest.mark.parametrize(("name", "tilt_rad"), [("crazyflie", 0.638), ("x500", 0.733)])
+def test_a_drone_whose_target_says_its_acceleration_flies_with_more_tilt(name: str, tilt_rad: float) -> None:
+    """It survives the quick circle of that tilt."""
+    chosen = controller_toml.parse(chosen_text(vehicle_toml.preset(name), name, acceleration="given"), name)
+    assert (chosen.model.tilt, chosen.limits.tilt_rad) == ("exact", tilt_rad)
 
 
 TIME_S = np.arange(-1.0, 10.005, 0.01)

@@ -22,6 +22,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MocapSensors,
     TrueState,
 )
+from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.step_response import fit_steps
 
 UPDATE_PERIOD_S: Final = 0.01
@@ -34,8 +35,16 @@ LEAST_BRAKING_M_S2: Final = 0.1
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
+TILT_SHARE, TOLD_TILT_SHARE = 0.5, 0.7
+"""Tilt limit over the tilt at which the largest thrust still carries the weight: for a target that is
+tracked, and with the exact tilt for one that says its acceleration."""
 EXACT_THRUST: Final = 2.5
 """Largest thrust over the weight from which on a larger tilt is worth its trigonometry."""
+ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
+    "tracked": "Removes most of the tracking error on curves",
+    "given": "By the program, which knows the curve",
+    "preview": "By the program, which knows the curve, now and up to 0.3 s ahead",
+}
 
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
@@ -73,43 +82,56 @@ class Derived:
     reason: str
 
 
-def is_strong(drone: VehicleFile) -> bool:
-    """Return whether a drone has thrust, and a height, for more tilt than small angles allow."""
-    strong = drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
-    return strong and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
+def wants_exact(drone: VehicleFile, acceleration: TargetAcceleration = "tracked") -> bool:
+    """Return whether more tilt than small angles allow is of use, by the thrust or by what the target says.
+
+    Not without a height, nor behind the optical flow of a Mambo.
+    """
+    useful = acceleration != "tracked" or drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
+    return useful and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
 
 
-def derive(drone: VehicleFile, *, exact: bool = False) -> list[Derived]:
+def derive(
+    drone: VehicleFile, *, exact: bool = False, acceleration: TargetAcceleration = "tracked"
+) -> list[Derived]:
     """Return the settings for a drone that differ from the defaults, section by section.
 
-    exact: with the exact thrust vector, and a tilt limit without the bound of small angles.
+    exact:        with the exact thrust vector, and a tilt limit without the bound of small angles.
+    acceleration: what is known of the target's acceleration.
     """
     attitude = list(_attitude(drone))
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
+    share = TILT_SHARE if acceleration == "tracked" or not exact else TOLD_TILT_SHARE
+    tilt = _tilt_limit(drone, share, exact=exact)
     return [
         *_horizon(drone),
         *attitude,
         Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
         Derived("model", "attitude", "predicted", "No quick loop through the measured attitude"),
         *([_exact_tilt(drone)] if exact else []),
-        Derived("target", "acceleration", "tracked", "Removes most of the tracking error on curves"),
+        *_target(acceleration),
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0),
         *_observer(drone),
-        *_limits(drone, exact=exact),
+        *_limits(drone, tilt),
         *_thrust_range(drone),
         *(height := list(_height(drone))),
-        *_guard(drone, height, exact=exact),
+        *_guard(float(tilt.value), height),
     ]
 
 
 def controller_text(
-    drone: VehicleFile, source: str, vehicle: str | None = None, *, exact: bool = False
+    drone: VehicleFile,
+    source: str,
+    vehicle: str | None = None,
+    *,
+    exact: bool = False,
+    acceleration: TargetAcceleration = "tracked",
 ) -> str:
     """Return a controller.toml for the drone of `source`, with the reason of each value as a comment.
 
-    vehicle: what the key `vehicle` names, for commands that fly the settings; None leaves it out.
-    exact:   as for `derive`.
+    vehicle:             what the key `vehicle` names, for commands that fly the settings; None leaves it out.
+    exact, acceleration: as for `derive`.
     """
     lines = [
         comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
@@ -122,7 +144,7 @@ def controller_text(
         ]
         lines += [f"{VEHICLE} = {json.dumps(vehicle, ensure_ascii=False)}"]
     section = ""
-    for each in derive(drone, exact=exact):
+    for each in derive(drone, exact=exact, acceleration=acceleration):
         if each.section != section:
             section = each.section
             lines += ["", f"[{section}]"]
@@ -171,6 +193,13 @@ def _exact_tilt(drone: VehicleFile) -> Derived:
     ratio = drone.largest_thrust_n / drone.weight_n
     words = f"The thrust, {ratio:.3g} times the weight, carries more tilt than small angles are good for"
     return Derived("model", "tilt", "exact", words)
+
+
+def _target(acceleration: TargetAcceleration) -> Iterator[Derived]:
+    """Yield what is known of the target's acceleration; what is given is taken as it comes."""
+    yield Derived("target", "acceleration", acceleration, ACCELERATIONS[acceleration])
+    if acceleration == "given":
+        yield Derived("target", "tracker_gain", 1.0, "What a curve says has no noise to be smoothed")
 
 
 def _response(slowness_s: float) -> Derived:
@@ -225,9 +254,8 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
 
 
-def _limits(drone: VehicleFile, *, exact: bool) -> Iterator[Derived]:
+def _limits(drone: VehicleFile, tilt: Derived) -> Iterator[Derived]:
     """Yield the limits of tilt and, if the tilt allows some braking, of speed and braking."""
-    tilt = _tilt_limit(drone, exact=exact)
     yield tilt
     gain, trim_m_s2 = GRAVITY_M_S2, 0.0
     if isinstance(drone.attitude, FirstOrderAttitude):
@@ -247,17 +275,18 @@ def _limits(drone: VehicleFile, *, exact: bool) -> Iterator[Derived]:
         yield Derived("limits", "braking_m_s2", braking_m_s2, words)
 
 
-def _tilt_limit(drone: VehicleFile, *, exact: bool) -> Derived:
-    """Return half the tilt at which the largest thrust carries the weight, as far as angles may be."""
+def _tilt_limit(drone: VehicleFile, share: float, *, exact: bool) -> Derived:
+    """Return a share of the tilt at which the largest thrust carries the weight, as far as angles may be."""
     ratio = drone.largest_thrust_n / drone.weight_n
-    half_rad = 0.5 * math.acos(1.0 / ratio)
-    words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
+    tilt_rad = share * math.acos(1.0 / ratio)
+    part = "Half" if share == TILT_SHARE else f"{share:g} of"
+    words = f"{part} the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
     most_rad, why = MOST_TILT_RAD, "the model takes a tilt for its tangent"
     if isinstance(drone.sensors, MamboSensors):
         most_rad, why = MOST_TILT_BY_FLOW_RAD, "the optical flow drifts in larger tilts"
-    if half_rad > most_rad and not exact:
-        half_rad, words = most_rad, f"{words}; at most {most_rad:g}, since {why}"
-    return Derived("limits", "tilt_rad", _round(max(half_rad, 0.01)), words)
+    if tilt_rad > most_rad and not exact:
+        tilt_rad, words = most_rad, f"{words}; at most {most_rad:g}, since {why}"
+    return Derived("limits", "tilt_rad", _round(max(tilt_rad, 0.01)), words)
 
 
 def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:
@@ -305,9 +334,8 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
     yield Derived("height", "descent_m_s", min(descent_m_s, DESCENT_M_S), words)
 
 
-def _guard(drone: VehicleFile, height: list[Derived], *, exact: bool) -> Iterator[Derived]:
+def _guard(tilt_rad: float, height: list[Derived]) -> Iterator[Derived]:
     """Yield the guard, by the tilt limit and, with settings of the height, the range of the thrust."""
-    tilt_rad = float(_tilt_limit(drone, exact=exact).value)
     words = f"{TILT_SWINGS:g} times limits.tilt_rad: swings are free, and a mixer keeps its thrust"
     yield Derived("guard", "tilt_rad", _round(TILT_SWINGS * tilt_rad), words)
     words = f"{TILT_SWINGS_1_S:g} times limits.tilt_rad in a second: commands that rattle by more are bounded"
