@@ -23,6 +23,7 @@ from mambo_sil.api import heading
 from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 from mambo_sil.model.derive.derived_settings import controller_text
 from tests.support.one_norm import ONE_NORM
 
@@ -65,6 +66,18 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     assert Controller.from_vehicle(str(file)).settings == derived
     quick = Controller.from_vehicle(file, sensors="true").settings.observer
     assert (quick.disturbance_noise, derived.observer.disturbance_noise) == (3.0, 1.0)
+
+
+def test_a_program_that_knows_its_curve_gets_what_design_writes_for_it() -> None:
+    """The exact tilt and more of it; a smaller tilt limit counts."""
+    text = chosen_text(vehicle_toml.preset("crazyflie"), "x", acceleration="given")
+    given = Controller.from_vehicle("crazyflie", acceleration="given").settings
+    assert given == controller_toml.parse(text, "x")
+    assert (given.model.tilt, given.limits.tilt_rad > DERIVED.limits.tilt_rad) == ("exact", True)
+    careful = Controller.from_vehicle("crazyflie", acceleration="given", tilt_rad=0.4).settings
+    assert careful == with_option(
+        with_option(given, "limits.tilt_rad", 0.4), "limits.braking_m_s2", careful.limits.braking_m_s2
+    )
 
 
 @pytest.mark.long

@@ -34,7 +34,13 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
-from mambo_sil.flight.names import ALTITUDE_NAMES, SENSORS_KINDS, SensorsKind
+from mambo_sil.flight.names import (
+    ALTITUDE_NAMES,
+    SENSORS_KINDS,
+    TARGET_ACCELERATIONS,
+    SensorsKind,
+    TargetAcceleration,
+)
 from mambo_sil.model.derive.chosen_tilt import chosen_text
 
 LARGEST_N: Final = 1_000_000
@@ -75,7 +81,8 @@ class Controller:
     ) -> Self:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
-        sensors: what measures, in place of the sensors in the file; "true" for the state of a simulator.
+        sensors:      what measures, in place of the sensors in the file; "true" for the state of a simulator.
+        acceleration: "given" or "preview" as `design --acceleration` derives them, with more tilt.
 
         Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
         InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
@@ -84,7 +91,11 @@ class Controller:
         if sensors is not None:
             require_choice("sensors", sensors, SENSORS_KINDS)
             drone = drone.with_sensors(sensors)
-        settings = controller_toml.parse(chosen_text(drone, drone.name), f"settings for {drone.name}")
+        wanted: list[TargetAcceleration] = [
+            name for name in TARGET_ACCELERATIONS if name == options.get("acceleration")
+        ]
+        text = chosen_text(drone, drone.name, acceleration=wanted[0] if wanted else "tracked")
+        settings = controller_toml.parse(text, f"settings for {drone.name}")
         return cls._made(settings, n, drone, options)
 
     @classmethod

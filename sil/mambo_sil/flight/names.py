@@ -48,6 +48,7 @@ EngineName = Literal["c", "numpy"]
 
 STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_KINDS: Final[tuple[SensorsKind, ...]] = get_args(SensorsKind)
+TARGET_ACCELERATIONS: Final[tuple[TargetAcceleration, ...]] = get_args(TargetAcceleration)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
