@@ -1,12 +1,13 @@
 """Fly in a simulator of others; write figures and paths to a folder. Takes 5 to 20 minutes.
 
-    python -m benchmarks.simulators crazyflow|rotorpy|pybullet|pyflyt FOLDER
+    python -m benchmarks.simulators crazyflow|rotorpy|pybullet|pyflyt|quick FOLDER
 
-wants that simulator.
+wants that simulator; quick wants crazyflow and rotorpy.
 """
 
 import importlib
 import json
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -22,6 +23,7 @@ FIGURES: Final = "figures.json"
 def main(simulator: str, folder: Path) -> None:
     """Fly every simulated drone of one simulator."""
     warnings.filterwarnings("ignore", "Attaching a spec", UserWarning)  # of MuJoCo, which crazyflow uses
+    os.environ.setdefault("SCIPY_ARRAY_API", "1")  # crazyflow wants it before SciPy is imported
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[str, Any] = {}
     flights = importlib.import_module(f"benchmarks.simulators.{simulator}_flights")
