@@ -44,6 +44,9 @@ class EmulatedController:
     """n controllers on one emulated core that runs a program of `build_guest`.
 
     The instances are stored in this process and copied to the core in batches that fit its memory.
+
+    counting: instructions are counted. Whether a command lies at the tilt limit is then not asked for, since
+              the answer calls functions of the step, whose instructions would count.
     """
 
     def __init__(
@@ -79,7 +82,10 @@ class EmulatedController:
         self._controller, self._inputs, outputs = addresses[0], addresses[1:4], addresses[4:]
         self._outputs = dict(zip(one, outputs, strict=True))
         self._outcome = self.machine.arena.allocate(len(outputs) * self.machine.word_bytes)
-        self.machine.write(self._outcome, np.array(outputs, f"<u{self.machine.word_bytes}").tobytes())
+        asked = [
+            0 if counting and name == "saturated" else address for name, address in self._outputs.items()
+        ]
+        self.machine.write(self._outcome, np.array(asked, f"<u{self.machine.word_bytes}").tobytes())
         self._instances = bytearray(DIRT * (n * self._instance_bytes))
         for batch in self._batches():
             self._run_batch(batch, "nmpc_batch_init")

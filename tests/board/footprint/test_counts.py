@@ -12,7 +12,7 @@ import unicorn
 
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
 from mambo_sil.board.emulation.unicorn_machine import UnicornMachine
@@ -25,11 +25,13 @@ from mambo_sil.board.footprint.counts import (
     InstructionCounts,
     count_instructions,
 )
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import batch_source
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
+from mambo_sil.model.derive.chosen_tilt import chosen_text
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 
@@ -281,6 +283,16 @@ def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
     elf = build_guest(settings, board_builder("crazyflie"), tmp_path)
     flight, searched = (counted(settings, elf, 30, steps) for steps in (0, 60))
     assert searched.most_met > 1.2 * flight.most_met
+
+
+@pytest.mark.long
+def test_what_the_harness_asks_afterwards_is_no_part_of_a_step(tmp_path: Path) -> None:
+    """A step takes two arc tangents without a loop; whether it ended at the tilt limit takes eight more."""
+    text = chosen_text(vehicle_toml.preset("crazyflie"), "x", acceleration="given")
+    elf = build_guest(settings := parse(text, "x"), board_builder("crazyflie"), tmp_path)
+    by_function = counted(settings, elf, 20, 0).by_function
+    longest = load(elf).symbol("arc_tangent").size_bytes / 2  # instructions have two bytes at least
+    assert 50 < by_function["arc_tangent"] <= 2 * longest
 
 
 @pytest.mark.long

@@ -2,6 +2,8 @@
  *
  * Steps n controllers in one call from Python. Compiled with a bundle, not part of it.
  */
+#include <stddef.h>
+
 #include "nmpc.h"
 
 #ifdef NMPC_HAS_HEIGHT
@@ -43,7 +45,9 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
     int k;
 
     outcome->missed[i] = (int)self->missed;
-    outcome->saturated[i] = nmpc_is_saturated(self);
+    if (outcome->saturated != NULL) {
+        outcome->saturated[i] = nmpc_is_saturated(self);
+    }
     for (k = 0; k < NMPC_STORED_NUMBERS; k++) {
         outcome->stored[(i * NMPC_STORED_NUMBERS) + k] = stored[k];
     }
