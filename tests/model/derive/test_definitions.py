@@ -265,14 +265,14 @@ def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
 @pytest.mark.parametrize("name", ["given", "preview"])
 def test_a_target_that_says_more_has_more_of_the_possible_tilt(name: TargetAcceleration) -> None:
     """0.7 of it with the exact tilt, and half with small angles; what is given is not smoothed."""
-    drone = strong(2.0, thrust={"lag_s": 0.05})
+    drone = strong(1.6, thrust={"lag_s": 0.05})
     exact, small = (
         controller_toml.parse(controller_text(drone, "mine", exact=exact, acceleration=name), "mine")
         for exact in (True, False)
     )
     assert exact.target.acceleration == small.target.acceleration == name
-    assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 2.0), rel=ROUNDED)
-    assert small.limits.tilt_rad == 0.5
+    assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 1.6), rel=ROUNDED)
+    assert small.limits.tilt_rad == pytest.approx(0.5 * math.acos(1.0 / 1.6), rel=ROUNDED)
     assert (exact.target.tracker_gain == 1.0) is (name == "given")
 
 
