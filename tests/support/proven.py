@@ -3,9 +3,10 @@
 What Frama-C says depends on its version, its options and the C alone. `tests/verify/proven.txt` has a line
 for each controller without an alarm: a digest of all these, the number of promises, and the test that wants
 the proof; and a line for each controller with faults of which each raised its alarm, with their number. C
-that has changed is proven as if there were no record; so is all C by another Frama-C.
+that has changed is proven as if there were no record, and takes the place of what its test has proven
+before; so is all C by another Frama-C. Whoever changes the C commits the record too.
 
-make proofs   make all proofs that tests want, and write the record
+make proofs   make all proofs that tests want, and write the record anew
 """
 
 import fcntl
@@ -29,7 +30,7 @@ from tests.support.tools import require
 
 RECORD: Final = Path(__file__).parents[1] / "verify" / "proven.txt"
 ANEW: Final = "PROOFS"
-"""The environment variable that `make proofs` and `make thorough` set: the record is written, not read."""
+"""The environment variable that `make proofs` and `make thorough` set: the record is not read."""
 _MACHINE: Final = ("-nostdinc", "-m32", "-D__FRAMAC__", "-D__FC_MACHDEP_X86_32")
 
 
@@ -102,14 +103,13 @@ def _recorded(key: str) -> int | None:
 
 
 def _record(key: str, count: int) -> None:
-    """Add a line for the present test to the record, whose lines are ordered, if proofs are made anew."""
-    if not os.environ.get(ANEW):
-        return
-    line = f"{key} {count} {os.environ['PYTEST_CURRENT_TEST'].rpartition(' ')[0]}"
+    """Write the line of the present test into the record, whose lines are ordered by their tests."""
+    test = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
     with RECORD.open("a+", encoding="utf-8") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         file.seek(0)
-        lines = {*file.read().splitlines(), line}
+        lines = {line.split(maxsplit=2)[2]: line for line in file.read().splitlines()}
+        lines[test] = f"{key} {count} {test}"
         file.seek(0)
         file.truncate()
-        file.write("".join(f"{one}\n" for one in sorted(lines, key=lambda one: one.split(maxsplit=2)[2])))
+        file.write("".join(f"{lines[name]}\n" for name in sorted(lines)))

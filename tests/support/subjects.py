@@ -2,15 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import tape_replay
-from mambo_sil.verify.calls import Outcomes, Tape, answers
-from mambo_sil.verify.cases import cases, random_tapes
+from mambo_sil.verify.calls import Outcomes, Tape
+from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import Subject
 from tests.support.bundles import place
 from tests.support.tools import require
@@ -50,10 +49,3 @@ def played_fault(
     return tape_replay.fault(
         tape_replay.play(program, its.folder / "tapes.bin", its.settings, tapes), expected
     )
-
-
-@lru_cache(maxsize=1)
-def few_played(settings: Settings) -> tuple[Sequence[Tape], Sequence[Outcomes]]:
-    """Return few random tapes, and what the reference answers."""
-    tapes = random_tapes(settings, 60)
-    return tapes, answers(settings, tapes)

@@ -91,7 +91,7 @@ def test_some_broken_settings_are_refused_in_words(tmp_path: Path) -> None:
     over_broken_settings(40, tmp_path)()
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_sixty_settings_go_the_whole_way(shard: int) -> None:
@@ -99,7 +99,7 @@ def test_sixty_settings_go_the_whole_way(shard: int) -> None:
     seed(shard)(over_valid_settings(any_settings(), VALID_EACH))()
 
 
-@pytest.mark.sampled(3)
+@pytest.mark.sampled(6)
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_three_hundred_broken_settings_are_refused_in_words(tmp_path: Path, shard: int) -> None:

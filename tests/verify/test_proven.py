@@ -77,3 +77,13 @@ def test_faults_that_the_record_has_are_not_tried_again(tmp_path: Path, record: 
     assert proven.unnoticed(wrong, faults) == []
     others = {"none": faults["none"]._replace(alarm=Alarm("nmpc.c", "no such line", "shift"))}
     assert proven.unnoticed(wrong, others) == ["none"]
+
+
+def test_what_a_test_proves_takes_the_place_of_what_it_proved_before(record: Path) -> None:
+    """So the record grows by no line when the C changes; lines of other tests stay."""
+    record.write_text("0a 7 some test\n", "utf-8")
+    for key in ("1b", "2c"):
+        proven._record(key, 5)
+    first, second = record.read_text("utf-8").splitlines()
+    assert first == "0a 7 some test"
+    assert second.startswith("2c 5 tests/verify/test_proven.py::test_what_a_test_proves_takes")

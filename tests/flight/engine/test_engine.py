@@ -78,7 +78,7 @@ def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...]
 
 
 @pytest.mark.long
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
     """One to nine drawn flights of any drone, without sensors or through them."""

@@ -1,6 +1,7 @@
 """The attitude model of a drone whose inner loops are known: fitted to its simulated answer to a step."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -33,6 +34,7 @@ class StepFit:
     error: float
 
 
+@lru_cache(maxsize=64)  # a program derives the same drone with several options
 def fit_steps(drone: VehicleFile) -> tuple[StepFit, StepFit]:
     """Return the models of roll and pitch of a drone that hovers without disturbance."""
     answers = _answers(drone)
