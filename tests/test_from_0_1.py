@@ -1,4 +1,4 @@
-"""Files of version 0.1.0 in this version: what docs/how-to/from-0.1-to-0.2.md promises of them.
+"""Files of version 0.1.0 in this version: what docs/how-to/upgrade.md promises of them.
 
 tests/data/version_0_1 was written by 0.1.0. Of 2026-11-22: its preset mambo as a file (one-norm), the log of
 a flight, the commands that a C program of that time printed, a result folder, a campaign and a record. Of
@@ -21,7 +21,7 @@ from tests.support.command import run, unwrapped
 from tests.support.tools import require
 
 DATA = Path(__file__).parent / "data" / "version_0_1"
-PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "from-0.1-to-0.2.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "upgrade.md").read_text("utf-8")
 CLOSE_RAD = 2e-5
 """What the page says of a quadratic cost."""
 

@@ -41,7 +41,7 @@ NOT_RUN = {
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
     "how-to/design.md": ("it installs",),
     "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
-    "how-to/from-0.1-to-0.2.md": ("needs files of 0.1",),
+    "how-to/upgrade.md": ("needs files of 0.1",),
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/libraries.md": ("needs arduino-cli", "needs PlatformIO", "needs ESP-IDF"),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
