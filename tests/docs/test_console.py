@@ -28,7 +28,6 @@ TOOLS = {
     "how-to/footprint.md": [ARM],
     "how-to/pil.md": [ARM],
     "how-to/verify.md": [("cppcheck", "cppcheck"), ("clang", "clang"), ("g++", "g++")],
-    "tutorials/crazyflie.md": [ARM],
     "tutorials/own-drone.md": [ARM],
 }
 """What the commands of a page need besides bash, make and a C compiler: tool and Debian package."""
@@ -38,7 +37,6 @@ NOT_RUN = {
         "needs the SITL, and a machine with an idle core",
     ),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
-    "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
     "how-to/design.md": ("it installs",),
     "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
     "how-to/upgrade.md": ("needs files of 0.1",),
