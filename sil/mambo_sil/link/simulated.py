@@ -45,6 +45,7 @@ from mambo_sil.link.records import (
     Text,
 )
 from mambo_sil.link.sockets import Address, MavlinkSocket
+from mambo_sil.link.tilt import turned_tilt
 
 STARTS_M: Final = (0.7, -0.4, 0.0)
 """Where the drone stands; its estimator has another origin, as that of a real one."""
@@ -226,16 +227,17 @@ class SimulatedAutopilot:
         self._state, moment = self._world.tick(self._state, self.time_s)
         if not self.armed and self.is_on_ground:
             return
+        now_rad = float(self._state.body[8, 0])
         if not self.armed:
             command_rad, thrust_n = np.zeros(2), 0.0
         elif self.mode == self.stack.guided and isinstance(self._set_point, SetAttitude):
             roll_rad, pitch_rad, yaw_rad = self._set_point.attitude_rad.tolist()
-            command_rad, self._yaw_rad = np.array([roll_rad, pitch_rad]), yaw_rad - self._error_rad
+            self._yaw_rad = yaw_rad - self._error_rad
+            command_rad = np.array(turned_tilt(roll_rad, pitch_rad, now_rad - self._yaw_rad))
             thrust_n = self._set_point.thrust / self.condition.hover_thrust * self.drone.hover_demand_n
         else:
             command_rad, thrust_n = self._hold(estimate)
         thrust = np.array([min(thrust_n, self.drone.altitude.thrust_max_n)])
-        now_rad = float(self._state.body[8, 0])
         reference_rad = now_rad + float(wrapped(self._yaw_rad - now_rad))
         self._state, _ = self._vehicle.advance(
             self._state, command_rad[:, np.newaxis], thrust, reference_rad, seen=seen, moment=moment
