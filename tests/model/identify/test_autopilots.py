@@ -23,10 +23,14 @@ def lifted() -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
     return dict.fromkeys(PLACE, np.zeros_like(columns["time_s"])) | columns
 
 
-def test_a_dataflash_log_is_read(tmp_path: Path) -> None:
-    """Degrees, a heading of 0 to 360 and the first of two estimators; the fit is that of the CSV."""
+@pytest.mark.parametrize("angles", ["ANG", "ATT"])
+def test_a_dataflash_log_is_read(angles: str, tmp_path: Path) -> None:
+    """Degrees, a heading of 0 to 360 and the first of two estimators; the fit is that of the CSV.
+
+    ArduCopter 4.7 logs fast angles as ANG, those before it as ATT.
+    """
     path = tmp_path / "00000012.BIN"
-    path.write_bytes(dataflash(FLOWN))
+    path.write_bytes(dataflash(FLOWN, angles=angles))
     (log,), faults = read_logs([path], {})
     assert not faults
     for name in ("roll_command_rad", "roll_rad", "pitch_rad", "x_m", "vy_m_s"):
@@ -86,6 +90,14 @@ def test_rare_angles_name_the_bit_that_ardupilot_needs(tmp_path: Path) -> None:
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(FLOWN, every=10))
     with pytest.raises(LogError, match=r"has a sample every 0.1 s .*LOG_BITMASK: add 1"):
+        read_logs([path], {})
+
+
+def test_a_log_without_set_points_is_refused(tmp_path: Path) -> None:
+    """Of another mode, whose DesRoll is smoothed: what follows it is quicker than the drone."""
+    path = tmp_path / "log.bin"
+    path.write_bytes(dataflash(FLOWN, guided=False))
+    with pytest.raises(LogError, match=r"log\.bin: has no GUIA: .* log a flight of mambo-nmpc pilot"):
         read_logs([path], {})
 
 
