@@ -366,12 +366,11 @@ def _quaternion(roll: Array, pitch: Array, yaw: Array) -> list[Array]:
 def dataflash(
     columns: Mapping[str, Array],
     *,
-    hover: float = 0.4,
     every: int = 1,
     angles: str = "ANG",
     guided: bool = True,
 ) -> bytes:
-    """Return a log in ArduPilot's format DataFlash: set-points if guided, angles, motion, thrust.
+    """Return a log in ArduPilot's format DataFlash: set-points if guided, angles, motion.
 
     The angles come in every n-th row, beside a rare ATT; their DesRoll and DesPitch follow the drone. The
     motion is that of two estimators. A row a second before the set-points is of something else.
@@ -380,8 +379,7 @@ def dataflash(
     kinds = {
         129: (angles, des, labels),
         130: ("XKF1", "QBfffff", "TimeUS,C,VN,VE,PN,PE,PD"),
-        131: ("CTUN", "Qff", "TimeUS,ThO,ThH"),
-        132: ("GUIA", "QBfff", "TimeUS,Type,Roll,Pitch,Yaw"),
+        132: ("GUIA", "QBffff", "TimeUS,Type,Roll,Pitch,Yaw,Thrust"),
         133: ("ATT" if angles != "ATT" else "OLD", des, labels),
     }
     layouts = {number: "<" + form for number, (_, form, _) in kinds.items()}
@@ -398,13 +396,13 @@ def dataflash(
     to_roll, to_pitch, roll, pitch, yaw = (np.degrees(columns[name]) for name in names)
     level = np.zeros_like(columns["time_s"])
     motion = [columns.get(name, level) for name in ("vx_m_s", "vy_m_s", "x_m", "y_m", "z_m")]
-    throttle = columns.get("thrust_command", level + hover)
+    throttle = columns.get("thrust_command", level + 0.4)
     parts.append(message(129, 9 * 10**6, 1.0, 2.0, 3.0, 4.0, 5.0))
     parts.append(message(130, 9 * 10**6, 0, 1.0, 2.0, 3.0, 4.0, 5.0))
     for row, time_s in enumerate(columns["time_s"].tolist()):
         stamp = round(1e6 * time_s) + 10**7
         if guided:
-            parts.append(message(132, stamp, 6, to_roll[row], to_pitch[row], yaw[row]))
+            parts.append(message(132, stamp, 6, to_roll[row], to_pitch[row], yaw[row], throttle[row]))
         attitude = roll[row], roll[row], pitch[row], pitch[row], yaw[row] % 360.0
         if row % every == 0:
             parts.append(message(129, stamp, *attitude))
@@ -412,5 +410,4 @@ def dataflash(
             parts.append(message(133, stamp, *attitude))
         parts.append(message(130, stamp, 0, *(each[row] for each in motion)))
         parts.append(message(130, stamp, 1, *(each[row] + 9.0 for each in motion)))
-        parts.append(message(131, stamp, throttle[row], hover))
     return b"".join(parts)

@@ -49,8 +49,8 @@ from mambo_sil.link.tilt import turned_tilt
 
 STARTS_M: Final = (0.7, -0.4, 0.0)
 """Where the drone stands; its estimator has another origin, as that of a real one."""
-SILENT_S: Final = 1.0
-"""Time without set-points after which PX4 leaves OFFBOARD, and ArduCopter flies level."""
+SILENT_S: Final = {"PX4": 1.0, "ArduCopter": 3.0}
+"""Time without set-points: PX4 leaves OFFBOARD then (COM_OF_LOSS_T), ArduCopter is level (GUID_TIMEOUT)."""
 CLIMB_M_S, DESCENT_M_S, SPEED_M_S = 1.0, 0.7, 1.5
 POSITION_1_S, VELOCITY_1_S = 0.9, 2.0
 LARGEST_TILT_RAD: Final = 0.35
@@ -208,7 +208,7 @@ class SimulatedAutopilot:
     @property
     def _is_guided(self) -> bool:
         """Whether set-points come."""
-        return self.time_s - self._set_point_s <= SILENT_S
+        return self.time_s - self._set_point_s <= SILENT_S[self.stack.name]
 
     def _fall_back(self) -> None:
         """Do without set-points if they fail to come, and disarm on the ground after landing."""

@@ -44,25 +44,22 @@ def test_a_dataflash_log_is_read(angles: str, tmp_path: Path) -> None:
     assert abs(found.roll.fitted.gain.value - wanted.roll.fitted.gain.value) < 1e-3
 
 
-@pytest.mark.parametrize("kind", ["bin", "ulg"])
-def test_the_thrust_is_over_mass_where_hover_is_estimated(kind: str, tmp_path: Path) -> None:
-    """The mass is in neither log; the gain is that of the estimate, and the lag is that of the drone."""
-    path = tmp_path / f"log.{kind}"
+def test_the_thrust_is_over_mass_where_hover_is_estimated(tmp_path: Path) -> None:
+    """The mass is not in the log; the gain is that of the estimate, and the lag is that of the drone."""
+    path = tmp_path / "log.ulg"
     columns = lifted()
-    content = (
-        dataflash(columns, hover=HOVER) if kind == "bin" else ulog(columns, quaternion=True, hover=HOVER)
-    )
-    path.write_bytes(content)
+    path.write_bytes(ulog(columns, quaternion=True, hover=HOVER))
     (log,), _ = read_logs([path], {})
     assert THRUST_COMMAND not in log.signals
     thrust_m_s2 = log.signals[THRUST].value
     np.testing.assert_allclose(thrust_m_s2, 9.81 / HOVER * columns["thrust_command"], rtol=1e-5)
 
 
-def test_a_ulog_without_the_estimate_has_the_thrust_in_its_own_unit(tmp_path: Path) -> None:
-    """As before."""
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog(lifted(), quaternion=True))
+@pytest.mark.parametrize("kind", ["bin", "ulg"])
+def test_without_an_estimate_of_hover_the_thrust_has_its_own_unit(kind: str, tmp_path: Path) -> None:
+    """As of ArduCopter, whose set-points of thrust teach it no hover."""
+    path = tmp_path / f"log.{kind}"
+    path.write_bytes(dataflash(lifted()) if kind == "bin" else ulog(lifted(), quaternion=True))
     (log,), _ = read_logs([path], {})
     assert THRUST not in log.signals
     np.testing.assert_allclose(log.signals[THRUST_COMMAND].value, lifted()["thrust_command"], rtol=1e-5)

@@ -2,8 +2,8 @@
 
 Its angles are in degrees, with the signs and the frame of this project. The commands are the set-points of
 GUIDED (GUIA): DesRoll and DesPitch follow them smoothly, as ATC_INPUT_TC says, 0.15 s later, so that they
-show a drone that is quicker than it is. The thrust is the throttle of CTUN over that of hover, which is
-learnt in flight, times g: thrust over mass.
+show a drone that is quicker than it is. The thrust is theirs, a share of the largest: the hover thrust that
+ArduCopter learns is not that of such a flight.
 """
 
 import contextlib
@@ -16,15 +16,14 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.errors import echo
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import DEGREE, THRUST, FlightLog, Signal
+from mambo_sil.model.identify.signals import DEGREE, THRUST_COMMAND, FlightLog, Signal
 
 ATTITUDES: Final = ("ANG", "ATT")
 """Angles, at the rate of the loop if that is there; those of ATT come 10 times a second where ANG exists."""
-SET_POINTS, MOTION, THROTTLE = "GUIA", "XKF1", "CTUN"
+SET_POINTS, MOTION = "GUIA", "XKF1"
 _ANGLES: Final = {"roll_rad": "Roll", "pitch_rad": "Pitch", "yaw_rad": "Yaw"}
 _COMMANDS: Final = {"roll_command_rad": "Roll", "pitch_command_rad": "Pitch"}
 _MOTION: Final = {"x_m": "PN", "y_m": "PE", "z_m": "PD", "vx_m_s": "VN", "vy_m_s": "VE"}
@@ -62,10 +61,7 @@ def read_dataflash(path: Path) -> FlightLog:
     if (motion := messages.get(MOTION)) is not None:
         for signal, field in _MOTION.items():
             signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
-    if (throttle := messages.get(THROTTLE)) is not None:
-        hover = float(np.median(throttle["ThH"]))
-        thrust_m_s2 = GRAVITY_M_S2 / hover * throttle["ThO"]
-        signals[THRUST] = _signal(throttle, thrust_m_s2, f"g*{THROTTLE}.ThO/{THROTTLE}.ThH")
+    signals[THRUST_COMMAND] = _signal(set_points, set_points["Thrust"], f"{SET_POINTS}.Thrust")
     signals = _between(signals, *(1e-6 * set_points[_CLOCK][[0, -1]]).tolist())
     return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
 
@@ -100,9 +96,8 @@ def _messages(path: Path) -> dict[str, Columns]:
 def _columns(reader: Any) -> dict[str, Columns]:
     wanted = {
         **dict.fromkeys(ATTITUDES, (_CLOCK, *_ANGLES.values())),
-        SET_POINTS: (_CLOCK, *_COMMANDS.values()),
+        SET_POINTS: (_CLOCK, *_COMMANDS.values(), "Thrust"),
         MOTION: (_CLOCK, *_MOTION.values()),
-        THROTTLE: (_CLOCK, "ThO", "ThH"),
     }
     found: dict[str, list[list[float]]] = {}
     while (message := reader.recv_match(type=list(wanted))) is not None:
