@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.link.tilt import turned_tilt
@@ -15,8 +16,6 @@ def test_the_thrust_points_where_it_did() -> None:
         np.testing.assert_allclose(direction(there), direction([roll_rad, pitch_rad, yaw_rad]), atol=1e-12)
 
 
-def direction(attitude_rad: list[float]) -> np.ndarray:
+def direction(attitude_rad: list[float]) -> FloatArray:
     """Return where the thrust points (3,) at roll, pitch, yaw."""
-    return to_world(*sine_cosine(np.array(attitude_rad)[:, np.newaxis]), np.array([[0.0], [0.0], [-1.0]]))[
-        :, 0
-    ]
+    return to_world(*sine_cosine(np.array(attitude_rad)), np.array([0.0, 0.0, -1.0]))
