@@ -20,6 +20,7 @@ from mambo_sil.link.pilot import Pilot
 from mambo_sil.link.records import PX4, STACKS, Arm, SetAttitude, SetMode, px4_mode
 from mambo_sil.link.simulated import STARTS_M, Condition
 from mambo_sil.link.steering import Update
+from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.links import controller, drone, simulated
 
@@ -341,3 +342,17 @@ def test_settings_for_the_estimator_of_an_autopilot_are_calm() -> None:
     (unknown, unknown_m), (known, known_m) = map(fly_by_an_estimator, (drone(), SEEN))
     assert known < 0.66 * unknown
     assert known_m < 1.1 * unknown_m
+
+
+@pytest.mark.long
+def test_the_log_shows_the_tilt_of_a_drone_whose_hover_thrust_is_wrong(tmp_path: Path) -> None:
+    """By 20 %, as the thrust that the controller thinks it commands; a tilt accelerates the drone as ever."""
+    pilot, _, updates = simulated("ardupilot", Condition(hover_thrust=0.5, believed=0.6))
+    with pilot:
+        pilot.take_off(1.0)
+        pilot.fly(Gerono(1.5, 1.0), 16.0)
+        pilot.land()
+    write_log(updates, log := tmp_path / "flight.csv")
+    motion = identify(read_logs([log], {})[0])[0].motion
+    assert motion is not None
+    assert motion.acceleration_per_tilt.value == pytest.approx(1.0, abs=0.03)
