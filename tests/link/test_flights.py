@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.flights.wire import Faults, WiredLink
+from mambo_sil.api.frames import wrapped
 from mambo_sil.api.states import TargetState
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
@@ -19,6 +20,7 @@ from mambo_sil.link.pilot import Pilot
 from mambo_sil.link.records import PX4, STACKS, Arm, SetAttitude, SetMode, px4_mode
 from mambo_sil.link.simulated import STARTS_M, Condition
 from mambo_sil.link.steering import Update
+from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.links import controller, drone, simulated
 
@@ -67,6 +69,36 @@ def test_a_program_flies_to_places_with_headings_and_follows_its_targets() -> No
         assert not pilot.go_to((50.0, 0.0, -1.5), within_s=0.5)
     assert not autopilot.armed
     assert SetMode(PX4.land) in autopilot.orders
+
+
+@pytest.mark.long
+def test_a_heading_that_turns_costs_little_on_a_circle() -> None:
+    """The nose follows the path at 1.5 rad/s, and its loop lags by 0.3 rad, which turns no tilt.
+
+    If it did, the drone would be 11 cm off.
+    """
+    pilot, _, updates = simulated("ardupilot")
+    with pilot:
+        pilot.take_off(1.0)
+        pilot.follow(ahead_on_a_circle, 9.0)
+        pilot.land()
+    flown = [one for one in updates if one.target.velocity_m_s[:2].any()]
+    assert horizontal_rms_m(flown, settled_s=4.0) < 0.06
+
+
+def ahead_on_a_circle(time_s: float) -> TargetState:
+    """Return a target on a circle of 1 m, with its nose ahead; it reaches 1.5 rad/s within 3 s."""
+    soft_s = min(time_s, 3.0)
+    rate, change = 0.5 * soft_s, 0.5 if time_s < 3.0 else 0.0
+    angle = 0.25 * soft_s * soft_s + 1.5 * (time_s - soft_s)
+    ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+    right = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    return TargetState(
+        [ahead[1], 1.0 - ahead[0], -1.0],
+        rate * ahead,
+        change * ahead + rate * rate * right,
+        float(wrapped(angle)),
+    )
 
 
 @pytest.mark.long
@@ -310,3 +342,17 @@ def test_settings_for_the_estimator_of_an_autopilot_are_calm() -> None:
     (unknown, unknown_m), (known, known_m) = map(fly_by_an_estimator, (drone(), SEEN))
     assert known < 0.66 * unknown
     assert known_m < 1.1 * unknown_m
+
+
+@pytest.mark.long
+def test_the_log_shows_the_tilt_of_a_drone_whose_hover_thrust_is_wrong(tmp_path: Path) -> None:
+    """By 20 %, as the thrust that the controller thinks it commands; a tilt accelerates the drone as ever."""
+    pilot, _, updates = simulated("ardupilot", Condition(hover_thrust=0.5, believed=0.6))
+    with pilot:
+        pilot.take_off(1.0)
+        pilot.fly(Gerono(1.5, 1.0), 16.0)
+        pilot.land()
+    write_log(updates, log := tmp_path / "flight.csv")
+    motion = identify(read_logs([log], {})[0])[0].motion
+    assert motion is not None
+    assert motion.acceleration_per_tilt.value == pytest.approx(1.0, abs=0.03)

@@ -363,12 +363,24 @@ def _quaternion(roll: Array, pitch: Array, yaw: Array) -> list[Array]:
     ]
 
 
-def dataflash(columns: Mapping[str, Array], *, hover: float = 0.4, every: int = 1) -> bytes:
-    """Return a log in ArduPilot's format DataFlash: ATT, in every n-th row, XKF1 of two estimators, CTUN."""
+def dataflash(
+    columns: Mapping[str, Array],
+    *,
+    every: int = 1,
+    angles: str = "ANG",
+    guided: bool = True,
+) -> bytes:
+    """Return a log in ArduPilot's format DataFlash: set-points if guided, angles, motion.
+
+    The angles come in every n-th row, beside a rare ATT; their DesRoll and DesPitch follow the drone. The
+    motion is that of two estimators. A row a second before the set-points is of something else.
+    """
+    des, labels = "Qfffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw"
     kinds = {
-        129: ("ATT", "Qfffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw"),
+        129: (angles, des, labels),
         130: ("XKF1", "QBfffff", "TimeUS,C,VN,VE,PN,PE,PD"),
-        131: ("CTUN", "Qff", "TimeUS,ThO,ThH"),
+        132: ("GUIA", "QBffff", "TimeUS,Type,Roll,Pitch,Yaw,Thrust"),
+        133: ("ATT" if angles != "ATT" else "OLD", des, labels),
     }
     layouts = {number: "<" + form for number, (_, form, _) in kinds.items()}
 
@@ -376,21 +388,26 @@ def dataflash(columns: Mapping[str, Array], *, hover: float = 0.4, every: int = 
         return b"\xa3\x95" + bytes([number]) + struct.pack(layouts[number], *values)
 
     parts = []
-    for number, (name, form, labels) in kinds.items():
+    for number, (name, form, fields) in kinds.items():
         size = 3 + struct.calcsize(layouts[number])
-        head = struct.pack("<BB4s16s64s", number, size, name.encode(), form.encode(), labels.encode())
+        head = struct.pack("<BB4s16s64s", number, size, name.encode(), form.encode(), fields.encode())
         parts.append(b"\xa3\x95\x80" + head)
-    angles = ("roll_command_rad", "roll_rad", "pitch_command_rad", "pitch_rad", "yaw_rad")
-    degrees = [np.degrees(columns[name]) for name in angles]
-    degrees[-1] = degrees[-1] % 360.0
+    names = ("roll_command_rad", "pitch_command_rad", "roll_rad", "pitch_rad", "yaw_rad")
+    to_roll, to_pitch, roll, pitch, yaw = (np.degrees(columns[name]) for name in names)
     level = np.zeros_like(columns["time_s"])
     motion = [columns.get(name, level) for name in ("vx_m_s", "vy_m_s", "x_m", "y_m", "z_m")]
-    throttle = columns.get("thrust_command", level + hover)
+    throttle = columns.get("thrust_command", level + 0.4)
+    parts.append(message(129, 9 * 10**6, 1.0, 2.0, 3.0, 4.0, 5.0))
+    parts.append(message(130, 9 * 10**6, 0, 1.0, 2.0, 3.0, 4.0, 5.0))
     for row, time_s in enumerate(columns["time_s"].tolist()):
         stamp = round(1e6 * time_s) + 10**7
+        if guided:
+            parts.append(message(132, stamp, 6, to_roll[row], to_pitch[row], yaw[row], throttle[row]))
+        attitude = roll[row], roll[row], pitch[row], pitch[row], yaw[row] % 360.0
         if row % every == 0:
-            parts.append(message(129, stamp, *(each[row] for each in degrees)))
+            parts.append(message(129, stamp, *attitude))
+        if row % 10 == 0:
+            parts.append(message(133, stamp, *attitude))
         parts.append(message(130, stamp, 0, *(each[row] for each in motion)))
         parts.append(message(130, stamp, 1, *(each[row] + 9.0 for each in motion)))
-        parts.append(message(131, stamp, throttle[row], hover))
     return b"".join(parts)

@@ -8,6 +8,8 @@ import pytest
 
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.elementary import sine_cosine
+from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover
 from tests.support.command import run
 from tests.support.px4 import HOLD, MPC, POSITION, Px4Desk, build_px4, px4_settings, status_ulog
@@ -115,6 +117,26 @@ def test_a_stick_moves_the_drone_and_centred_stops_it(
     desk.set(f"px4.{stick}", 0.0)
     desk.run(4000)
     assert np.abs(desk.state.velocity_m_s).max() < 0.05
+
+
+def test_the_thrust_points_where_it_shall_while_the_heading_lags(module: Path) -> None:
+    """Roll and pitch are of the measured heading, but those of a set-point of the heading that it wants."""
+    desk = Px4Desk(module).select(MPC, 500)
+    desk.set("px4.sticks", 1)
+    desk.set("px4.pitch", 1.0)
+    desk.run(500)
+    desk.set("px4.yaw", 1.0)
+    desk.run(300)
+    sent = [desk[name] for name in ("roll", "pitch", "yaw")]
+    wanted = [desk[name] for name in ("s.command_roll", "s.command_pitch", "s.yaw")]
+    assert abs(sent[2] - wanted[2]) > 0.05
+    assert np.abs(wanted[:2]).max() > 0.05
+    np.testing.assert_allclose(thrust_direction(sent), thrust_direction(wanted), atol=1e-5)
+
+
+def thrust_direction(attitude_rad: list[float]) -> FloatArray:
+    """Return where the thrust points (3,) at roll, pitch, yaw."""
+    return to_world(*sine_cosine(np.array(attitude_rad)), np.array([0.0, 0.0, -1.0]))
 
 
 def test_sticks_are_of_the_heading_which_they_turn(module: Path) -> None:

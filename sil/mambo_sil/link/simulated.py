@@ -45,11 +45,12 @@ from mambo_sil.link.records import (
     Text,
 )
 from mambo_sil.link.sockets import Address, MavlinkSocket
+from mambo_sil.link.tilt import turned_tilt
 
 STARTS_M: Final = (0.7, -0.4, 0.0)
 """Where the drone stands; its estimator has another origin, as that of a real one."""
-SILENT_S: Final = 1.0
-"""Time without set-points after which PX4 leaves OFFBOARD, and ArduCopter flies level."""
+SILENT_S: Final = {"PX4": 1.0, "ArduCopter": 3.0}
+"""Time without set-points: PX4 leaves OFFBOARD then (COM_OF_LOSS_T), ArduCopter is level (GUID_TIMEOUT)."""
 CLIMB_M_S, DESCENT_M_S, SPEED_M_S = 1.0, 0.7, 1.5
 POSITION_1_S, VELOCITY_1_S = 0.9, 2.0
 LARGEST_TILT_RAD: Final = 0.35
@@ -207,7 +208,7 @@ class SimulatedAutopilot:
     @property
     def _is_guided(self) -> bool:
         """Whether set-points come."""
-        return self.time_s - self._set_point_s <= SILENT_S
+        return self.time_s - self._set_point_s <= SILENT_S[self.stack.name]
 
     def _fall_back(self) -> None:
         """Do without set-points if they fail to come, and disarm on the ground after landing."""
@@ -226,16 +227,17 @@ class SimulatedAutopilot:
         self._state, moment = self._world.tick(self._state, self.time_s)
         if not self.armed and self.is_on_ground:
             return
+        now_rad = float(self._state.body[8, 0])
         if not self.armed:
             command_rad, thrust_n = np.zeros(2), 0.0
         elif self.mode == self.stack.guided and isinstance(self._set_point, SetAttitude):
             roll_rad, pitch_rad, yaw_rad = self._set_point.attitude_rad.tolist()
-            command_rad, self._yaw_rad = np.array([roll_rad, pitch_rad]), yaw_rad - self._error_rad
+            self._yaw_rad = yaw_rad - self._error_rad
+            command_rad = np.array(turned_tilt(roll_rad, pitch_rad, now_rad - self._yaw_rad))
             thrust_n = self._set_point.thrust / self.condition.hover_thrust * self.drone.hover_demand_n
         else:
             command_rad, thrust_n = self._hold(estimate)
         thrust = np.array([min(thrust_n, self.drone.altitude.thrust_max_n)])
-        now_rad = float(self._state.body[8, 0])
         reference_rad = now_rad + float(wrapped(self._yaw_rad - now_rad))
         self._state, _ = self._vehicle.advance(
             self._state, command_rad[:, np.newaxis], thrust, reference_rad, seen=seen, moment=moment

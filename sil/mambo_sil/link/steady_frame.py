@@ -31,6 +31,9 @@ LONGEST_S: Final = 0.25
 """Time between two estimates from which on a jump cannot be seen."""
 NOISE_M_S: Final = 0.1
 """Change of the velocity that may be noise and motion: where resets are not counted, none is seen in it."""
+SETTLES_S, SETTLING_M = 1.0, 0.005
+"""ArduCopter's estimator moves its position within half a second, by less in each step: for a time after a
+jump smaller changes of the position are taken for its rest."""
 FADING_1_S: Final = 1.05
 """w: after 0.2 m the drone glides with 0.06 m/s at most, and needs 6 s for 95 % of it."""
 
@@ -53,13 +56,14 @@ class SteadyFrame:
         self.heading_change_rad = 0.0
         """What the heading has jumped by so far."""
         self._last: EstimatedState | None = None
+        self._jumped_s = -math.inf
         self._offset_m: FloatArray = np.zeros(3)
         self._offset_m_s: FloatArray = np.zeros(3)
         self._offset_m_s2: FloatArray = np.zeros(3)
 
     def begin(self, estimate: EstimatedState) -> None:
         """Take an estimate as it is, and forget what was before."""
-        self._last = estimate
+        self._last, self._jumped_s = estimate, -math.inf
         self._offset_m, self._offset_m_s, self._offset_m_s2 = np.zeros((3, 3))
 
     def follow(self, estimate: EstimatedState) -> FrameJump | None:
@@ -69,11 +73,19 @@ class SteadyFrame:
             self.begin(estimate)
             return None
         self._fade(passed_s)
-        if not _has_jumped(last, estimate, passed_s):
-            return None
         moved_m, moved_m_s, turned_rad = _changes(last, estimate, passed_s)
-        if estimate.resets is None and float(np.abs(moved_m_s).max()) <= NOISE_M_S:
-            moved_m_s = np.zeros(3)
+        if last.resets is None or estimate.resets is None:
+            far_m = float(np.abs(moved_m).max()) - CLOCK_S * float(np.abs(estimate.velocity_m_s).max())
+            has_turned = abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s
+            if far_m > JUMP_M + ERROR_M_S * passed_s or has_turned:
+                self._jumped_s = estimate.time_s
+            elif far_m <= SETTLING_M or estimate.time_s > self._jumped_s + SETTLES_S:
+                return None
+            turned_rad = turned_rad if has_turned else 0.0
+            if float(np.abs(moved_m_s).max()) <= NOISE_M_S:
+                moved_m_s = np.zeros(3)
+        elif last.resets == estimate.resets:
+            return None
         self.jumps += 1
         self._offset_m = self._offset_m + moved_m
         self._offset_m_s = self._offset_m_s + moved_m_s
@@ -108,13 +120,3 @@ def _changes(
     expected_m = last.position_m + passed_s * 0.5 * (last.velocity_m_s + estimate.velocity_m_s)
     turned_rad = float(wrapped(estimate.attitude_rad[2] - last.attitude_rad[2]))
     return estimate.position_m - expected_m, estimate.velocity_m_s - last.velocity_m_s, turned_rad
-
-
-def _has_jumped(last: EstimatedState, estimate: EstimatedState, passed_s: float) -> bool:
-    """Return whether the frame has moved: by the count of the estimator, else by the size of the change."""
-    if last.resets is not None and estimate.resets is not None:
-        return last.resets != estimate.resets
-    moved_m, _, turned_rad = _changes(last, estimate, passed_s)
-    flown_m = (ERROR_M_S * passed_s) + (CLOCK_S * float(np.abs(estimate.velocity_m_s).max()))
-    is_moved = float(np.abs(moved_m).max()) > JUMP_M + flown_m
-    return is_moved or abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s

@@ -15,6 +15,7 @@ from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.errors import LinkError
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
+from mambo_sil.link.tilt import turned_tilt
 
 PAUSE_S: Final = 0.1
 """Time without an estimate after which the controller begins anew, at the present attitude."""
@@ -153,7 +154,8 @@ class Steering:
             )
         )
         self._jump = None
-        attitude_rad = np.array([roll_rad, pitch_rad, heading_rad])
+        turn_rad = heading_rad - float(estimate.attitude_rad[2])
+        attitude_rad = np.array([*turned_tilt(roll_rad, pitch_rad, turn_rad), heading_rad])
         return SetAttitude(estimate.time_s, attitude_rad, thrust)
 
     def level(self, time_s: float) -> SetAttitude:

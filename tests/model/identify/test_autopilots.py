@@ -23,10 +23,14 @@ def lifted() -> dict[str, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
     return dict.fromkeys(PLACE, np.zeros_like(columns["time_s"])) | columns
 
 
-def test_a_dataflash_log_is_read(tmp_path: Path) -> None:
-    """Degrees, a heading of 0 to 360 and the first of two estimators; the fit is that of the CSV."""
+@pytest.mark.parametrize("angles", ["ANG", "ATT"])
+def test_a_dataflash_log_is_read(angles: str, tmp_path: Path) -> None:
+    """Degrees, a heading of 0 to 360 and the first of two estimators; the fit is that of the CSV.
+
+    ArduCopter 4.7 logs fast angles as ANG, those before it as ATT.
+    """
     path = tmp_path / "00000012.BIN"
-    path.write_bytes(dataflash(FLOWN))
+    path.write_bytes(dataflash(FLOWN, angles=angles))
     (log,), faults = read_logs([path], {})
     assert not faults
     for name in ("roll_command_rad", "roll_rad", "pitch_rad", "x_m", "vy_m_s"):
@@ -40,25 +44,22 @@ def test_a_dataflash_log_is_read(tmp_path: Path) -> None:
     assert abs(found.roll.fitted.gain.value - wanted.roll.fitted.gain.value) < 1e-3
 
 
-@pytest.mark.parametrize("kind", ["bin", "ulg"])
-def test_the_thrust_is_over_mass_where_hover_is_estimated(kind: str, tmp_path: Path) -> None:
-    """The mass is in neither log; the gain is that of the estimate, and the lag is that of the drone."""
-    path = tmp_path / f"log.{kind}"
+def test_the_thrust_is_over_mass_where_hover_is_estimated(tmp_path: Path) -> None:
+    """The mass is not in the log; the gain is that of the estimate, and the lag is that of the drone."""
+    path = tmp_path / "log.ulg"
     columns = lifted()
-    content = (
-        dataflash(columns, hover=HOVER) if kind == "bin" else ulog(columns, quaternion=True, hover=HOVER)
-    )
-    path.write_bytes(content)
+    path.write_bytes(ulog(columns, quaternion=True, hover=HOVER))
     (log,), _ = read_logs([path], {})
     assert THRUST_COMMAND not in log.signals
     thrust_m_s2 = log.signals[THRUST].value
     np.testing.assert_allclose(thrust_m_s2, 9.81 / HOVER * columns["thrust_command"], rtol=1e-5)
 
 
-def test_a_ulog_without_the_estimate_has_the_thrust_in_its_own_unit(tmp_path: Path) -> None:
-    """As before."""
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog(lifted(), quaternion=True))
+@pytest.mark.parametrize("kind", ["bin", "ulg"])
+def test_without_an_estimate_of_hover_the_thrust_has_its_own_unit(kind: str, tmp_path: Path) -> None:
+    """As of ArduCopter, whose set-points of thrust teach it no hover."""
+    path = tmp_path / f"log.{kind}"
+    path.write_bytes(dataflash(lifted()) if kind == "bin" else ulog(lifted(), quaternion=True))
     (log,), _ = read_logs([path], {})
     assert THRUST not in log.signals
     np.testing.assert_allclose(log.signals[THRUST_COMMAND].value, lifted()["thrust_command"], rtol=1e-5)
@@ -86,6 +87,14 @@ def test_rare_angles_name_the_bit_that_ardupilot_needs(tmp_path: Path) -> None:
     path = tmp_path / "log.bin"
     path.write_bytes(dataflash(FLOWN, every=10))
     with pytest.raises(LogError, match=r"has a sample every 0.1 s .*LOG_BITMASK: add 1"):
+        read_logs([path], {})
+
+
+def test_a_log_without_set_points_is_refused(tmp_path: Path) -> None:
+    """Of another mode, whose DesRoll is smoothed: what follows it is quicker than the drone."""
+    path = tmp_path / "log.bin"
+    path.write_bytes(dataflash(FLOWN, guided=False))
+    with pytest.raises(LogError, match=r"log\.bin: has no GUIA: .* log a flight of mambo-nmpc pilot"):
         read_logs([path], {})
 
 

@@ -46,6 +46,14 @@ class Quatf
 public:
 	explicit Quatf(const float q[4]) { memcpy(_q, q, sizeof _q); }
 	explicit Quatf(const Eulerf &euler);
+	Quatf operator*(const Quatf &p) const
+	{
+		const float product[4] {_q[0] *p._q[0] - _q[1] *p._q[1] - _q[2] *p._q[2] - _q[3] *p._q[3],
+			_q[0] *p._q[1] + _q[1] *p._q[0] + _q[2] *p._q[3] - _q[3] *p._q[2],
+			_q[0] *p._q[2] - _q[1] *p._q[3] + _q[2] *p._q[0] + _q[3] *p._q[1],
+			_q[0] *p._q[3] + _q[1] *p._q[2] - _q[2] *p._q[1] + _q[3] *p._q[0]};
+		return Quatf{product};
+	}
 	void copyTo(float q[4]) const { memcpy(q, _q, sizeof _q); }
 	float operator()(int k) const { return _q[k]; }
 private:

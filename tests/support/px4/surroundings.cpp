@@ -219,10 +219,13 @@ static McNmpc *module() { return static_cast<McNmpc *>(McNmpc::desc.object.load(
 static setpoint_t flown(const setpoint_t &setpoint)
 {
 	setpoint_t to = setpoint;
-	const matrix::Eulerf euler{matrix::Quatf{data_vehicle_attitude_setpoint.q_d}};
+	const matrix::Quatf wanted{data_vehicle_attitude_setpoint.q_d};
+	const matrix::Eulerf euler{wanted};
+	// as PX4: the thrust goes where it points in the world, whatever the heading is
+	const matrix::Eulerf tilt{wanted * matrix::Quatf{matrix::Eulerf{0, 0, data_vehicle_local_position.heading - euler.psi()}}};
 
 	to.mode = {modeDisable, modeDisable, modeDisable, modeAbs, modeAbs, modeAbs, modeDisable};
-	to.attitude = {setpoint.timestamp, DEG * euler.phi(), DEG * euler.theta(), -DEG * matrix::wrap_pi(euler.psi() - offset_heading)};
+	to.attitude = {setpoint.timestamp, DEG * tilt.phi(), DEG * tilt.theta(), -DEG * matrix::wrap_pi(euler.psi() - offset_heading)};
 	to.thrust = -data_vehicle_attitude_setpoint.thrust_body[2] * FULL;
 	return to;
 }

@@ -7,7 +7,7 @@ from typing import Final
 
 from mambo_codegen.errors import echo
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.signals import DEGREE, OPTIONAL, REQUIRED, TIME
+from mambo_sil.model.identify.signals import DEGREE, OPTIONAL, REQUIRED, START_THRUST, TIME
 
 _DEGREES: Final = "deg"
 _MOST_SHOWN: Final = 20
@@ -63,6 +63,7 @@ KNOWN: Final[dict[str, tuple[Column, ...]]] = {
         Column("nmpc.vy", -1.0),
     ),
     "thrust_acceleration_m_s2": (Column("thrust_acceleration_m_s2"),),
+    START_THRUST: (Column(START_THRUST),),
     "thrust_command": (
         Column("thrust_command"),
         Column("controller.cmd_thrust"),

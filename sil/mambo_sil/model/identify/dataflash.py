@@ -1,7 +1,9 @@
 """Read a DataFlash log of ArduPilot's copter (.bin), with the reader of the optional package pymavlink.
 
-Its angles are in degrees, with the signs and the frame of this project. The thrust is the throttle of CTUN
-over that of hover, which is learnt in flight, times g: thrust over mass.
+Its angles are in degrees, with the signs and the frame of this project. The commands are the set-points of
+GUIDED (GUIA): DesRoll and DesPitch follow them smoothly, as ATC_INPUT_TC says, 0.15 s later, so that they
+show a drone that is quicker than it is. The thrust is theirs, a share of the largest: the hover thrust that
+ArduCopter learns is not that of such a flight.
 """
 
 import contextlib
@@ -14,25 +16,25 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.errors import echo
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import DEGREE, THRUST, FlightLog, Signal
+from mambo_sil.model.identify.signals import DEGREE, THRUST_COMMAND, FlightLog, Signal
 
-ATTITUDE, MOTION, THROTTLE = "ATT", "XKF1", "CTUN"
-_ANGLES: Final = {
-    "roll_command_rad": "DesRoll",
-    "pitch_command_rad": "DesPitch",
-    "roll_rad": "Roll",
-    "pitch_rad": "Pitch",
-    "yaw_rad": "Yaw",
-}
+ATTITUDES: Final = ("ANG", "ATT")
+"""Angles, at the rate of the loop if that is there; those of ATT come 10 times a second where ANG exists."""
+SET_POINTS, MOTION = "GUIA", "XKF1"
+_ANGLES: Final = {"roll_rad": "Roll", "pitch_rad": "Pitch", "yaw_rad": "Yaw"}
+_COMMANDS: Final = {"roll_command_rad": "Roll", "pitch_command_rad": "Pitch"}
 _MOTION: Final = {"x_m": "PN", "y_m": "PE", "z_m": "PD", "vx_m_s": "VN", "vy_m_s": "VE"}
 _BEGINS: Final = b"\xa3\x95\x80"
 """The definition of a message, which comes first."""
 _CLOCK: Final = "TimeUS"
 _FASTER: Final = "log attitude fast (LOG_BITMASK: add 1, ATTITUDE_FAST)"
+_NO_SET_POINTS: Final = (
+    f"has no {SET_POINTS}: without set-points of the attitude it shows only how the drone follows "
+    "ArduCopter's own smooth target, not a command; log a flight of mambo-nmpc pilot"
+)
 
 Columns = dict[str, FloatArray]
 
@@ -44,21 +46,23 @@ def read_dataflash(path: Path) -> FlightLog:
     """
     name = echo(str(path))
     messages = _messages(path)
-    attitude = messages.get(ATTITUDE)
-    if attitude is None:
-        raise LogError((f"{name}: has no {ATTITUDE}; it is no DataFlash log of a copter, or {_FASTER}",))
-    signals = {}
+    kind = next((one for one in ATTITUDES if one in messages), None)
+    if kind is None:
+        raise LogError((f"{name}: has no {ATTITUDES[-1]}; it is no DataFlash log of a copter, or {_FASTER}",))
+    if (set_points := messages.get(SET_POINTS)) is None:
+        raise LogError((f"{name}: {_NO_SET_POINTS}",))
+    attitude, signals = messages[kind], {}
+    for signal, field in _COMMANDS.items():
+        signals[signal] = _signal(set_points, DEGREE * set_points[field], f"deg*{SET_POINTS}.{field}")
     for signal, field in _ANGLES.items():
         values = DEGREE * attitude[field]
         values = np.unwrap(values) if signal == "yaw_rad" else values
-        signals[signal] = _signal(attitude, values, f"deg*{ATTITUDE}.{field}")
+        signals[signal] = _signal(attitude, values, f"deg*{kind}.{field}")
     if (motion := messages.get(MOTION)) is not None:
         for signal, field in _MOTION.items():
             signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
-    if (throttle := messages.get(THROTTLE)) is not None:
-        hover = float(np.median(throttle["ThH"]))
-        thrust_m_s2 = GRAVITY_M_S2 / hover * throttle["ThO"]
-        signals[THRUST] = _signal(throttle, thrust_m_s2, f"g*{THROTTLE}.ThO/{THROTTLE}.ThH")
+    signals[THRUST_COMMAND] = _signal(set_points, set_points["Thrust"], f"{SET_POINTS}.Thrust")
+    signals = _between(signals, *(1e-6 * set_points[_CLOCK][[0, -1]]).tolist())
     return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
 
 
@@ -91,9 +95,9 @@ def _messages(path: Path) -> dict[str, Columns]:
 
 def _columns(reader: Any) -> dict[str, Columns]:
     wanted = {
-        ATTITUDE: (_CLOCK, *_ANGLES.values()),
+        **dict.fromkeys(ATTITUDES, (_CLOCK, *_ANGLES.values())),
+        SET_POINTS: (_CLOCK, *_COMMANDS.values(), "Thrust"),
         MOTION: (_CLOCK, *_MOTION.values()),
-        THROTTLE: (_CLOCK, "ThO", "ThH"),
     }
     found: dict[str, list[list[float]]] = {}
     while (message := reader.recv_match(type=list(wanted))) is not None:
@@ -109,6 +113,15 @@ def _quiet() -> Any:
     """Keep the reader from printing what it thinks of a file."""
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         yield
+
+
+def _between(signals: dict[str, Signal], first_s: float, last_s: float) -> dict[str, Signal]:
+    """Return what lies between two times."""
+    cut = {}
+    for name, signal in signals.items():
+        inside = (signal.time_s >= first_s) & (signal.time_s <= last_s)
+        cut[name] = Signal(signal.time_s[inside], signal.value[inside], signal.column)
+    return cut
 
 
 def _signal(message: Columns, values: FloatArray, column: str) -> Signal:

@@ -14,6 +14,7 @@ from mambo_sil.model.identify.signals import (
     COMMANDS,
     HEIGHT,
     POSITION,
+    START_THRUST,
     THRUST,
     THRUST_COMMAND,
     TILTS,
@@ -130,7 +131,8 @@ def _cut_stretch(
     velocity = _velocity(log, time_s)
     yaw = _onto(time_s, log.signals[YAW], turn=True) if YAW in log.signals else np.zeros_like(time_s)
     thrust = log.signals.get(THRUST)
-    thrust_m_s2 = None if thrust is None else _onto(time_s, thrust)
+    is_measured = thrust is not None and START_THRUST not in log.signals
+    thrust_m_s2 = _onto(time_s, thrust) if thrust is not None and is_measured else None
     height_m = -_onto(time_s, log.signals[HEIGHT]) if HEIGHT in log.signals else None
     sent = log.signals.get(THRUST_COMMAND, thrust)
     thrust_command = None

@@ -29,7 +29,7 @@ TAKE_OVERS: Final = "take_overs"
 START_TILTS: Final = ("start_roll_rad", "start_pitch_rad")
 """The angles with which it did."""
 START_THRUST: Final = "start_thrust_m_s2"
-"""The thrust over mass with which it did."""
+"""The thrust over mass with which it did; a log that has it says in `THRUST` what was commanded."""
 JUMPS: Final = "estimator_jumps"
 """How often the frame of the estimates has jumped."""
 JUMP: Final = (
