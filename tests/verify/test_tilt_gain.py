@@ -16,7 +16,7 @@ from tests.support.subjects import Harm, few_played, played_fault, subject
 from tests.support.tools import require
 
 KINDS: Final = {"small angles": height_case(5, "float32"), "thrust vector": height_case(6, "float32")} | {
-    f"level {k}": quadratic_case(k, "float32") for k in (0, 1, 2)
+    f"level {k}": quadratic_case(k, "float32") for k in (0,)
 }
 """With a height, limits and guard, with small angles and with the thrust vector; and without a height."""
 FAULTS: Final = {
@@ -62,7 +62,8 @@ def learning(kind: str, scalar: str) -> Settings:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("scalar", ["float32", "float64", "fixed"])
+@pytest.mark.sampled(2)
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_calls_have_the_bits_of_the_reference(kind: str, scalar: str, tmp_path: Path) -> None:
     """Commands, gains, means, and what is saturated."""
@@ -71,6 +72,7 @@ def test_random_calls_have_the_bits_of_the_reference(kind: str, scalar: str, tmp
 
 
 @pytest.mark.first_is_quick
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_in_the_tilt_gain_is_found(fault: str, tmp_path: Path) -> None:
     """By other bits than those of the reference."""
@@ -84,12 +86,11 @@ def test_a_fault_in_the_tilt_gain_is_found(fault: str, tmp_path: Path) -> None:
 def test_no_call_breaks_a_promise(tmp_path: Path) -> None:
     """Whatever the drone does, no command leaves the tilt limit, and a held one stays."""
     require("clang", "clang")
-    result = fuzzing.check(subject(learning("thrust vector", "float32"), tmp_path), runs=5_000)
+    result = fuzzing.check(subject(learning("thrust vector", "float32"), tmp_path), runs=1_000)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
-@pytest.mark.sampled(4)
-@pytest.mark.long
+@pytest.mark.thorough
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_no_rule_is_broken(scalar: str, tmp_path: Path) -> None:
     """MISRA C, but for the deviations that the manual lists."""
