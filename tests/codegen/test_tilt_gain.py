@@ -187,6 +187,15 @@ def _numbers(found: TiltGainState) -> Any:
     return [value.tolist() for value in vars(found).values()]
 
 
+@pytest.mark.parametrize("settings", [LEVEL, HIGH])
+def test_it_stores_four_means_and_a_gain_of_each_angle(settings: Settings) -> None:
+    """Behind the attitude model, as nmpc_t has them."""
+    stored = Quadratic(settings).stored
+    without = Quadratic(with_option(settings, "observer.tilt_gain", "given")).stored
+    assert stored == (*without[:16], *["acceleration"] * 8, *["factor"] * 2, *without[16:])
+    assert len(controller(settings).stored[0]) == len(stored)
+
+
 def test_without_it_the_c_is_that_of_before() -> None:
     """No word of it."""
     files = render(with_option(HIGH, "observer.tilt_gain", "given"), with_digest=False)
