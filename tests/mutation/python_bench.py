@@ -83,6 +83,7 @@ ROOMS: Final = {
             *(f"{_CONSTANTS}/test_{name}.py" for name in ("stored_numbers", "tracker_constants")),
             "tests/codegen/test_limits.py",
             "tests/codegen/test_preview.py",
+            "tests/codegen/test_tilt_gain.py",
         ),
     ),
     "laws": Room(
@@ -94,7 +95,14 @@ ROOMS: Final = {
             "tests/codegen/test_quadratic_settings.py",
             "tests/codegen/test_preview.py",
         ),
-        without=("tracker_constants.py", "limits_constants.py", "height_constants.py"),
+        without=(
+            *("tracker_constants.py", "limits_constants.py", "height_constants.py"),
+            "tilt_gain_constants.py",
+        ),
+    ),
+    "tilt gain": Room(
+        source=(f"{_METHODS}/tilt_gain_constants.py",),
+        tests=("tests/codegen/test_tilt_gain.py",),
     ),
     "derive": Room(
         source=("sil/mambo_sil/model/derive/*.py",),

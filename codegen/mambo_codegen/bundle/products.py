@@ -20,6 +20,7 @@ _NAMES: Final = (
         "halved",
         "initial_error",
         "knee_product",
+        "learning_product",
         "noise_product",
     ),
     *("move_acceleration", "per_step2_product", "per_step_product", "position_change"),

@@ -181,7 +181,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     scalar = settings.code.scalar
     return (
         products(fixed=numbers.formats is not None, weighs=method.has_height)
-        | {"height": None, "guard": None, "doubts": False, "vector": None}
+        | {"height": None, "guard": None, "doubts": False, "vector": None, "tilt_gain": None}
         | method.context
         | {
             "settings": settings,

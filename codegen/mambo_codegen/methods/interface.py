@@ -127,6 +127,7 @@ class Method(Constants):
             *(("tracker", self.tracker), ("guard", self.guard), ("height", self.has_height)),
             ("limits", self.limiting),
             ("thrust_vector", self.has_thrust_vector),
+            ("tilt_gain", self.learns_tilt_gain),
             ("float", self.numbers.formats),
         )
         absent = {name for name, needed in needs if not needed}

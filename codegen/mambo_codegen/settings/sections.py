@@ -287,6 +287,11 @@ class Observer(SettingsSection):
         description="Time without a good state, in seconds, over which the controller flies on by its "
         "prediction; after it the last command holds. At most 250 update periods.",
     )
+    tilt_gain: Literal["given", "learnt"] = Field(
+        "given",
+        description='Whether model.roll_gain and model.pitch_gain are right, "given", or "learnt" in flight, '
+        "within 0.5 to 1.6 of them: for a drone whose gains are known to 10 % or worse.",
+    )
 
 
 class Damping(SettingsSection):

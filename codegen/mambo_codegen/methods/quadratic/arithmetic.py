@@ -106,6 +106,10 @@ class QuadraticArithmetic(Arithmetic):
         change = self._nearest((gain * by_m) + (other_gain * by_m_step), "gain_correction")
         return self._within(change, _MOST_GAIN_CHANGE)
 
+    def learning_product(self, rate: Any, acceleration_m_step2: Real) -> Real:
+        """Return rate * acceleration, a relative change of the tilt gain."""
+        return self._nearest(rate * acceleration_m_step2, "learning_product")
+
     def reach_product(self, steps: Any, velocity_m_step: Real) -> Real:
         """Return steps * velocity, m."""
         return self._nearest(steps * velocity_m_step, "reach_product")

@@ -1,5 +1,6 @@
 """Attitude model: how the drone accelerates in answer to the commands."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -76,16 +77,31 @@ class AttitudeModel:
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
     def change_command(
-        self, attitude: AttitudeState, before_rad: Real, after_rad: Real, weight: Real | None = None
+        self,
+        attitude: AttitudeState,
+        before_rad: Real,
+        after_rad: Real,
+        weight: Real | None = None,
+        gain: Real | None = None,
     ) -> AttitudeState:
-        """Change the last commands from `before_rad` to `after_rad` (n, 2), roll and pitch."""
+        """Change the last commands from `before_rad` to `after_rad` (n, 2), roll and pitch.
+
+        They stand for `gain` (n, 2) times as much, if there is one.
+        """
         if self.vector is not None:
-            before, after = (self._commanded(self.vector, rad, weight) for rad in (before_rad, after_rad))
+            before, after = (
+                self._commanded(self.vector, self._meant(rad, gain), weight)
+                for rad in (before_rad, after_rad)
+            )
             return replace(attitude, command=clamp(attitude.command + (after - before), self._limit))
-        change_rad = after_rad - before_rad
+        change_rad = self._meant(after_rad - before_rad, gain)
         product = self.weighed(self._products.tilt_product(self._command_gain, change_rad), weight)
         change = np.stack([product[:, 0], -product[:, 1]], axis=1)
         return replace(attitude, command=clamp(attitude.command + change, self._limit))
+
+    def _meant(self, command_rad: Real, gain: Real | None) -> Real:
+        """Return commands (n, 2) of the model that stand for those that were sent."""
+        return command_rad if gain is None else self._products.angle_product(gain, command_rad)
 
     def _commanded(self, vector: ThrustVector, command_rad: Real, weight: Real | None) -> Real:
         """Return the accelerations (n, 2) of the attitude that commands (n, 2) lead to."""
@@ -174,10 +190,13 @@ class AttitudeModel:
             pitch = self._trim_command[1] - product[:, 1]
         return np.stack([roll, pitch], axis=1)
 
-    def largest_commands(self, limit: Real, tilt_rad: Real) -> tuple[Real, Real]:
+    def largest_commands(
+        self, limit: Real, tilt_rad: Real, sent: Callable[[Real], Real] | None = None
+    ) -> tuple[Real, Real]:
         """Return the largest and the least roll and pitch (n, 2) of moves along one axis.
 
-        The moves are at most `limit` (n, 2); with the thrust vector the angles are at most tilt_rad (n,).
+        The moves are at most `limit` (n, 2); with the thrust vector the angles are at most tilt_rad (n,), and
+        with a learnt gain, by which `sent` turns the model's commands into those that are sent.
         """
         most, zero = self._products.move_acceleration(limit), np.zeros_like(limit)
         both = [
@@ -186,7 +205,9 @@ class AttitudeModel:
             )
             for side in (most, -most)
         ]
-        if self.vector is not None:
+        if sent is not None:
+            both = [sent(side) for side in both]
+        if self.vector is not None or sent is not None:
             both = [clamp(side, tilt_rad[:, None]) for side in both]
         return np.maximum(*both), np.minimum(*both)
 

@@ -12,6 +12,7 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     ThrustVectorConstants,
     thrust_vector_constants,
 )
+from mambo_codegen.methods.quadratic.tilt_gain_constants import TiltGainConstants, tilt_gain_constants
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import LimitsConstants, stored_quantities
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
@@ -34,6 +35,11 @@ class QuadraticConstants(Constants):
     def thrust_vector(self) -> ThrustVectorConstants | None:
         """The constants of the thrust vector, in float64; None with small angles."""
         return thrust_vector_constants(self.settings, self.attitude.gain_m_step2_rad)
+
+    @cached_property
+    def tilt_gain(self) -> TiltGainConstants | None:
+        """The constants of the tilt gain, in float64; None if none is learnt."""
+        return tilt_gain_constants(self.settings)
 
     @cached_property
     def observer(self) -> ObserverConstants:
@@ -74,6 +80,7 @@ class QuadraticConstants(Constants):
         """The quantity of each number in nmpc_t, in their order."""
         observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
+        attitude += [*["acceleration"] * 8, *["factor"] * 2] if self.tilt_gain else []
         tracker = [quantity for quantity in self._stored_tracker for _ in "xy"]
         limiting = stored_quantities("move", "move") if self.limiting else ()
         if self.limiting and self.settings.target.gives_acceleration:

@@ -1,6 +1,7 @@
 """Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +11,7 @@ from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.height import HeightBounds
 from mambo_codegen.methods.quadratic.observer import Estimate
 from mambo_codegen.methods.quadratic.step import CheckedInputs, ControlStep, QuadraticMemory
+from mambo_codegen.methods.quadratic.tilt_gain import unknown_gain
 from mambo_codegen.methods.shared.inputs import Inputs, Rows, Status, choose, within
 from mambo_codegen.methods.shared.limits import LimitsMemory
 from mambo_codegen.methods.shared.limits_constants import LIMITS
@@ -76,7 +78,11 @@ class QuadraticController:
         memory = self.memory
         height = self._height.set_command(memory.height, given[:, 2:])
         attitude = self._model.change_command(
-            memory.attitude, memory.command_rad, given[:, 0:2], self._height.command_weight(height)
+            memory.attitude,
+            memory.command_rad,
+            given[:, 0:2],
+            self._height.command_weight(height),
+            memory.tilt_gain.gain if self.parts.tilt_gain else None,
         )
         new = replace(memory, command_rad=given[:, 0:2], attitude=attitude, height=height)
         self.memory = choose(good, new, memory)
@@ -193,13 +199,19 @@ class QuadraticController:
             if (budget := self.parts.tilt_budget)
             else zeros,
             is_coarse=np.zeros(n, np.bool_),
+            tilt_gain=unknown_gain(zeros, self._numbers.constant(1.0, "factor")),
         )
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
         limits, command = self.memory.limits, self.memory.command_rad
-        most, least = self._model.largest_commands(limits.command_limit, limits.bounds.tilt_rad)
+        limit, learnt = limits.command_limit, self.parts.tilt_gain
+        if learnt is not None:
+            share = learnt.share(self.memory.tilt_gain)
+            limit = self.parts.products.factor_product(limit, share)
+        sent = partial(learnt.sent, self.memory.tilt_gain) if learnt else None
+        most, least = self._model.largest_commands(limit, limits.bounds.tilt_rad, sent)
         is_largest = (command >= most) | (command <= least)
         return np.asarray(np.any(is_largest, axis=1))
 
@@ -234,6 +246,8 @@ class QuadraticController:
         columns = [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2]
         columns += [attitude.tilt, attitude.integral, attitude.lagged, attitude.command]
         columns += [attitude.sine[:, None], attitude.cosine[:, None]]
+        if self.parts.tilt_gain is not None:
+            columns += self.parts.tilt_gain.stored(memory.tilt_gain)
         columns += self.parts.tracker.stored(motion) if self.parts.tracker else []
         columns += [*self._height.stored(memory.height), self.stored_limits]
         if self._constants.feedback_steps is not None:

@@ -34,6 +34,7 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     has_thrust_vector,
     thrust_vector_constants,
 )
+from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_constants
 from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import tracker_constants
@@ -122,12 +123,16 @@ def _formats(*sections: Any) -> QuadraticFormats:
     law, height = law_constants(settings), height_constants(settings)
     vector = thrust_vector_constants(settings, attitude.gain_m_step2_rad)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
+    learnt = tilt_gain_constants(settings)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
     ranges = settings.ranges
     loops = np.concatenate([attitude.tilt_row, attitude.integral_row])
     laws, gain, ratios = law.rows, observer.gain[np.newaxis], np.abs(law.ratios)
     if observer.coarse_gain is not None:
         gain = np.concatenate([gain, observer.coarse_gain[np.newaxis]])
+    if learnt is not None:
+        means = [[*row.tolist(), 0.0, 0.0] for row in (learnt.quick_row, learnt.slow_row)]
+        loops = np.concatenate([loops, means])
     if height is not None:
         laws = np.concatenate([laws, np.insert(height.rows, INTEGRAL, 0.0, axis=1)[np.newaxis]])
         loops = np.concatenate([loops, np.insert(height.thrust_row, 1, 0.0)[np.newaxis]])
@@ -143,7 +148,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
     bits = {
         "position": position,
         "velocity": fractional_bits(2 * ranges.velocity_m_s),
-        "angle": fractional_bits(bounds.angle),
+        "angle": fractional_bits(bounds.angle * (learnt.inverse.most if learnt else 1.0)),
         "yaw": fractional_bits(YAW_LIMIT_RAD),
         "thrust": fractional_bits(bounds.thrust_m_s2),
         "speed": speed,
@@ -161,6 +166,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
         "per_noise": fractional_bits(tracker.noise.steps2_per_m) if tracker and tracker.noise else 0,
+        "learning": fractional_bits(learnt.rate_step2_m) if learnt else 0,
         "factor": FACTOR_BITS,
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
@@ -286,6 +292,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
             float(np.max(rows @ [states[name] for name in _ATTITUDE_STATES])),
             turned,
             (3 * target) + (2 * jerk),
+            (4 * LAGGED * states["a"]) if settings.observer.tilt_gain == "learnt" else 0.0,
         ),
         move=move,
         angle=max(
@@ -340,8 +347,9 @@ def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int
         "target_product": ("tracker", target_input, "acceleration"),
         "noise_product": ("per_noise", "acceleration", "factor"),
         "factor_product": ("factor", "acceleration", "acceleration"),
+        "learning_product": ("learning", "acceleration", "factor"),
     }
-    unused = {name for name in ("drag", "age", "tracker", "per_noise") if not bits[name]}
+    unused = {name for name in ("drag", "age", "tracker", "per_noise", "learning") if not bits[name]}
     shifts = {
         name: bits[one] + bits[other] - bits[result]
         for name, (one, other, result) in factors.items()

@@ -20,6 +20,7 @@ from mambo_codegen.methods.quadratic.optimizer import row_quantities
 from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.step_choices import step_choices
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
+from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
@@ -41,6 +42,7 @@ class Quadratic(QuadraticConstants, Method):
         "trigonometry": "sine and cosine of the heading",
         "thrust_vector": "the direction of the thrust",
         "attitude": "how the drone answers the commands",
+        "tilt_gain": "how much it tilts, over what the model says",
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
         "optimizer": "the minimum of the cost",
@@ -57,7 +59,13 @@ class Quadratic(QuadraticConstants, Method):
         *("command_rad", "thrust_m_s2"),
     )
     iterates: ClassVar[bool] = False
-    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS, "height.thrust_gain", "model.tilt")
+    unnamed: ClassVar[tuple[str, ...]] = (
+        "target",
+        *LATER_LIMITS,
+        "height.thrust_gain",
+        "model.tilt",
+        "observer.tilt_gain",
+    )
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec sine_cosine"),
         "refuse_nan": (
@@ -141,6 +149,7 @@ class Quadratic(QuadraticConstants, Method):
             "law": self.law,
             **height_context(self.height),
             **thrust_vector_context(self.thrust_vector),
+            **tilt_gain_context(self.tilt_gain),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
             "doubts": self.tracker is not None and self.tracker.noise is not None,
@@ -215,6 +224,7 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
     tells_noise = constants.tracker is not None and constants.tracker.noise is not None
+    learns = constants.learns_tilt_gain
     wanted = {
         "speed_product": True,
         **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),
@@ -230,7 +240,8 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
             ("reach_product", "gravity_product", "step2_product", "thrust_product"),
             constants.has_height,
         ),
-        "factor_product": constants.has_height or tells_noise,
+        "factor_product": constants.has_height or tells_noise or learns,
+        "learning_product": learns,
         "noise_product": tells_noise,
         "target_product": constants.tracker is not None,
         "tracker_product": constants.tracker is not None,

@@ -14,11 +14,15 @@ from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, Hei
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
+from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory, limits_law
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.representation import PREVIEW_TIMES
+
+_GROUNDED: Final = 9
+"""The column of a state that says whether the drone touches the floor, if there is a height."""
 
 REST_M_S: Final = 0.02
 """After an outage the model brakes to this speed along both axes; then the command is level."""
@@ -44,6 +48,7 @@ class QuadraticMemory:
     height_bounds: HeightBounds | None
     budget_rad: Real
     is_coarse: Rows
+    tilt_gain: TiltGainState
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,9 @@ class ControlStep:
         self.tilt_budget: VariationBudget | None = None
         if guard := constants.guard:
             self.tilt_budget = VariationBudget(products, guard.tilt_rad, guard.tilt_growth_rad, "angle")
+        self.tilt_gain: TiltGain | None = None
+        if learnt := constants.tilt_gain:
+            self.tilt_gain = TiltGain(learnt, products)
         self._feedback = constants.feedback_steps and np.array(
             [constant(steps, "feedback") for steps in constants.feedback_steps]
         )
@@ -124,10 +132,11 @@ class ControlStep:
             else self.model.accelerations(slope, lift.weight)
         )
         tilt = np.where(seen, measured, attitude.tilt)
+        memory = replace(memory, tilt_gain=self._learn(memory, inputs, none_yet, attitude.tilt, measured))
         world = self._to_world(attitude, tilt)
         estimate = self._observe(memory, inputs, none_yet, world)
         aim = self._aim(memory, inputs, lift, estimate)
-        moves, by_thrust = self._minimize(attitude, estimate, aim, tilt)
+        moves, by_thrust = self._minimize(memory, attitude, estimate, aim, tilt)
         attitude, command, budget = self._command(memory, inputs, attitude, moves, aim)
         return QuadraticMemory(
             estimate=self.observer.predict(estimate, world),
@@ -141,6 +150,7 @@ class ControlStep:
             height_bounds=memory.height_bounds,
             budget_rad=budget,
             is_coarse=memory.is_coarse,
+            tilt_gain=memory.tilt_gain,
         )
 
     def shift(self, memory: QuadraticMemory, jump: FrameShift) -> QuadraticMemory:
@@ -175,6 +185,25 @@ class ControlStep:
             return self.height.share(tilt_rad), None
         share, slope = vector.of_measured(angles)
         return np.where(inputs.has_state, share, self.commanded_share(memory.command_rad)), slope
+
+    def _learn(
+        self, memory: QuadraticMemory, inputs: CheckedInputs, none_yet: Rows, model: Real, measured: Real
+    ) -> TiltGainState:
+        """Return what the accelerations (n, 2) of the model's and of the measured tilt say of the gain."""
+        before = memory.tilt_gain
+        if self.tilt_gain is None:
+            return before
+        restarts = none_yet
+        if inputs.state.shape[1] > _GROUNDED:
+            restarts = restarts | (inputs.state[:, _GROUNDED] != 0)
+        limit = memory.limits.bounds.tilt_rad[:, None]
+        learnt = self.tilt_gain.learn(before, model, measured, memory.command_rad, limit)
+        kept = self.tilt_gain.restart(before, model, measured, restarts)
+        return choose(inputs.has_state, choose(restarts, kept, learnt), before)
+
+    def _sent(self, memory: QuadraticMemory, command_rad: Real) -> Real:
+        """Return what is sent for commands (n, 2) of the model."""
+        return self.tilt_gain.sent(memory.tilt_gain, command_rad) if self.tilt_gain else command_rad
 
     def _with_thrust(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
         """Return the memory of the limits, with whether the thrust limited the last command (n,)."""
@@ -275,19 +304,21 @@ class ControlStep:
     ) -> tuple[AttitudeState, Real, Real]:
         """Return the models with the next commands, roll and pitch (n, 2) that are sent, and the budgets."""
         moved = replace(attitude, command=self.products.move_acceleration(moves))
-        command = self._angles(moved.command, aim.weight)
+        command = self._sent(memory, self._angles(moved.command, aim.weight))
         held, tilt_limit = memory.command_rad, memory.limits.bounds.tilt_rad[:, None]
         if self._feedback is not None:  # the C adds none where its factor is 0: a sum with 0 has no sign -0
             fed = self._feedback != 0
             command = np.where(fed, command + self._rate_feedback(memory, inputs), command)
-            without = clamp(self._angles(attitude.command, aim.weight), tilt_limit)
+            without = self._sent(memory, self._angles(attitude.command, aim.weight))
+            without = clamp(without, tilt_limit)
             held = np.where(fed & (memory.missed == 0)[:, None], without, held)
         command, budget = clamp(command, tilt_limit), memory.budget_rad
         if self.tilt_budget is not None:
             wanted = command
             command, left = self.tilt_budget.spend(budget, memory.command_rad, wanted)
             command, budget = clamp(command, tilt_limit), np.where(aim.has_command[:, None], left, budget)
-            told = self.model.change_command(moved, wanted, command, aim.weight)
+            gain = memory.tilt_gain.gain if self.tilt_gain else None
+            told = self.model.change_command(moved, wanted, command, aim.weight, gain)
             moved = choose((command != wanted).any(axis=1), told, moved)
         command = np.where(aim.has_command[:, None], command, held)
         attitude, level = choose(aim.has_command, moved, attitude), np.zeros_like(command)
@@ -305,7 +336,7 @@ class ControlStep:
         return self.model.command_rad(self.height.over_weight(command, weight))
 
     def _minimize(
-        self, attitude: AttitudeState, estimate: Estimate, aim: _Aim, tilt: Real
+        self, memory: QuadraticMemory, attitude: AttitudeState, estimate: Estimate, aim: _Aim, tilt: Real
     ) -> tuple[Real, Rows]:
         """Return the first free moves (n, 2), right and forward, with the acceleration `tilt` (n, 2).
 
@@ -331,7 +362,10 @@ class ControlStep:
             attitude.command,
             *led[1:],
         ]
-        limit, spare = self.model.weighed(aim.limits.command_limit, aim.weight), self.height.spare(aim.height)
+        limit, spare = aim.limits.command_limit, self.height.spare(aim.height)
+        if self.tilt_gain is not None:
+            limit = self.products.factor_product(limit, self.tilt_gain.share(memory.tilt_gain))
+        limit = self.model.weighed(limit, aim.weight)
         if spare is None:
             return self.optimizer.minimize(np.stack(state, axis=2), limit), np.zeros(len(tilt), np.bool_)
         left = self.products.to_move(spare)[:, None]

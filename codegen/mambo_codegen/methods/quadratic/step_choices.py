@@ -104,7 +104,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         tilt_limit="self->bounds.tilt_rad" if has_limits else "NMPC_TILT_LIMIT_RAD",
         angles=angles,
         fed=fed,
-        limited=angles if has_height else fed,
+        limited=angles if has_height or constants.learns_tilt_gain else fed,
         held=f"hold(self, attitude{inverse});" if constants.feedback_steps else "/* The command holds. */",
         cleared=_cleared(has_height=has_height) if tracker else (),
         rested=target_members(constants),

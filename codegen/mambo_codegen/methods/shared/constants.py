@@ -95,6 +95,11 @@ class Constants(ABC):
         return self.has_height and self.settings.model.tilt == "exact"
 
     @property
+    def learns_tilt_gain(self) -> bool:
+        """Whether the controller learns how much the drone tilts."""
+        return self.settings.observer is not None and self.settings.observer.tilt_gain == "learnt"
+
+    @property
     def state(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_state_t, in their order."""
         return (*STATE, *HEIGHT, *CONTACT) if self.has_height else STATE
