@@ -137,8 +137,8 @@ def test_rotorpy_is_flown_by_its_controller_and_by_ours() -> None:
     require_module("rotorpy")
     flights: Any = importlib.import_module("benchmarks.simulators.rotorpy_flights")
     hover = Mission("hover", Hover(), 1.0, largest_mm)
-    for factors in (np.ones(6), None):
-        one = flights.RotorpyDrone(factors)
+    for challenger in (np.ones(6), Designed(flights.HUMMINGBIRD)):
+        one = flights.RotorpyDrone(challenger)
         path = fly_alone(one, hover, 1, flights.noise())
         assert path.position_m.shape == (101, 1, 3)
         assert np.linalg.norm(path.position_m[:, 0] - [0.0, 0.0, 1.0], axis=1).max() < 0.02

@@ -26,7 +26,7 @@ from mambo_sil.model.identify.manoeuvre import DURATION_S, SINES_HZ, waypoints_c
 from mambo_sil.model.identify.motion import Motion, fit_motion
 from mambo_sil.model.identify.response import FittedResponse
 from mambo_sil.model.identify.segments import PERIOD_S, HeldCommand, Segment, cut
-from mambo_sil.model.identify.signals import COMMANDS, THRUST_COMMAND, FlightLog, Signal
+from mambo_sil.model.identify.signals import COMMANDS, START_THRUST, THRUST_COMMAND, FlightLog, Signal
 
 Array = NDArray[np.float64]
 
@@ -126,9 +126,8 @@ def test_a_short_log_does_not_lose_the_integrator(trace: Path, begin_s: float, e
 @pytest.mark.long
 def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
     """From the true motion: 0.067 1/s, and g per radian."""
-    motion = motion_of(
-        trace, {name: Column(name) for name in KNOWN if name not in (*COMMANDS, THRUST_COMMAND)}
-    )
+    missing = (*COMMANDS, THRUST_COMMAND, START_THRUST)
+    motion = motion_of(trace, {name: Column(name) for name in KNOWN if name not in missing})
     assert abs(motion.acceleration_per_tilt.value - 1.0) < 0.001
     assert abs(motion.drag_1_s.value - 0.067) < 0.002
 
