@@ -20,7 +20,7 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x74701A36UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x0D5751AAUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
