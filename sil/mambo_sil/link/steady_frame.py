@@ -73,24 +73,28 @@ class SteadyFrame:
             self.begin(estimate)
             return None
         self._fade(passed_s)
+        jump = self._jump(last, estimate, passed_s)
+        if jump is not None:
+            self.jumps += 1
+            self._offset_m = self._offset_m + jump.position_m
+            self._offset_m_s = self._offset_m_s + jump.velocity_m_s
+            self.heading_change_rad += jump.heading_rad
+        return jump
+
+    def _jump(self, last: EstimatedState, estimate: EstimatedState, passed_s: float) -> FrameJump | None:
+        """Return by what the frame has moved: where resets are not counted, what motion and noise are not."""
         moved_m, moved_m_s, turned_rad = _changes(last, estimate, passed_s)
-        if last.resets is None or estimate.resets is None:
-            far_m = float(np.abs(moved_m).max()) - CLOCK_S * float(np.abs(estimate.velocity_m_s).max())
-            has_turned = abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s
-            if far_m > JUMP_M + ERROR_M_S * passed_s or has_turned:
-                self._jumped_s = estimate.time_s
-            elif far_m <= SETTLING_M or estimate.time_s > self._jumped_s + SETTLES_S:
-                return None
-            turned_rad = turned_rad if has_turned else 0.0
-            if float(np.abs(moved_m_s).max()) <= NOISE_M_S:
-                moved_m_s = np.zeros(3)
-        elif last.resets == estimate.resets:
+        if last.resets is not None and estimate.resets is not None:
+            return None if last.resets == estimate.resets else FrameJump(moved_m, moved_m_s, turned_rad)
+        far_m = float(np.abs(moved_m).max()) - CLOCK_S * float(np.abs(estimate.velocity_m_s).max())
+        has_turned = abs(turned_rad) > JUMP_RAD + RATE_RAD_S * passed_s
+        if far_m > JUMP_M + ERROR_M_S * passed_s or has_turned:
+            self._jumped_s = estimate.time_s
+        elif far_m <= SETTLING_M or estimate.time_s > self._jumped_s + SETTLES_S:
             return None
-        self.jumps += 1
-        self._offset_m = self._offset_m + moved_m
-        self._offset_m_s = self._offset_m_s + moved_m_s
-        self.heading_change_rad += turned_rad
-        return FrameJump(moved_m, moved_m_s, turned_rad)
+        if float(np.abs(moved_m_s).max()) <= NOISE_M_S:
+            moved_m_s = np.zeros(3)
+        return FrameJump(moved_m, moved_m_s, turned_rad if has_turned else 0.0)
 
     def moved(self, target: TargetState) -> TargetState:
         """Return a target as far off as the rest of the jumps; its heading is its own."""
