@@ -140,7 +140,6 @@ def unexplained(bench: Bench, tried: list[Mutant]) -> list[Mutant]:
     """Return the faults that go unnoticed without a reason."""
     unnoticed = bench.unnoticed(tried)
     found = [one for one in unnoticed if not is_explained(one.key, REASONS, bench.settings)]
-    assert len(found) < len(unnoticed), "those that have a reason run to the end"
     return [one for one in found if bench.fate(one) is Fate.SURVIVED]
 
 
@@ -153,8 +152,9 @@ def test_a_fault_is_noticed_or_explained(tmp_path: Path, scalar: str, settings: 
     its = subject(in_scalar(settings, scalar), tmp_path)
     bench = Bench(its)
     assert bench.difference() is None
-    turn = zlib.crc32((its.bundle / "nmpc.c").read_bytes()) % STRIDE
-    tried = [mutant for path in FILES for mutant in bench.mutants_of(path)][turn::STRIDE]
+    found = [mutant for path in FILES for mutant in bench.mutants_of(path)]
+    keys = [mutant.key for mutant in found if mutant.file == "nmpc.c"]  # the same in every version
+    tried = found[zlib.crc32(repr(keys).encode()) % STRIDE :: STRIDE]
     assert [one.key for one in unexplained(bench, tried)] == []
 
 

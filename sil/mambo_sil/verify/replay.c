@@ -368,11 +368,14 @@ static int shifts_alike(nmpc_t *self, nmpc_t *other)
 {
     const float position_m[3] = { 0.5f, -0.25f, 0.125f };
     const float velocity_m_s[3] = { 0.0078125f, -0.015625f, 0.25f };
+    const float far[3] = { 0.0f, 1e9f, 0.0f };
     const nmpc_real_t position[3] = { NMPC_POSITION(0.5), NMPC_POSITION(-0.25), NMPC_POSITION(0.125) };
     const nmpc_real_t velocity[3] = { NMPC_VELOCITY(0.0078125), NMPC_VELOCITY(-0.015625), NMPC_VELOCITY(0.25) };
 
     return (nmpc_float_shift(self, NULL, velocity_m_s, 0.0625f) == NMPC_NULL_POINTER)
            && (nmpc_float_shift(self, position_m, NULL, 0.0625f) == NMPC_NULL_POINTER)
+           && (nmpc_float_shift(self, far, velocity_m_s, 0.0625f) == NMPC_BAD_SHIFT)
+           && (nmpc_float_shift(self, position_m, far, 0.0625f) == NMPC_BAD_SHIFT)
            && (nmpc_float_shift(self, position_m, velocity_m_s, 0.0625f) == NMPC_OK)
            && (nmpc_shift(other, position, velocity, NMPC_YAW(0.0625)) == NMPC_OK);
 }
