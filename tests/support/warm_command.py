@@ -7,6 +7,7 @@ this process, and ends with the exit code of the fork.
 python -m tests.support.warm_command SOCKET   serve until standard input ends
 """
 
+import gc
 import importlib
 import json
 import os
@@ -59,6 +60,7 @@ def _main(name: str) -> None:
     for module in pkgutil.walk_packages(mambo_sil.__path__, "mambo_sil."):
         importlib.import_module(module.name)
     importlib.import_module("matplotlib.pyplot")
+    gc.freeze()  # a fork neither looks for garbage in what is imported nor copies it
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(name)
