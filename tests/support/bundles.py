@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mambo_codegen.bundle import bundle
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings.model import Settings
 
 FILES = {
     "README.md": "What.\n",
@@ -20,6 +23,11 @@ def place(files: Mapping[str, str], folder: Path) -> Path:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
     return folder
+
+
+def write_target(name: str, settings: Settings, folder: Path) -> Path:
+    """Write the firmware target `name` for `settings` into `folder`, and return it."""
+    return place(render_target(settings, TARGETS[name], with_digest=False), folder)
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -11,12 +11,9 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
-from mambo_codegen.settings.model import Settings
 from mambo_sil.board import desk
-from mambo_sil.drone.plant.arrays import FloatArray, IntArray
-from tests.support.bundles import place
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from tests.support.shell import shell
 from tests.support.tools import require
 
@@ -80,14 +77,6 @@ def link(objects: Sequence[Path], output: Path) -> Any:
     """Link objects as a shared library, and load it."""
     shell(require("gcc", "gcc"), "-shared", *objects, "-lm", "-o", output)
     return _INTERFACE.dlopen(str(output))
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a controller of a simulated flight returns."""
-
-    command_rad: FloatArray
-    status: IntArray
 
 
 class Crazyflie:
@@ -191,7 +180,7 @@ class Fleet:
         for app in apps:
             app.modes("modeAbs")
 
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Answer:
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
         """Run the ticks of an update; states (n, 7) and targets (n, 6) as in `PositionController`."""
         del thrust_acceleration_m_s2
         if self._updates % self._updates_per_setpoint == 0:
@@ -199,7 +188,7 @@ class Fleet:
                 app.aim(one)
         self._updates += 1
         commands = [app.update(one) for app, one in zip(self.apps, state, strict=True)]
-        return Answer(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))
+        return Applied(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))
 
 
 def app_sources(folder: Path) -> list[Path]:
@@ -245,11 +234,6 @@ def build(folder: Path) -> Built:
     } | {"host": compile_host(HOST, folder / "host.o")}
     link([*objects.values()], folder / "app.so")
     return Built(folder, objects, folder / "app.so")
-
-
-def folder_of(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`."""
-    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
 
 
 def send(app: Crazyflie, x: float, speed: float = 0.0, acceleration: float = 0.0) -> None:

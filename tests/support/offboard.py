@@ -12,11 +12,11 @@ import numpy as np
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Circle
-from tests.support.crazyflie import Answer
 
 TICK_S: Final = 0.002
 LOG_TICKS: Final = 5
@@ -83,7 +83,7 @@ class Air:
         if self._arrives():
             self._up.append((self.time_s + self.radio.up_s, np.radians([roll, pitch])))
 
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Answer:
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
         """Log the state, let the script run, and return what has arrived; called every tick."""
         del target, thrust_acceleration_m_s2
         self.time_s = self._tick * TICK_S
@@ -103,7 +103,7 @@ class Air:
         if self.time_s - self._commanded_s > LEVEL_OUT_S:
             self._command = np.zeros(2)
         self._tick += 1
-        return Answer(self._command[np.newaxis], np.zeros(1, np.int64))
+        return Applied(self._command[np.newaxis], np.zeros(1, np.int64))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The scripts of the Crazyflie's app: written, imported and run."""
+"""The scripts of the Crazyflie's app: imported and run."""
 
 import builtins
 import importlib
@@ -10,22 +10,13 @@ from typing import Any
 
 import pytest
 
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.model import Settings
-from tests.support.bundles import place
 from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
 
 SETTINGS = presets.preset("crazyflie")
 PLACE = (1.0, -0.5, 0.1)
 """Where the drone stands: x, y, height of the floor."""
 MODULES = ("heading", "radio", "figures", "checks", "fly", "simulated_drone", "offboard")
-
-
-def write(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`."""
-    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
 
 
 def modules_of(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, ModuleType]:

@@ -5,20 +5,22 @@ from types import ModuleType
 
 import pytest
 
-from tests.support.crazyflie import Built, build, folder_of
-from tests.support.scripts import SETTINGS, modules_of, write
+from tests.support.bundles import write_target
+from tests.support.crazyflie import Built, build
+from tests.support.radio import Drone
+from tests.support.scripts import SETTINGS, modules_of, ready
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Return the app for preset crazyflie, compiled."""
-    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+    return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("crazyflie")))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the target."""
-    return write(SETTINGS, tmp_path_factory.mktemp("app"))
+    return write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("app"))
 
 
 @pytest.fixture
@@ -26,3 +28,9 @@ def scripts(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> di
     """Return the modules of the folder, imported anew, in an empty working folder."""
     monkeypatch.chdir(tmp_path)
     return modules_of(folder, monkeypatch)
+
+
+@pytest.fixture
+def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
+    """Return a drone that is ready to fly, and put it and its clock under the scripts."""
+    return ready(scripts, monkeypatch)

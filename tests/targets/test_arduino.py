@@ -6,12 +6,9 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen import boards
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.model import Settings
-from tests.support.bundles import place
+from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require, require_file
@@ -39,11 +36,6 @@ SUBJECTS = {
 }
 
 
-def folder_of(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`."""
-    return place(render_target(settings, TARGETS["arduino"], with_digest=False), folder)
-
-
 def library(folder: Path) -> list[Path]:
     """Return the sources that the builder compiles: all in src."""
     return sorted((folder / "src").glob("*.c"))
@@ -61,7 +53,7 @@ def sketch(folder: Path) -> Path:
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Path) -> None:
     """The self-test passes, no input is refused, and the drone stands within a centimetre of its target."""
-    folder = folder_of(SUBJECTS[name], tmp_path)
+    folder = write_target("arduino", SUBJECTS[name], tmp_path)
     for source in library(folder):
         shell(require("gcc", "gcc"), "-std=gnu11", *STRICT, "-c", source, "-o", folder / f"{source.stem}.o")
     flags = ("-std=gnu++11", *STRICT, f"-I{STUBS}", f"-I{folder}/src")
@@ -83,7 +75,7 @@ def test_the_core_of_debian_builds_and_links_the_example_for_the_mega(name: str,
     """Library and sketch without a warning, with the core's own flags, into the memory of an ATmega2560."""
     core = require_file(CORE / "cores/arduino/Arduino.h", "arduino-core-avr").parent
     c, cxx = require("avr-gcc", "gcc-avr"), require("avr-g++", "gcc-avr")
-    folder = folder_of(SUBJECTS[name], tmp_path)
+    folder = write_target("arduino", SUBJECTS[name], tmp_path)
     headers = (f"-I{core}", f"-I{CORE / 'variants/mega'}", f"-I{folder / 'src'}")
     modern = ("-std=gnu++11", "-fno-exceptions", "-fno-threadsafe-statics")
     for source in library(folder):
@@ -105,7 +97,7 @@ def test_the_core_of_debian_builds_and_links_the_example_for_the_mega(name: str,
 def test_without_a_flag_the_bits_are_kept(tmp_path: Path) -> None:
     """An Arduino core for a Cortex-M4F has a GNU dialect and no place for a library's flags."""
     compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    folder = folder_of(SUBJECTS["mambo"], tmp_path)
+    folder = write_target("arduino", SUBJECTS["mambo"], tmp_path)
     flags = (*boards.load("crazyflie").compiler.flags, "-std=gnu11", "-Os", *STRICT, "-ffreestanding")
     shell(compiler, *flags, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
     assert "\tvfm" not in shell(
@@ -116,7 +108,7 @@ def test_without_a_flag_the_bits_are_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_keywords_are_the_names_of_the_header(name: str, tmp_path: Path) -> None:
     """All functions, types and statuses of both headers, and no others; a tab separates name and kind."""
-    folder = folder_of(SUBJECTS[name], tmp_path)
+    folder = write_target("arduino", SUBJECTS[name], tmp_path)
     listed = dict(line.split("\t") for line in (folder / "keywords.txt").read_text("utf-8").splitlines())
     headers = "".join(path.read_text("utf-8") for path in sorted((folder / "src").glob("*.h")))
     header = re.sub(r"/\*.*?\*/", "", headers, flags=re.DOTALL)
@@ -132,7 +124,7 @@ def test_keywords_are_the_names_of_the_header(name: str, tmp_path: Path) -> None
 
 def test_library_properties_have_every_field_that_the_ide_wants(tmp_path: Path) -> None:
     """Of its library specification, 1.5 format."""
-    folder = folder_of(SUBJECTS["mambo"], tmp_path)
+    folder = write_target("arduino", SUBJECTS["mambo"], tmp_path)
     lines = (folder / "library.properties").read_text("utf-8").splitlines()
     fields = dict(line.split("=", 1) for line in lines)
     wanted = ("name", "version", "author", "maintainer", "sentence", "paragraph", "category", "architectures")

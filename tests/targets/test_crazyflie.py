@@ -18,6 +18,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Circle
+from tests.support.bundles import write_target
 from tests.support.crazyflie import (
     TURNED,
     Built,
@@ -26,7 +27,6 @@ from tests.support.crazyflie import (
     build,
     content,
     flown_since,
-    folder_of,
     send,
 )
 
@@ -111,7 +111,7 @@ def test_a_set_point_that_no_other_follows_does_not_run_away(built: Built) -> No
 @pytest.mark.long
 def test_a_given_acceleration_is_that_of_the_set_point(tmp_path: Path) -> None:
     """With target.acceleration = "given" the flight is that of the controller alone; a wrong sign counts."""
-    given = build(folder_of(with_option(SETTINGS, "target.acceleration", "given"), tmp_path))
+    given = build(write_target("crazyflie", with_option(SETTINGS, "target.acceleration", "given"), tmp_path))
     apps = [given.app(), *(given.mutant(name, *mutant) for name, mutant in GIVEN_MUTANTS.items())]
     alone = fly(flight_of(1), CompiledController(with_option(SETTINGS, "target.acceleration", "given")))
     right, *wrong = np.abs(flown_by(apps).position_m - alone.position_m).max(axis=(0, 2))
@@ -250,7 +250,7 @@ def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_p
     """The console names the step and the flag; the firmware then refuses to fly."""
     app = built.app()
     assert app.host.controllerOutOfTreeTest()
-    folder = folder_of(SETTINGS, tmp_path)
+    folder = write_target("crazyflie", SETTINGS, tmp_path)
     header = folder / "src" / "nmpc.h"
     text = header.read_text("utf-8")
     wrong = text.replace("define NMPC_UPDATE_STEP_S 0.01f", "define NMPC_UPDATE_STEP_S 0.0101f")
@@ -266,7 +266,7 @@ def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_p
 def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
     """They act at the next update; a weight out of range changes nothing; the cost is logged."""
     settings = presets.preset("mambo-1norm")
-    weighted = build(folder_of(settings, tmp_path))
+    weighted = build(write_target("crazyflie", settings, tmp_path))
     here, costs = np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0]), []
     for tracking in (settings.cost.tracking_weight, 2 * settings.cost.tracking_weight, np.nan):
         app = weighted.app()
@@ -281,7 +281,7 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
 
 def test_limits_are_parameters(tmp_path: Path) -> None:
     """A fence in the firmware's frame, y to the left, acts at the next update; a bad one changes nothing."""
-    limited = build(folder_of(with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
+    limited = build(write_target("crazyflie", with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
     app = limited.app()
     for name in ("speed", "tilt"):
         app.set_parameter(name, 100.0)
@@ -317,7 +317,7 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
 
 def test_missing_variances_are_said_once(tmp_path: Path) -> None:
     """In the worker's task, when the app starts: a lost position goes unnoticed then."""
-    quiet = build(folder_of(SETTINGS, tmp_path)).host()
+    quiet = build(write_target("crazyflie", SETTINGS, tmp_path)).host()
     quiet.host_has_variances = False
     app = Crazyflie(quiet)
     scheduled = app.host.host_scheduled

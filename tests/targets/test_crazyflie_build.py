@@ -12,6 +12,7 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
+from tests.support.bundles import write_target
 from tests.support.command import run
 from tests.support.crazyflie import (
     FIRMWARE_FLAGS,
@@ -22,7 +23,6 @@ from tests.support.crazyflie import (
     Crazyflie,
     app_sources,
     compile_host,
-    folder_of,
     link,
     send,
 )
@@ -55,7 +55,7 @@ SUBJECTS = {
 def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path) -> None:
     """Every warning of the firmware is an error there."""
     compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    folder = folder_of(SUBJECTS[name], tmp_path)
+    folder = write_target("crazyflie", SUBJECTS[name], tmp_path)
     for source in sorted((folder / "src").glob("*.c")):
         shell(
             *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding"),
@@ -66,7 +66,7 @@ def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path)
 @pytest.mark.parametrize("name", ["crazyflie", "prefix"])
 def test_names_that_are_linked_have_the_prefix(name: str, tmp_path: Path) -> None:
     """All files are linked into one firmware, whose names they must not meet."""
-    folder, prefix = folder_of(SUBJECTS[name], tmp_path), SUBJECTS[name].code.prefix
+    folder, prefix = write_target("crazyflie", SUBJECTS[name], tmp_path), SUBJECTS[name].code.prefix
     sources = sorted((folder / "src").glob("*_app*.c"))
     objects = [compile_host(source, folder / f"{source.stem}.o") for source in sources]
     listed = shell(require("nm", "binutils"), "--defined-only", "-g", "-j", *objects).split()
@@ -98,7 +98,7 @@ def test_every_log_and_parameter_has_its_documentation(name: str) -> None:
 def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
     """By the compiler's figures, along the calls that it saw: a tick without the PID controller's."""
     compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    folder = folder_of(SETTINGS, tmp_path)
+    folder = write_target("crazyflie", SETTINGS, tmp_path)
     frames: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
     for source in (folder / "src" / "nmpc.c", *app_sources(folder)):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods import method_of
-from tests.support.crazyflie import Built, Crazyflie, build, folder_of
+from tests.support.bundles import write_target
+from tests.support.crazyflie import Built, Crazyflie, build
 from tests.support.height_settings import height_settings
 
 MOST_N = 0.48
@@ -20,7 +21,7 @@ AXES = (("x", 1.0), ("y", -1.0), ("z", 1.0))
 @pytest.fixture(scope="module")
 def lifting(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Return the app for preset crazyflie with a height, compiled."""
-    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("lifting")))
+    return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("lifting")))
 
 
 def hovering(lifting: Built, height_m: float = 1.0) -> Crazyflie:
@@ -191,7 +192,7 @@ def test_floor_ceiling_and_speeds_are_parameters(tmp_path: Path) -> None:
     """None looser than in the settings."""
     values = SETTINGS.model_dump(exclude_none=True)
     values["limits"] |= {"speed_m_s": 3.0, "fence": {"floor_m": -0.5, "ceiling_m": 2.0}}
-    app = hovering(build(folder_of(type(SETTINGS).model_validate(values), tmp_path)))
+    app = hovering(build(write_target("crazyflie", type(SETTINGS).model_validate(values), tmp_path)))
     ticks(app, 11)
     for name, value in (("zMin", -3.0), ("zMax", 1.2), ("climb", 0.5)):
         app.set_parameter(name, value)

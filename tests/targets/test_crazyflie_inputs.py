@@ -11,11 +11,13 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
 from mambo_sil.model.replay.log_replay import replay_log
-from tests.support.crazyflie import Answer, Built, Crazyflie, Fleet, build, folder_of
+from tests.support.bundles import write_target
+from tests.support.crazyflie import Built, Crazyflie, Fleet, build
 
 SETTINGS = with_option(presets.preset("crazyflie"), "target.acceleration", "given")
 LOGGED = (
@@ -27,7 +29,7 @@ LOGGED = (
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Return the target, compiled."""
-    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+    return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("crazyflie")))
 
 
 def filtered(app: Crazyflie, time_ms: int, delay_ms: int) -> None:
@@ -141,7 +143,7 @@ class Logging:
         self.fleet, self.app = Fleet([app], 3), app
         self.rows: list[list[float]] = []
 
-    def step(self, *inputs: np.ndarray) -> Answer:
+    def step(self, *inputs: np.ndarray) -> Applied:
         """Make a step, and log it."""
         if len(self.rows) == 150:
             self.app.ticks += 10  # another controller flew

@@ -11,15 +11,9 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings.controller_toml import with_option
+from tests.support.bundles import write_target
 from tests.support.radio import ARMED, CAN_FLY, FLYING, Drone
-from tests.support.scripts import PLACE, SETTINGS, at_call, interrupt, modules_of, ready, run, without, write
-
-
-@pytest.fixture
-def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
-    """Return a drone that is ready to fly, and put it and its clock under the scripts."""
-    return ready(scripts, monkeypatch)
-
+from tests.support.scripts import PLACE, SETTINGS, at_call, interrupt, modules_of, run, without
 
 PREPARED = ["set_value", "stop"]
 LANDED = ["notify", "land", "stop", "close"]
@@ -341,7 +335,7 @@ def test_scripts_have_the_prefix_and_what_given_accelerations_need(
 ) -> None:
     """The group of logs and parameters is that of the app."""
     settings = with_option(with_option(SETTINGS, "code.prefix", "left"), "target.acceleration", "given")
-    radio = modules_of(write(settings, tmp_path), monkeypatch)["radio"]
+    radio = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)["radio"]
     assert radio.GROUP == "left"
     assert radio.LOGGED[0][:2] == ("left.step", "left.x")
     assert "left.targetAy" in radio.LOGGED[2]

@@ -6,7 +6,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tests.support.scripts import SETTINGS, modules_of, run, without, write
+from tests.support.bundles import write_target
+from tests.support.scripts import SETTINGS, modules_of, run, without
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,7 @@ def test_a_simulation_of_other_settings_or_vehicles_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A controller.toml that was changed after generate; a vehicle that is not known."""
-    folder = write(SETTINGS, tmp_path / "app")
+    folder = write_target("crazyflie", SETTINGS, tmp_path / "app")
     scripts = modules_of(folder, monkeypatch)
     assert run(scripts, "hover", "--simulate", "crazyfly") == 1
     assert "crazyfly" in capsys.readouterr().err

@@ -10,16 +10,10 @@ from types import ModuleType
 import pytest
 
 from mambo_codegen.settings.controller_toml import with_option
+from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
 from tests.support.radio import LOG_BYTES, Drone, LogConfig
-from tests.support.scripts import at_call, modules_of, ready, run, write
-
-
-@pytest.fixture
-def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Drone:
-    """Return a drone that is ready to fly, and put it and its clock under the scripts."""
-    return ready(scripts, monkeypatch)
-
+from tests.support.scripts import at_call, modules_of, run
 
 LANDED, STOPPED = ["notify", "land", "stop", "close"], ["stop_setpoint", "notify", "stop", "close"]
 TROUBLES: dict[str, tuple[dict[str, float], str, list[str]]] = {
@@ -123,7 +117,7 @@ def test_a_figure_longer_than_a_battery_is_refused(
 def test_log_blocks_fit_the_radio(given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each a packet; at 2 and 1 Mbit/s every update is logged, at 250 kbit/s every second one."""
     settings = with_option(height_settings(), "target.acceleration", given)
-    radio = modules_of(write(settings, tmp_path), monkeypatch)["radio"]
+    radio = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)["radio"]
     for names in radio.LOGGED:
         block = LogConfig("block", 10)
         for name in names:

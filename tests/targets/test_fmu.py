@@ -6,7 +6,7 @@ import sys
 import zipfile
 from collections.abc import Callable, Sequence
 from ctypes import CDLL
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -16,20 +16,19 @@ import numpy as np
 import pytest
 
 from mambo_codegen.bundle.fmu import fmu_variables
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.trajectories import CURVES, Bernoulli
-from tests.support.bundles import place
+from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require, require_module
@@ -61,7 +60,7 @@ def unit_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], 
         require("cc", "gcc")
         require_module("fmpy")
         folder = tmp_path_factory.mktemp("units")
-        place(render_target(SUBJECTS[name], TARGETS["fmu"], with_digest=False), folder)
+        write_target("fmu", SUBJECTS[name], folder)
         shell(sys.executable, folder / "build.py")
         return folder
 
@@ -79,15 +78,6 @@ def unpacked(unit_file: Callable[[str, str], Path], tmp_path: Path) -> Callable[
         return folder
 
     return unpack
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """What a controller of a simulated flight returns."""
-
-    command_rad: FloatArray
-    status: IntArray
-    thrust_m_s2: FloatArray | None = None
 
 
 class Unit:
@@ -138,7 +128,7 @@ class Unit:
 
     def step(
         self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray | None = None
-    ) -> Outputs:
+    ) -> Applied:
         """Set the inputs, make a step of an update period, and return the outputs."""
         places = dict(zip(MEASURED, state[0], strict=False))
         given = ("target_ax", "target_ay") if "target_ax" in self.reference else ()
@@ -150,7 +140,7 @@ class Unit:
         self.advance(self._period_s)
         status, command = np.array(self.get_status(STATUS)), np.array([self.read(*COMMANDED)])
         thrust = np.array(self.read("thrust_command")) if thrust_acceleration_m_s2 is None else None
-        return Outputs(command, status, thrust)
+        return Applied(command, status, thrust)
 
     def close(self) -> None:
         """Release the unit and its library."""
@@ -305,7 +295,7 @@ def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp
         "fixed height": height_settings("fixed"),
     }
     settings = (SUBJECTS | fixed)[name]
-    folder = place(render_target(settings, TARGETS["fmu"], with_digest=False), tmp_path)
+    folder = write_target("fmu", settings, tmp_path)
     headers = Path(str(import_module("fmpy").__file__)).parent / "c-code"
     for version in VERSIONS:
         sources = [folder / "sources" / f"{stem}.c" for stem in ("nmpc", "nmpc_fmu", f"fmi{version}")]

@@ -4,7 +4,6 @@ import math
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -17,12 +16,13 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
-from tests.support.bundles import place
+from tests.support.bundles import place, write_target
 from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
@@ -56,14 +56,6 @@ SUBJECTS = {
 }
 
 
-@dataclass(frozen=True)
-class Angles:
-    """What a controller of a simulated flight returns."""
-
-    command_rad: FloatArray
-    status: IntArray
-
-
 class FlightProcess:
     """A process on an emulated ARM that has loaded the library."""
 
@@ -95,7 +87,7 @@ class Processes:
     def __init__(self, processes: Sequence[FlightProcess]) -> None:
         self._processes = processes
 
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Angles:
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
         """Return the angles of the second tick, in which the state is NaN: they are held since the first."""
         thrusts_n = NOMINAL.body.mass_kg * thrust_acceleration_m_s2
         held = []
@@ -103,7 +95,7 @@ class Processes:
             process.tick(one, aim, float(thrust_n))
             held.append(process.tick(np.full(7, np.nan), aim, float(thrust_n)))
         rows = np.array(held, np.float64)
-        return Angles(rows[:, 1::-1], rows[:, 2].astype(np.int64))
+        return Applied(rows[:, 1::-1], rows[:, 2].astype(np.int64))
 
 
 @contextmanager
@@ -217,7 +209,7 @@ def test_the_flags_of_both_toolboxes_build_it_without_a_word(
 ) -> None:
     """One has no optimisation, one -O3; both are gnu89, warnings are errors; the block needs only libm."""
     compiler = require("arm-linux-gnueabi-gcc", "gcc-arm-linux-gnueabi and libc6-dev-armel-cross")
-    place(render_target(SUBJECTS[name], TARGETS["mambo"], with_digest=False), tmp_path)
+    write_target("mambo", SUBJECTS[name], tmp_path)
     shell(
         *(compiler, *VENDOR_FLAGS, optimisation, "-shared", "-Wl,--no-undefined"),
         *("src/nmpc.c", "src/nmpc_mambo.c", "-lm", "-o", "block.so"),

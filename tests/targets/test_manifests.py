@@ -11,7 +11,7 @@ from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
-from tests.support.bundles import place
+from tests.support.bundles import place, write_target
 from tests.support.height_settings import height_settings
 from tests.support.shell import shell
 from tests.support.tools import require
@@ -35,11 +35,6 @@ add_subdirectory(component)
 """
 
 
-def folder_of(name: str, folder: Path) -> Path:
-    """Write a target of preset mambo into `folder`."""
-    return place(render_target(presets.preset("mambo"), TARGETS[name], with_digest=False), folder)
-
-
 def fused(folder: Path, *flags: str) -> int:
     """Compile the library for a Cortex-M4F with `flags`, and count its fused multiply-adds."""
     require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
@@ -52,7 +47,7 @@ def fused(folder: Path, *flags: str) -> int:
 
 def test_flags_of_library_json_keep_the_bits(tmp_path: Path) -> None:
     """PlatformIO adds them to those of the board; without them a GNU dialect fuses products and sums."""
-    folder = folder_of("platformio", tmp_path)
+    folder = write_target("platformio", presets.preset("mambo"), tmp_path)
     listed = json.loads((folder / "library.json").read_text("utf-8"))
     assert (listed["name"], listed["headers"]) == ("nmpc", "nmpc.h")
     assert re.fullmatch(r"\d+\.\d+\.\d+(-dev\d+)?", listed["version"])
@@ -65,7 +60,7 @@ def test_the_component_is_compiled_by_its_cmakelists(tmp_path: Path) -> None:
     """With CMake and a RISC-V compiler, and `-ffp-contract=off` on its command line."""
     require("cmake", "cmake")
     require("riscv64-unknown-elf-gcc", "gcc-riscv64-unknown-elf")
-    folder_of("espidf", tmp_path / "component")
+    write_target("espidf", presets.preset("mambo"), tmp_path / "component")
     (tmp_path / "CMakeLists.txt").write_text(PROJECT, "utf-8")
     shell(
         *(

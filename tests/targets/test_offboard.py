@@ -11,27 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
-from mambo_codegen.settings import presets
 from mambo_nmpc import Controller
-from tests.support.bundles import place
+from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
 from tests.support.offboard import Flown, Radio, fly_offboard
 from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
-from tests.support.scripts import interrupt, modules_of, without
+from tests.support.scripts import SETTINGS, interrupt, modules_of, without
 
-SETTINGS = presets.preset("crazyflie")
 PREPARED, STOPPED = ["set_value"], ["stop_setpoint", "notify", "close"]
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "offboard.md"
 STATE = {"x": 1.0, "y": -0.5, "z": 0.1, "vx": 0.0, "vy": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the target."""
-    files = render_target(SETTINGS, TARGETS["crazyflie"], with_digest=False)
-    return place(files, tmp_path_factory.mktemp("app"))
 
 
 @pytest.fixture
@@ -82,8 +71,7 @@ def test_with_a_height_in_the_settings_the_stock_firmware_flies_it(
     drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The script sends the same kind of set-points."""
-    files = render_target(height_settings(), TARGETS["crazyflie"], with_digest=False)
-    imported(place(files, tmp_path), drone, monkeypatch).main()
+    imported(write_target("crazyflie", height_settings(), tmp_path), drone, monkeypatch).main()
     assert capsys.readouterr().out == "landed\n"
     assert drone.names() == [*PREPARED, "zdistance", *STOPPED]
 
