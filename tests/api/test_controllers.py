@@ -24,10 +24,10 @@ from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
 from mambo_sil.model.derive.chosen_tilt import chosen_text
-from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 from tests.support.one_norm import ONE_NORM
 
-DERIVED = controller_toml.parse(controller_text(vehicle_toml.preset("crazyflie"), "x"), "x")
+DERIVED = settings_for(vehicle_toml.preset("crazyflie"))
 RECIPROCAL_M_S2 = RECIPROCAL_ERROR * GRAVITY_M_S2
 """Error of the thrust in hover with `[height]`, whose C divides by products."""
 RNG = np.random.default_rng(5)
@@ -61,7 +61,7 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     axis = "{ gain = 0.9, lag_s = 0.05, dead_time_s = 0.02 }"
     attitude = f"[attitude]\nkind = 'first_order'\nroll = {axis}\npitch = {axis}\n"
     file.write_text(f"[body]\nmass_kg = 0.05\ndrag_1_s = 0.3\n{attitude}", "utf-8")
-    derived = controller_toml.parse(controller_text(vehicle_toml.read(file), "mine"), "mine")
+    derived = settings_for(vehicle_toml.read(file))
     assert Controller.from_vehicle(file).settings == derived
     assert Controller.from_vehicle(str(file)).settings == derived
     quick = Controller.from_vehicle(file, sensors="true").settings.observer

@@ -3,8 +3,6 @@
 from functools import lru_cache
 from pathlib import Path
 
-from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.model import Settings
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -14,6 +12,7 @@ from mambo_sil.link.records import STACKS
 from mambo_sil.link.simulated import Condition, SimulatedAutopilot
 from mambo_sil.link.steering import Update
 from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 
 DRONE = """
 [body]
@@ -46,12 +45,7 @@ def write_drone(folder: Path) -> None:
 
 def controller(vehicle: VehicleFile | None = None) -> Controller:
     """Return a new controller with the settings that `design` derives for a drone, or that of these tests."""
-    return Controller(_settings(vehicle or drone()))
-
-
-@lru_cache
-def _settings(vehicle: VehicleFile) -> Settings:
-    return controller_toml.parse(controller_text(vehicle, "drone"), "controller.toml")
+    return Controller(settings_for(vehicle or drone()))
 
 
 def simulated(

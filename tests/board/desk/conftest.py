@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import parse
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.desk import desk_library
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FlowDeckSensors
-from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 
 
 @pytest.fixture(scope="session")
@@ -28,8 +27,7 @@ def flow_app() -> Path:
 
 def built(drone: VehicleFile) -> Path:
     """Return the library of the app with derived settings."""
-    text = controller_text(drone, drone.name)
-    return desk_library.build(parse(text, "controller.toml"), host_toolchain())
+    return desk_library.build(settings_for(drone), host_toolchain())
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -21,7 +20,7 @@ from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover
-from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 
 DRONES = range(100, 150)
 """Seeds of the drones; others than those by which this test was made."""
@@ -105,9 +104,7 @@ def unstable(settings: Settings, drone: VehicleFile) -> bool:
 def test_what_is_called_unstable_swings_and_nothing_else(seed: int) -> None:
     """At every corner of the intervals, flown with the settings that are derived for the drone itself."""
     drone = drawn(seed)
-    settings = with_option(
-        controller_toml.parse(controller_text(drone, drone.name), drone.name), "code.scalar", "float64"
-    )
+    settings = with_option(settings_for(drone), "code.scalar", "float64")
     certain = uncertain(drone, height=settings.height is not None)
     at = {str(ends): at_ends(certain, ends) for ends in corners(certain)}
     called = {ends: unstable(settings, one) for ends, one in at.items()}

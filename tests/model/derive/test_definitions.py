@@ -11,23 +11,17 @@ from scipy.optimize import linprog
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
 from mambo_sil.model.derive.step_response import _answers, fit_steps
+from tests.support.derived import settings_for
 from tests.support.scenarios import changed
 
 GENERIC = vehicle_toml.preset("generic")
 ROUNDED = 5e-3
 """Three digits of a number, relative to it."""
-
-
-def settings_for(drone: VehicleFile) -> Settings:
-    """Return the settings in the file that is written for a drone."""
-    return controller_toml.parse(controller_text(drone, drone.name), drone.name)
 
 
 def strong(ratio: float, **sections: Any) -> VehicleFile:
@@ -73,6 +67,7 @@ def test_the_braking_is_a_share_of_what_the_tilt_gives(
         found = linprog([-sign * slope * gain], bounds=[(-limit_rad, limit_rad)])
         most.append(-found.fun - sign * slope * trim_rad)
     assert settings.limits.braking_m_s2 == pytest.approx(0.65 * min(most), rel=ROUNDED)
+    assert settings.limits.speed_m_s == 5.0
     assert (settings.model.roll_gain, settings.model.pitch_gain) == gains
     limiting = method_of(settings).limiting
     assert limiting is not None
@@ -80,10 +75,10 @@ def test_the_braking_is_a_share_of_what_the_tilt_gives(
     assert BRAKING_SHARE == 0.65
 
 
-@pytest.mark.parametrize("rate_hz", [50, 70, 110, 120, 200, 740, 2000])
+@pytest.mark.parametrize("rate_hz", [50, 70, 110, 180, 200, 250, 333, 500, 740, 2000])
 def test_the_update_period_is_the_nearest_of_all_numbers_of_ticks(rate_hz: int) -> None:
     """To 10 ms."""
-    drone = changed(GENERIC, attitude={"rate_hz": rate_hz}, sensors={"position_rate_hz": 10})
+    drone = changed(GENERIC, attitude={"rate_hz": rate_hz}, sensors={"position_rate_hz": rate_hz})
     periods_s = [ticks / rate_hz for ticks in range(1, 100)]
     nearest_s = min(periods_s, key=lambda period_s: abs(period_s - 0.01))
     assert settings_for(drone).horizon.update_period_s == pytest.approx(nearest_s)
@@ -147,16 +142,16 @@ def test_a_drone_that_hardly_climbs_has_no_height(largest_m_s2: float, has: bool
     assert (settings_for(drone).height is not None) is has
 
 
-@pytest.mark.parametrize("lags_s", [(0.05, 0.4), (0.3, 0.1), (0.02, 0.03)])
+@pytest.mark.parametrize("lags_s", [(0.05, 0.4), (0.3, 0.1), (0.02, 0.03), (2.0, 2.0)])
 def test_the_response_time_is_the_mean_of_both_axes(lags_s: tuple[float, float]) -> None:
-    """Of lag plus dead time; at least 0.1 s."""
+    """Of lag plus dead time; at least 0.1 s, at most 2 s."""
     axes = {
         name: {"gain": 1.0, "lag_s": lag_s, "dead_time_s": 0.02}
         for name, lag_s in zip(("roll", "pitch"), lags_s, strict=True)
     }
     mean_s = np.mean([lag_s + 0.02 for lag_s in lags_s])
     settings = settings_for(changed(GENERIC, attitude=axes))
-    assert settings.cost.response_time_s == pytest.approx(max(mean_s, 0.1), rel=ROUNDED)
+    assert settings.cost.response_time_s == pytest.approx(np.clip(mean_s, 0.1, 2.0), rel=ROUNDED)
     assert (settings.model.roll_lag_s, settings.model.pitch_lag_s) == lags_s
     assert math.isclose(settings.model.roll_delay_s, 0.02)
 
@@ -167,6 +162,7 @@ def test_the_least_braking_is_the_least_that_settings_allow(braking_m_s2: float,
     half_rad = braking_m_s2 / (0.65 * GRAVITY_M_S2)
     limits = settings_for(strong(1.0 / math.cos(2.0 * half_rad))).limits
     assert limits.braking_m_s2 == (pytest.approx(braking_m_s2, rel=ROUNDED) if has else 0.0)
+    assert limits.speed_m_s == (5.0 if has else 0.0)
 
 
 @pytest.mark.parametrize("largest_m_s2", [30.0, 51.0, 54.0, 130.5])
@@ -266,10 +262,7 @@ def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
 def test_a_target_that_says_more_has_more_of_the_possible_tilt(name: TargetAcceleration) -> None:
     """0.7 of it with the exact tilt, and half with small angles; what is given is not smoothed."""
     drone = strong(1.6, thrust={"lag_s": 0.05})
-    exact, small = (
-        controller_toml.parse(controller_text(drone, "mine", exact=exact, acceleration=name), "mine")
-        for exact in (True, False)
-    )
+    exact, small = (settings_for(drone, exact=exact, acceleration=name) for exact in (True, False))
     assert exact.target.acceleration == small.target.acceleration == name
     assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 1.6), rel=ROUNDED)
     assert small.limits.tilt_rad == pytest.approx(0.5 * math.acos(1.0 / 1.6), rel=ROUNDED)
@@ -280,7 +273,7 @@ def test_a_target_that_says_more_has_more_of_the_possible_tilt(name: TargetAccel
 def test_exact_settings_have_half_of_the_possible_tilt(ratio: float) -> None:
     """And brake as small angles do, whose limit is 0.5."""
     drone = strong(ratio, thrust={"lag_s": 0.05})
-    exact = controller_toml.parse(controller_text(drone, "mine", exact=True), "mine")
+    exact = settings_for(drone, exact=True)
     small = settings_for(drone)
     assert (exact.model.tilt, small.model.tilt) == ("exact", "small-angle")
     assert exact.limits.tilt_rad == pytest.approx(math.acos(1.0 / ratio) / 2.0, rel=ROUNDED)

@@ -11,7 +11,6 @@ import pytest
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -25,12 +24,8 @@ from mambo_sil.model.derive.derived_flight import (
     quick_rate_rad_s,
 )
 from mambo_sil.model.derive.derived_settings import controller_text, wants_exact
+from tests.support.derived import settings_for
 from tests.support.scenarios import CRAZYFLIE
-
-
-def settings_for(drone: VehicleFile) -> Settings:
-    """Return the settings in the file that is written for a drone."""
-    return controller_toml.parse(controller_text(drone, drone.name), drone.name)
 
 
 def delivering(gain: float) -> VehicleFile:
@@ -84,7 +79,7 @@ def test_a_drone_that_oscillates_is_seen() -> None:
 def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survives: bool) -> None:
     """Both have ten times their weight in thrust; the mixer of one loses the height in large swings."""
     drone = vehicle_toml.preset(name)
-    exact = controller_toml.parse(controller_text(drone, name, exact=True), name)
+    exact = settings_for(drone, exact=True)
     assert (exact.model.tilt, wants_exact(drone)) == ("exact", strong)
     assert exact.limits.tilt_rad > 0.7
     assert flies_quick_circle(exact, drone) is survives
@@ -104,7 +99,7 @@ def test_the_quick_circle_asks_for_more_than_the_tilt_limit() -> None:
 def test_the_quick_circle_has_slower_rotors() -> None:
     """1.5 times slower: a thrust with 0.15 s of lag, which flies it, is flown with 0.225 s, and is lost."""
     drone = vehicle_toml.preset("cf2x-pyflyt")
-    exact = controller_toml.parse(controller_text(drone, "mine", exact=True), "mine")
+    exact = settings_for(drone, exact=True)
     assert drone.thrust is not None
     survives = [
         flies_quick_circle(

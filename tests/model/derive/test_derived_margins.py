@@ -6,8 +6,6 @@ from typing import Any
 
 import pytest
 
-from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins, Margins, Poles
@@ -16,7 +14,7 @@ from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.model.derive.derived_margins import JudgedMargins, _reserve, _without, judge_margins
-from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 from tests.support.scenarios import CRAZYFLIE, changed
 
 GENERIC = vehicle_toml.preset("generic")
@@ -143,11 +141,6 @@ def of_gains(roll: float, pitch: float, lag_s: float = 0.15) -> VehicleFile:
     return blind(attitude={"roll": axis | {"gain": roll}, "pitch": axis | {"gain": pitch}})
 
 
-def settings_for(drone: VehicleFile) -> Settings:
-    """Return the settings in the file that is written for a drone."""
-    return controller_toml.parse(controller_text(drone, "mine"), "mine")
-
-
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_warning_begins_where_a_loop_tolerates_too_little(axis: int) -> None:
     """Of one axis, whose gain is raised until its loop tolerates less than 30 ms of delay."""
@@ -193,7 +186,7 @@ def test_the_cause_is_the_property_without_which_most_is_left(
 def judged(dead_time_s: float) -> JudgedMargins:
     """Return what is said of the settings derived for a drone with that dead time."""
     drone = changed(GENERIC, attitude={name: {"dead_time_s": dead_time_s} for name in ("roll", "pitch")})
-    return judge_margins(controller_toml.parse(controller_text(drone, "mine"), "mine"), drone)
+    return judge_margins(settings_for(drone), drone)
 
 
 def test_a_quick_drone_is_not_warned_of() -> None:
@@ -207,7 +200,7 @@ def test_a_quick_drone_is_not_warned_of() -> None:
 
 def reserve_of(drone: VehicleFile, ends: Mapping[str, int]) -> float:
     """Return the least reserve at ends of the intervals, with its own settings."""
-    settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
+    settings = settings_for(drone)
     return min(map(_reserve, measure_drone(settings, at_ends(drone, ends), "true")))
 
 
@@ -219,8 +212,8 @@ def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dea
     axis = {"gain": 1.0, "lag_s": 0.15, "dead_time_s": dead_time_s}
     uncertainty = {"roll_gain": gain_width, "pitch_dead_time_s": 0.01}
     sections = {"attitude": {"roll": axis, "pitch": axis}, "uncertainty": uncertainty}
-    drone = VehicleFile.model_validate(changed(GENERIC, **sections).model_dump(exclude={"sensors"}))
-    settings = controller_toml.parse(controller_text(drone, "mine"), "mine")
+    drone = blind(**sections)
+    settings = settings_for(drone)
     found, ends = judge_margins(settings, drone), list(corners(drone))
     measured = [measure_drone(settings, at_ends(drone, one), "true") for one in ends]
     assert [_reserve(axis) for axis in found.axes] == [
