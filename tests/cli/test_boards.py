@@ -10,7 +10,7 @@ from mambo_codegen import boards
 from mambo_codegen.settings import presets
 from mambo_sil.board.footprint.footprint_plots import draw_footprints
 from mambo_sil.board.footprint.measure import measure_footprint
-from tests.support.command import command, run, unwrapped
+from tests.support.command import command, run, unwrapped, without
 from tests.support.tools import board_builder, only, require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -90,15 +90,6 @@ def test_the_name_of_a_board_is_no_formula(tmp_path: Path) -> None:
     assert r"$\frac{$ &lt;b&gt;  flash" in (tmp_path / "footprint.svg").read_text("utf-8")
 
 
-@pytest.mark.usefixtures("_no_tool")
-def test_missing_compilers_are_named() -> None:
-    """Exit 2 with every package."""
-    _, talk = run("footprint", code=2)
-    for name in boards.names():
-        assert boards.load(name).title in talk
-        assert boards.load(name).compiler.packages[0] in talk
-
-
 @pytest.mark.long
 def test_what_has_a_compiler_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others are named on stderr; the table and the exit code are about what was measured."""
@@ -122,15 +113,6 @@ def test_flying_on_a_board_is_the_flight_of_this_machine(tmp_path: Path) -> None
     assert plain["same_bits_as_host"] is None
     assert plain["metrics"] == summary["metrics"]
     assert (tmp_path / "plain" / "trace.csv").read_bytes() == (tmp_path / "flight" / "trace.csv").read_bytes()
-
-
-@pytest.mark.long
-def test_flying_on_the_mega_is_the_flight_of_this_machine(tmp_path: Path) -> None:
-    """Eight bits with a floating-point library of their own, in a process of its own."""
-    board_builder("mega")
-    run("fly", "--on", "mega", "--duration-s", "1", "--no-pictures")
-    summary = json.loads((tmp_path / "flight" / "summary.json").read_text("utf-8"))
-    assert (summary["board"], summary["same_bits_as_host"]) == ("mega", True)
 
 
 @pytest.mark.first_is_quick
@@ -212,7 +194,6 @@ def test_the_doctor_answers() -> None:
     assert {"arm-none-eabi-gcc", "qemu-system-avr", "unicorn"} <= tools
 
 
-WITHOUT_UNICORN = "import sys; sys.modules['unicorn'] = None; from mambo_sil.cli.app import main; main()"
 NAMES_THE_EXTRA = (
     "unicorn, the optional package that emulates cortex-m4, is missing: pip install unicorn "
     '(the extra "emulation")'
@@ -222,7 +203,7 @@ NAMES_THE_EXTRA = (
 @pytest.mark.usefixtures("_crazyflie")
 def test_without_the_emulator_a_footprint_has_flash_ram_and_stack() -> None:
     """It needs no package of another licence; the note says what instructions and cycles want."""
-    done = command("footprint", "--board", "crazyflie", "--json", "-o", "out", script=WITHOUT_UNICORN)
+    done = command("footprint", "--board", "crazyflie", "--json", "-o", "out", script=without("unicorn"))
     assert done.returncode == 0, done.stderr
     (board,) = json.loads(done.stdout)["boards"]
     assert [limit["name"] for limit in board["limits"]] == ["flash", "RAM", "stack"]
@@ -236,7 +217,7 @@ def test_without_the_emulator_a_footprint_has_flash_ram_and_stack() -> None:
 )
 def test_without_the_emulator_what_needs_it_names_the_extra(words: str) -> None:
     """In one sentence."""
-    done = command(*words.split(), script=WITHOUT_UNICORN)
+    done = command(*words.split(), script=without("unicorn"))
     assert done.returncode == 2
     assert done.stderr == f"{NAMES_THE_EXTRA}\n"
 

@@ -14,9 +14,8 @@ import pytest
 from mambo_codegen import errors
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.toml_file import PRESETS
-from tests.support.command import run, unwrapped
+from tests.support.command import MAIN, command, run, unwrapped
 
-COMMAND = "from mambo_sil.cli.app import main; main()"
 INTERRUPTED = """
 from mambo_sil.cli import command
 app = command.root()
@@ -28,16 +27,10 @@ app()
 """
 
 
-def run_script(script: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a script in a process of its own."""
-    line = [sys.executable, "-c", script, *arguments]
-    return subprocess.run(line, capture_output=True, text=True, env=os.environ | environment, check=False)
-
-
 def run_limited(*arguments: str) -> None:
     """Run the command where no file may have more than 1 kB, and demand a message of one line."""
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); "
-    result = run_script(limit + COMMAND, *arguments)
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"
+    result = command(*arguments, script=f"{limit}; {MAIN}")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1), result.stderr
     assert "cannot be written: File too large" in result.stderr
 
@@ -165,12 +158,13 @@ def test_generate_keeps_edited_files_until_forced() -> None:
 
 
 @pytest.mark.long
-def test_letters_that_the_terminal_has_not_are_shown_by_number() -> None:
+def test_letters_that_the_terminal_has_not_are_shown_by_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """An edit in another script, on a terminal of another: the diff is shown, not a traceback."""
     run("generate", "-o", "out")
     with Path("out/README.md").open("a", encoding="utf-8") as file:
         file.write("\N{EURO SIGN}\n")
-    result = run_script(COMMAND, "generate", "-o", "out", "--check", PYTHONIOENCODING="latin-1")
+    monkeypatch.setenv("PYTHONIOENCODING", "latin-1")
+    result = command("generate", "-o", "out", "--check")
     assert result.returncode == 1, result.stderr
     assert "\n-\\u20ac\n" in result.stdout
 
@@ -239,7 +233,7 @@ def test_bad_input_gets_a_message_and_exit_code_2(arguments: list[str], message:
 
 def test_debug_shows_the_traceback() -> None:
     """With --debug an error arrives whole."""
-    result = run_script(COMMAND, "--debug", "generate", "nope", "-o", "out")
+    result = command("--debug", "generate", "nope", "-o", "out")
     assert "Traceback" in result.stderr
     assert "SourceNotFoundError: nope is neither" in result.stderr
 
@@ -250,9 +244,9 @@ def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
     """A closed pipe (| head) ends the command as the signal would, without a traceback, help included."""
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-c", COMMAND, *arguments.split()]
+    line = [sys.executable, "-c", MAIN, *arguments.split()]
     with os.fdopen(writer, "wb") as closed:
-        result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
+        result = subprocess.run(line, stdout=closed, stderr=subprocess.PIPE, check=False)
     assert (result.returncode, result.stderr) == (errors.NO_READER, b"")
 
 
@@ -260,7 +254,7 @@ def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
 @pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["generate", "-o", "out", "--json"]])
 def test_stdout_that_takes_nothing_gets_a_message(arguments: list[str]) -> None:
     """A full disk or a closed stdout is said in one line, without a traceback."""
-    line = shlex.join([sys.executable, "-c", COMMAND, *arguments])
+    line = shlex.join([sys.executable, "-c", MAIN, *arguments])
     for redirection, reason in ((">/dev/full", "No space left on device"), (">&-", "is closed")):
         result = subprocess.run(
             f"{line} {redirection}", shell=True, capture_output=True, text=True, check=False
@@ -281,7 +275,7 @@ def test_what_the_system_refuses_gets_a_message(error: str, message: str) -> Non
     """An error that no command expects is one line, with --debug a traceback too."""
     script = INTERRUPTED.replace("KeyboardInterrupt", error)
     for debug in ([], ["--debug"]):
-        result = run_script(script, *debug, "stop")
+        result = command(*debug, "stop", script=script)
         assert result.returncode == 2
         assert result.stderr.endswith(message)
         assert (result.stderr == message) is not bool(debug)
@@ -295,13 +289,13 @@ def test_root_help_names_the_exit_codes() -> None:
 
 def test_ctrl_c_exits_130() -> None:
     """An interrupted command says so by its exit code, without a traceback."""
-    result = run_script(INTERRUPTED, "stop")
+    result = command("stop", script=INTERRUPTED)
     assert (result.returncode, result.stderr) == (errors.INTERRUPTED, "")
 
 
-@pytest.mark.parametrize("command", ["init", "presets", "schema", "generate"])
-def test_help_teaches_by_example(command: str) -> None:
+@pytest.mark.parametrize("name", ["init", "presets", "schema", "generate"])
+def test_help_teaches_by_example(name: str) -> None:
     """Every command explains itself, and those with options show examples."""
-    text = run(command, "--help")[0]
-    assert command == "presets" or f"mambo-nmpc {command}" in text
+    text = run(name, "--help")[0]
+    assert name == "presets" or f"mambo-nmpc {name}" in text
     assert "\x1b" not in text

@@ -184,9 +184,3 @@ def test_intervals_that_no_controller_learns_have_no_margins(strong: str, said: 
     found = unwrapped(run("design", "mine.toml")[1])
     assert "flown for 10 s: stays at its target (true state)" in found
     assert f"no margins: {said}" in found
-
-
-def test_an_unknown_drone_is_refused() -> None:
-    """With the names there are."""
-    said = run("design", "crazyfly", code=2)[1]
-    assert said.startswith("crazyfly is neither a shipped vehicle nor a file (did you mean crazyflie?)")

@@ -16,7 +16,7 @@ from mambo_sil.flight.loop import fly
 from mambo_sil.flight.names import PD_NAMES, PdName
 from mambo_sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
-from tests.support.command import HEARS_CTRL_C, command, run, unwrapped
+from tests.support.command import HEARS_CTRL_C, MAIN, command, run, unwrapped
 from tests.support.one_norm import ONE_NORM
 
 PLAIN = ("--json", "--no-pictures")
@@ -237,20 +237,6 @@ def test_a_repeated_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
         assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
 
 
-@pytest.mark.long
-def test_the_pd_with_feed_forward_flies_closer_than_the_stock_pd(tmp_path: Path) -> None:
-    """The page names which of them flew."""
-    iae_m_s = []
-    for pd in PD_NAMES:
-        said, _ = run("fly", "--controller", pd, "--duration-s", "20", *PLAIN, "-o", pd)
-        iae_m_s.append(json.loads(said)["metrics"]["iae_m_s"])
-    assert iae_m_s[1] < 0.2 * iae_m_s[0]
-    run("report", "pd", "pd-feedforward", "-o", "report.html")
-    page = (tmp_path / "report.html").read_text()
-    assert "Flight: PD, bernoulli" in page
-    assert "Flight: PD-feedforward, bernoulli" in page
-
-
 def test_refusals_during_lift_off_are_explained() -> None:
     """They belong to every start from the ground, which does well."""
     options = ["--start", "take-off", "--duration-s", "0.1", "--no-pictures"]
@@ -296,12 +282,8 @@ def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     """A limit on the size of files stands for it: one line, exit 2, and the old flight is whole."""
     run("fly", "--controller", "pd", "--duration-s", "0.1")
     before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
-    script = (
-        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
-        "from mambo_sil.cli.app import main; main()"
-    )
-    line = [sys.executable, "-c", script, "fly", "--controller", "pd", "--duration-s", "1"]
-    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    script = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); {MAIN}"
+    done = command("fly", "--controller", "pd", "--duration-s", "1", folder=tmp_path, script=script)
     assert (done.returncode, done.stderr) == (2, "flight: cannot be written: File too large\n")
     assert {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()} == before
 
@@ -312,10 +294,3 @@ def test_a_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     _, talk = run("fly", "--duration-s", "1", code=2)
     assert "no-such-compiler" in talk
     assert "Traceback" not in talk
-
-
-def test_flying_again_overwrites_our_own_results(tmp_path: Path) -> None:
-    """The second flight into a folder replaces the first."""
-    for duration in ("0.1", "0.2"):
-        run("fly", "--controller", "pd", "--duration-s", duration, "--no-pictures")
-    assert json.loads((tmp_path / "flight" / "summary.json").read_text())["duration_s"] == 0.2

@@ -1,12 +1,9 @@
-"""Help: what it says of every command, and that it need not wait for what only commands need."""
-
-import subprocess
-import sys
+"""Help and completion: what they say, and that they need not wait for what only commands need."""
 
 import pytest
 
 from mambo_sil.cli.app import PANELS
-from tests.support.command import run
+from tests.support.command import MAIN, command, run
 
 HEAVY = {"capstone", "cffi", "elftools", "jinja2", "matplotlib", "numpy", "optuna", "scipy", "unicorn"}
 SETTINGS = "mambo_codegen.settings.model"
@@ -25,8 +22,7 @@ except SystemExit as leaving:
 @pytest.mark.parametrize("arguments", [["--help"], ["fly", "--help"], ["generate", "--help"]])
 def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     """It answers at once: a command imports what it needs when it is called."""
-    line = [sys.executable, "-c", SCRIPT, *arguments]
-    done = subprocess.run(line, capture_output=True, text=True, check=True)
+    done = command(*arguments, script=SCRIPT)
     assert done.stdout
     assert "typer" in done.stderr.split()
     assert not {*HEAVY, SETTINGS} & set(done.stderr.split())
@@ -48,8 +44,7 @@ def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_a_command_loads_only_what_it_needs(arguments: list[str], unwanted: set[str]) -> None:
     """With a preset, whose constants are shipped; each of these takes a tenth of a second or more."""
-    line = [sys.executable, "-c", SCRIPT.replace("raise", "sys.exit(leaving.code)"), *arguments]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command(*arguments, script=SCRIPT.replace("raise", "sys.exit(leaving.code)"))
     assert done.returncode == 0, done.stderr
     assert "numpy" in done.stderr.split()
     assert not unwanted & set(done.stderr.split())
@@ -68,3 +63,26 @@ def test_help_of_fly_fits_on_two_screens(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("COLUMNS", "80")
     said, _ = run("fly", "--help")
     assert len(said.splitlines()) <= 110
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("mambo-nmpc footp", ["footprint"]),
+        ("mambo-nmpc fly tab", ["table1", "table1-printed"]),
+        ("mambo-nmpc init mam", ["mambo", "mambo-1norm"]),
+        ("mambo-nmpc footprint --board cra", ["crazyflie"]),
+        ("mambo-nmpc sweep --board al", []),
+        ("mambo-nmpc fly --on rp", ["rp2040"]),
+    ],
+)
+def test_the_shell_completes_commands_presets_and_boards(
+    line: str, expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What bash asks for after the tab key; `all` is no board of sweep and fly."""
+    words = {"COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1)}
+    for name, value in (words | {"_MAMBO_NMPC_COMPLETE": "complete_bash"}).items():
+        monkeypatch.setenv(name, value)
+    done = command(script=f"import sys; sys.argv[0] = 'mambo-nmpc'; {MAIN}")
+    assert done.stdout.split() == expected, done.stderr

@@ -101,13 +101,6 @@ def test_recorded_flights_are_the_same_again_and_others_fail() -> None:
     assert "the controller's settings have changed since the metrics were recorded" in said
 
 
-@pytest.mark.long
-def test_the_stock_pd_can_be_tested() -> None:
-    """As in a campaign."""
-    said, _ = run("regress", "mine.toml", "--controller", "pd", "-o", "out")
-    assert "mine with pd on mambo: 5 of 5 flights passed" in said
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -1,9 +1,8 @@
 """SIGTERM while the command starts: exit 143 at any time; SIGINT that is ignored stays so."""
 
-import subprocess
-import sys
-
 import pytest
+
+from tests.support.command import command
 
 TERMINATE = "os.kill(os.getpid(), signal.SIGTERM)"
 DURING_IMPORT = f"""
@@ -36,8 +35,7 @@ command.typer.echo = stop
 def test_a_terminated_command_exits_with_143(when: str) -> None:
     """While modules are imported, while the command line is parsed, and while the command runs."""
     script = f"import os, signal, sys\n{when}\nfrom mambo_nmpc.__main__ import main\nmain()"
-    line = [sys.executable, "-c", script, "presets"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command("presets", script=script)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "")
 
 
@@ -46,7 +44,6 @@ def test_a_command_started_with_ctrl_c_ignored_goes_on() -> None:
     interrupted = DURING_COMMAND.replace("SIGTERM", "SIGINT")
     ignored = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"
     script = f"{ignored}\n{interrupted}\nfrom mambo_nmpc.__main__ import main\nmain()"
-    line = [sys.executable, "-c", script, "presets"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command("presets", script=script)
     assert (done.returncode, done.stderr) == (0, "")
     assert "mambo-1norm" in done.stdout

@@ -3,12 +3,15 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Final
 
 from typer.testing import CliRunner
 
 from mambo_sil.cli.app import app
 
-HEARS_CTRL_C = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+MAIN: Final = "from mambo_sil.cli.app import main; main()"
+"""The script that is mambo-nmpc."""
+HEARS_CTRL_C: Final = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 """Begins a script that Ctrl-C stops, also where the tests run with SIGINT ignored, which children inherit."""
 
 
@@ -24,10 +27,15 @@ def unwrapped(text: str) -> str:
     return " ".join(text.split())
 
 
+def without(package: str) -> str:
+    """Return the script that is mambo-nmpc where a package is not installed."""
+    return f"import sys; sys.modules[{package!r}] = None; {MAIN}"
+
+
 def command(
     *arguments: object,
     folder: Path | None = None,
-    script: str = "from mambo_sil.cli.app import main; main()",
+    script: str = MAIN,
 ) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc in `folder` and a session of its own, until all that hold its output have ended.
 

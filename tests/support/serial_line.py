@@ -16,7 +16,7 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulation.avr_machine import demand_skips
 from tests.support.bundles import place
-from tests.support.tools import require
+from tests.support.tools import require, require_module
 
 COMPILERS: Final = {
     "host": ("cc", "gcc"),
@@ -175,7 +175,8 @@ class Line:
 
 @contextmanager
 def serial_line(elf: Path, faults: Faults | None = None) -> Iterator[Line]:
-    """Run a firmware of `build_firmware` behind a line."""
+    """Run a firmware of `build_firmware` behind a line; skip without pyserial, which opens its port."""
+    require_module("serial")
     line = Line(elf, faults or Faults())
     try:
         yield line

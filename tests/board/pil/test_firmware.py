@@ -25,7 +25,7 @@ from mambo_sil.board.pil.serial_port import open_port
 from tests.support.command import run, unwrapped
 from tests.support.height_settings import height_settings
 from tests.support.serial_line import Line, build_firmware, serial_line
-from tests.support.tools import require_module, without_compilers_of_boards
+from tests.support.tools import without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
@@ -44,11 +44,6 @@ LONG_CASES = [
     ("mega", "mambo", "fixed"),
     ("mega", "mambo-1norm", "fixed"),
 ]
-
-
-@pytest.fixture(autouse=True)
-def _pyserial() -> None:
-    require_module("serial")
 
 
 def flown(line: Line, source: str, *options: str, code: int = 0) -> dict[str, Any]:

@@ -11,17 +11,12 @@ from mambo_sil.board.footprint.on_board import choose_board
 from mambo_sil.errors import BoardError
 from tests.support.command import run, unwrapped
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
-from tests.support.tools import board_builder, require_module, without_compilers_of_boards
+from tests.support.tools import board_builder, without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 SETTINGS = presets.preset("mambo")
 ALL = [boards.load(name) for name in boards.names()]
-
-
-@pytest.fixture(autouse=True)
-def _pyserial() -> None:
-    require_module("serial")
 
 
 @pytest.mark.long
@@ -106,12 +101,7 @@ def test_a_process_needs_the_name_of_a_board(tmp_path: Path) -> None:
 def test_other_bits_fail(tmp_path: Path) -> None:
     """Exit 1, in capitals in the text; the report calls it a failure."""
     board_builder("crazyflie")
-
-    def bend(files: dict[str, str]) -> None:
-        old = "    ended ="
-        assert old in files["pil.c"]
-        files["pil.c"] = files["pil.c"].replace(old, "    command.roll_rad *= 0.999f;\n" + old)
-
+    bend = edited("pil.c", "    ended =", "    command.roll_rad *= 0.999f;\n    ended =")
     with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil", bend)) as line:
         said, _ = run("footprint", "--port", line.port, "--board", "crazyflie", "-o", "out", code=1)
     assert "STEPS HAVE OTHER BITS THAN ON THIS MACHINE" in unwrapped(said)

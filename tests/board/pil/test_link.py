@@ -35,7 +35,6 @@ IMPATIENT: Final = Patience(reply_s=0.05, silence_s=0.2, return_s=0.2)
 @pytest.fixture(scope="module")
 def elf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the firmware for this machine."""
-    require_module("serial")
     return build_firmware(SETTINGS, "host", tmp_path_factory.mktemp("pil"))
 
 

@@ -18,16 +18,11 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import CURVES
 from tests.support.command import run, unwrapped
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
-from tests.support.tools import require_module, without_compilers_of_boards
+from tests.support.tools import without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 SETTINGS: Final = presets.preset("mambo")
-
-
-@pytest.fixture(autouse=True)
-def _pyserial() -> None:
-    require_module("serial")
 
 
 def demand_consistent(summary: dict[str, Any], periods: int) -> None:

@@ -1,8 +1,6 @@
 """Readers: CSV in three dialects, ULog, and a message for whatever is no log."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -246,26 +244,6 @@ def test_what_is_no_ulog_is_told(tmp_path: Path) -> None:
     path.write_bytes(whole[: len(whole) // 2 + 1])
     (log,), _ = read_logs([path], {})
     assert len(log.signals["roll_rad"].value) < 400
-
-
-@pytest.mark.long
-def test_ulog_without_pyulog_names_what_to_install(tmp_path: Path) -> None:
-    """For the Python that runs."""
-    (tmp_path / "a.ulg").write_bytes(b"")
-    script = "import sys; sys.modules['pyulog'] = None; from mambo_sil.cli.app import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", script, "identify", "a.ulg"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert (
-        done.stderr
-        == f"a.ulg: reading ULog needs pyulog; install it: {sys.executable} -m pip install pyulog\n"
-    )
-    assert [path.name for path in tmp_path.iterdir()] == ["a.ulg"]
 
 
 def test_every_signal_has_the_documented_column() -> None:
