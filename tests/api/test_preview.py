@@ -1,6 +1,8 @@
-"""What a program says of what comes, and where a preview is refused because nobody can say it."""
+"""What a program says of its target: a curve that can be sampled, a preview where somebody knows it."""
 
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +11,8 @@ from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings.controller_toml import to_toml
-from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState
-from mambo_nmpc.curves import curve, preview, sample
+from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
+from mambo_nmpc.curves import Circle, curve, preview, sample
 from mambo_sil.errors import FlightError, LogError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.link.pilot import Pilot
@@ -83,3 +85,31 @@ def test_logs_pages_and_pilots_refuse_a_preview(tmp_path: Path) -> None:
         page_controllers([str(path)])
     with pytest.raises(ArgumentError, match=r'must be "given" or "tracked": the targets of a pilot'):
         Pilot.simulate(path, "crazyflie")
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "time_s", "message"),
+    [
+        (None, 0.0, "trajectory = None must have the methods target and acceleration"),
+        (Circle, 0.0, "trajectory = .* must have the methods target and acceleration"),
+        (
+            Circle(math.nan, 1.0),
+            0.0,
+            r"trajectory = Circle\(radius_m=nan, .*\) must be finite at these times",
+        ),
+        (Circle(1.0, 1.0), [0.0, math.nan], r"time_s = \[0\.0, nan\] must be finite"),
+        (Circle(1.0, 1.0), math.inf, "time_s = inf must be finite"),
+        (Circle(1.0, 1.0), "now", 'time_s = "now" must be numbers'),
+    ],
+)
+def test_what_cannot_be_sampled_is_refused(trajectory: Any, time_s: Any, message: str) -> None:
+    """By name and value: no curve, a curve that is NaN, and times that are not finite."""
+    with pytest.raises(ArgumentError, match=message):
+        sample(trajectory, time_s)
+
+
+def test_a_curve_of_nan_is_not_flown() -> None:
+    """It would be a flight without a target."""
+    pilot, vehicle = Controller.from_preset("crazyflie"), Vehicle.from_preset("crazyflie")
+    with pytest.raises(ArgumentError, match=r"trajectory = Circle\(radius_m=nan, .*\) must be finite at 0 s"):
+        fly(pilot, vehicle, Circle(math.nan, 1.0))

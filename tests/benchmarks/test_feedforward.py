@@ -1,7 +1,8 @@
-"""The search for the gains of the laws with feed-forward."""
+"""The search for the gains of the laws with feed-forward, and of the altitude loop `pid`."""
 
 from dataclasses import astuple
 
+from benchmarks.gains import altitude
 from benchmarks.gains.feedforward import (
     DRAWS_PER_GAIN,
     FIRST,
@@ -14,6 +15,7 @@ from benchmarks.gains.feedforward import (
     search,
 )
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.altitude_loops import AltitudeLaw, pid_altitude_gains
 from mambo_sil.flight.controllers.pd import GAINS, PdGains, PidGains, pid_gains
 
 STOCK = FIRST["pd-feedforward"]
@@ -65,5 +67,15 @@ def test_the_flights_are_those_of_a_campaign() -> None:
 
 def test_there_are_gains_for_shipped_drones_only() -> None:
     """Another drone flies those of the Mambo."""
-    assert vehicle_toml.DEFAULT in pid_gains()
-    assert set(pid_gains()) <= set(vehicle_toml.names())
+    for gains in (pid_gains(), pid_altitude_gains()):
+        assert vehicle_toml.DEFAULT in gains
+        assert set(gains) <= set(vehicle_toml.names())
+
+
+def test_the_flights_have_heights_and_the_shipped_gains_follow_closest() -> None:
+    """Drawn, with sensors; on the first six of each curve the errors fall from law to law."""
+    flights = drawn_flights(altitude.CURVES, altitude.DURATION_S, count=6, vehicle="crazyflie")
+    assert len(flights) == len(altitude.CURVES)
+    assert all(flight.sensors is not None and flight.given_targets.shape[2] == 9 for flight in flights)
+    errors = [altitude.judge(flights, AltitudeLaw(name)).error for name in ("stock", "feedforward", "pid")]
+    assert errors == sorted(errors, reverse=True)

@@ -1,4 +1,4 @@
-"""Jumps of an estimator that does not count them, told from motion and noise."""
+"""Frames: jumps of an estimator told from motion and noise; roll and pitch seen from two headings."""
 
 import math
 from collections.abc import Iterator
@@ -6,8 +6,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.elementary import sine_cosine
+from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.link.records import EstimatedState
 from mambo_sil.link.steady_frame import LONGEST_S, SteadyFrame
+from mambo_sil.link.tilt import turned_tilt
 
 FASTEST_RAD_S = 2.5
 """Rate of a circle of 2 m: 5 m/s, and 1.3 g."""
@@ -75,3 +79,16 @@ def test_a_jump_of_ten_centimetres_is_seen(rate_rad_s: float) -> None:
                 found_m += found.position_m
         np.testing.assert_allclose(found_m, jump_m, atol=0.05)
         assert (frame.jumps > 0) == jump_m.any()
+
+
+def test_the_thrust_points_where_it_did() -> None:
+    """In the world, for random tilts of up to 69 degrees and headings, against the rotation of the plant."""
+    random = np.random.default_rng(6)
+    for roll_rad, pitch_rad, yaw_rad, turn_rad in random.uniform(-1.2, 1.2, (50, 4)) * [1.0, 1.0, 1.0, 2.6]:
+        there = [*turned_tilt(roll_rad, pitch_rad, turn_rad), yaw_rad + turn_rad]
+        np.testing.assert_allclose(direction(there), direction([roll_rad, pitch_rad, yaw_rad]), atol=1e-12)
+
+
+def direction(attitude_rad: list[float]) -> FloatArray:
+    """Return where the thrust points (3,) at roll, pitch, yaw."""
+    return to_world(*sine_cosine(np.array(attitude_rad)), np.array([0.0, 0.0, -1.0]))

@@ -139,10 +139,7 @@ ROOMS: Final = {
     ),
     "linear controllers": Room(
         source=(f"{_MARGINS}/controller_jacobian.py",),
-        tests=tuple(
-            f"{_MARGIN_TESTS}/test_{name}.py"
-            for name in ("controller_jacobian", "linear", "height", "hover_loop")
-        ),
+        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("linear", "height", "hover_loop")),
     ),
     "measured": Room(
         source=tuple(f"{_MARGINS}/{name}.py" for name in ("hover_margins", "margins_run", "response_file")),

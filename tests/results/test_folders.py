@@ -1,14 +1,18 @@
-"""Result folders: all results or none, one run at a time, foreign files stay."""
+"""Result folders: all results or none, one run at a time, foreign files stay; and temporary folders."""
 
+import errno
 import json
+import os
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mambo_codegen.errors import ForeignFilesError, MamboNmpcError, UnwritableError
-from mambo_sil.errors import BusyError
+from mambo_sil.errors import BusyError, ScratchError
 from mambo_sil.results.folders import SUMMARY, new_results
+from mambo_sil.results.scratch import scratch_folder
 from mambo_sil.results.summary import Summary
 
 
@@ -161,3 +165,30 @@ def test_a_summary_has_null_for_nan_and_infinity() -> None:
     text = summary_text("fly", {"a": float("nan"), "b": [1.5, (float("inf"), {"c": -float("inf")})]})
     summary = json.loads(text, parse_constant=pytest.fail)
     assert (summary["content"]["a"], summary["content"]["b"]) == (None, [1.5, [None, {"c": None}]])
+
+
+def test_the_folder_is_removed() -> None:
+    """With everything in it."""
+    with scratch_folder() as folder:
+        (folder / "a.c").write_text("int a;")
+    assert not folder.exists()
+
+
+def test_a_full_disk_names_the_folder_for_temporary_files() -> None:
+    """Not the folder for the results."""
+    with pytest.raises(ScratchError) as caught, scratch_folder():
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert str(caught.value) == (
+        f"{tempfile.gettempdir()}: temporary files cannot be written: No space left on device; "
+        "free some space there, or set TMPDIR to another folder"
+    )
+
+
+def test_a_folder_that_was_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """TMPDIR may vanish during a run."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with (
+        pytest.raises(ScratchError, match="gone: temporary files cannot be written"),
+        scratch_folder(),
+    ):
+        pass

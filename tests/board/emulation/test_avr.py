@@ -26,9 +26,8 @@ from mambo_sil.errors import EmulationError, EmulatorError
 from mambo_sil.flight.controllers.controller_library import batch_source
 from tests.support.cases import settings_case
 from tests.support.height import height_case
-from tests.support.linking import link
+from tests.support.linking import link, run_in_simavr
 from tests.support.one_norm import ONE_NORM
-from tests.support.simavr import run_in_simavr
 from tests.support.tools import board_builder, only
 
 SELF_TEST = """

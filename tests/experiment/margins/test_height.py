@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
@@ -139,14 +139,6 @@ def test_command_shows_the_height_beside_roll_and_pitch() -> None:
     axes = json.loads(run("margins", "c.toml", "--vehicle", "crazyflie", "--json")[0])["axes"]
     assert [axis["axis"] for axis in axes] == ["roll", "pitch", "height"]
     assert axes[2]["motors"] is None
-
-
-def test_a_fence_changes_nothing() -> None:
-    """A controller is linearised midway between floor and ceiling, where neither acts."""
-    settings, vehicle = height_settings(), Vehicle.from_preset("crazyflie")
-    walled = with_option(with_option(settings, "limits.fence.ceiling_m", 2.5), "limits.fence.floor_m", 0.5)
-    walled, free = (margins_of(one, vehicle)[HEIGHT].command.gain_up for one in (walled, settings))
-    assert walled == pytest.approx(free, rel=1e-6)
 
 
 @pytest.mark.long

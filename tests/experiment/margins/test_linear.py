@@ -1,4 +1,4 @@
-"""The linear systems: the C's memory, the sensors' memory, and what leaves no linear system."""
+"""The linear systems: the C's memory, the sensors' memory, the load, and what leaves no linear system."""
 
 import dataclasses
 
@@ -7,9 +7,11 @@ import pytest
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import names, preset
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.errors import FlightError
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law, linear_controller
 from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians, repeating_ticks
 from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, BY_PUSH, PLACE, SENT
@@ -20,6 +22,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover
+from tests.support.height_settings import height_settings
 
 SEEN: list[tuple[str, SensorsName]] = [
     ("mambo", "true"),
@@ -106,3 +109,40 @@ def test_axes_are_separate_and_small() -> None:
     for loop in loops:
         assert loop.transition.shape[1] <= 35
         assert loop.response(np.array([1.0]))[0, SENT, AT_COMMAND] != 0.0
+
+
+def test_a_narrow_fence_changes_nothing_midway() -> None:
+    """Between walls 10 cm apart the four matrices are those without walls, to 1e-6 of their largest number.
+
+    At a wall, and outside, the climb is limited on one side.
+    """
+    free = height_settings()
+    walled = with_option(with_option(free, "limits.fence.ceiling_m", 1.1), "limits.fence.floor_m", 1.0)
+    found, expected = linear_controller(walled), linear_controller(free)
+    for name in ("a", "b", "c", "d"):
+        right = getattr(expected, name)
+        assert getattr(found, name) == pytest.approx(right, rel=0.0, abs=1e-6 * np.abs(right).max())
+
+
+@pytest.mark.parametrize(
+    ("settings", "load"),
+    [
+        (height_settings(delay_s=0.0), 1.2),
+        (height_settings(delay_s=0.05), 1.2),
+        (with_option(height_settings(), "observer.age_s", 0.024), 1.1),
+    ],
+    ids=["thrust without delay", "thrust with delay", "old state"],
+)
+def test_a_load_that_is_learnt_multiplies_the_thrust(settings: Settings, load: float) -> None:
+    """The controller's estimates ask for as many times more thrust as the drone is heavier.
+
+    A drone whose thrust or state were not as late as the settings say would not come to rest.
+    """
+    light, heavy = (np.abs(linear_controller(settings, one).c[2]).max() for one in (1.0, load))
+    assert heavy == pytest.approx(load * light, rel=1e-4)
+
+
+def test_a_drone_that_falls_is_not_at_hover() -> None:
+    """Also one whose controller learns nothing, which need not be at its target."""
+    with pytest.raises(FlightError, match=r"hovers with 3 times the expected thrust does not hold"):
+        linear_controller(height_settings(learn="none"), 3.0)

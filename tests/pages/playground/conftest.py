@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from tests.support import command
-from tests.support.browser import Browser, browser
-from tests.support.playground import Page
+from tests.support.browser import Browser, Page, browser
 from tests.support.tools import require
 
 

@@ -18,8 +18,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Bernoulli, Circle, InSpace
 from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support import command
-from tests.support.browser import Browser
-from tests.support.playground import DESK_PX, MAMBO, ONE_NORM, PD, Page
+from tests.support.browser import DESK_PX, MAMBO, ONE_NORM, PD, Browser, Page
 from tests.support.tools import require
 
 pytestmark = pytest.mark.long

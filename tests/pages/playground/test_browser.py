@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.support.browser import Browser
-from tests.support.playground import DESK_PX, FEEDFORWARD, MAMBO, PD, PHONE_PX, Page
+from tests.support.browser import DESK_PX, FEEDFORWARD, MAMBO, PD, PHONE_PX, Browser, Page
 
 SPACE, ARROW_RIGHT = 32, 39
 

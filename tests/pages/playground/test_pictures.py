@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from mambo_sil.drone.plant.gusts import mean_speed_m_s
-from tests.support.browser import Browser
-from tests.support.playground import DESK_PX, FEEDFORWARD, MAMBO, PD, PHONE_PX, Page
+from tests.support.browser import DESK_PX, FEEDFORWARD, MAMBO, PD, PHONE_PX, Browser, Page
 from tests.support.tools import require_module
 
 BLUE = [0, 0x67, 0xA3, 255]

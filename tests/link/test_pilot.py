@@ -1,18 +1,21 @@
-"""The command `pilot`: a simulated flight with its files, and what it refuses."""
+"""The command `pilot` and its link: a simulated flight with its files, and what is refused."""
 
 import csv
 import json
 import socket
+import sys
 from pathlib import Path
 
 import pytest
 
+from mambo_sil.errors import LinkError
+from mambo_sil.link.sockets import Address, MavlinkSocket, parse_link
 from tests.support.command import run, unwrapped
 from tests.support.links import write_drone
 
 
 @pytest.fixture
-def settings() -> str:
+def settings(in_an_empty_folder: None) -> str:  # noqa: ARG001 - where it is written
     """Derive settings for the drone of these tests, in the present folder."""
     write_drone(Path())
     return "controller.toml"
@@ -45,7 +48,6 @@ def test_a_simulated_flight_writes_a_log_that_replay_and_identify_read(settings:
         ("", "name either this, such as udp:127.0.0.1:14540, or --simulate px4"),
         ("--link udp:127.0.0.1:14540 --simulate px4", "name either this"),
         ("--link udp:127.0.0.1:14540 --vehicle drone.toml", "it is the drone of --simulate"),
-        ("--link 14540", "--link 14540 must be udp:HOST:PORT"),
         ("--simulate px4 --trajectory eight", "--trajectory eight must be bernoulli, gerono"),
         ("--simulate px4 --height-m 0", "height_m = 0.0 must"),
     ],
@@ -57,12 +59,6 @@ def test_what_cannot_be_flown_is_refused(line: str, words: str) -> None:
     assert not Path("piloted").exists()
 
 
-def test_settings_without_a_height_are_refused() -> None:
-    """The autopilot wants the thrust too."""
-    _, talk = run("pilot", "mambo", "--simulate", "px4", code=2)
-    assert "the settings have no [height]" in unwrapped(talk)
-
-
 def test_a_second_pilot_at_the_port_is_refused(settings: str) -> None:
     """It is in use."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
@@ -70,3 +66,40 @@ def test_a_second_pilot_at_the_port_is_refused(settings: str) -> None:
         link = f"udp:127.0.0.1:{other.getsockname()[1]}"
         _, talk = run("pilot", settings, "--link", link, code=2)
     assert f"{link}: is in use: another pilot or ground station listens there" in unwrapped(talk)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "udp",
+        "udp:14540",
+        "udp:127.0.0.1:",
+        "udp:127.0.0.1:0",
+        "udp:127.0.0.1:99999",
+        "tcp:1.2.3.4:5",
+        "/dev/x",
+    ],
+)
+def test_what_is_no_link_is_refused(text: str) -> None:
+    """With the form that is wanted."""
+    with pytest.raises(LinkError, match=r"must be udp:HOST:PORT .*, such as udp:127\.0\.0\.1:14540"):
+        parse_link(text)
+
+
+def test_a_link_is_host_and_port() -> None:
+    """Of this machine."""
+    assert parse_link("udp:0.0.0.0:14550") == Address("0.0.0.0", 14550)
+
+
+def test_an_address_of_another_machine_is_a_sentence() -> None:
+    """TEST-NET-1 of RFC 5737."""
+    with pytest.raises(LinkError, match="name an address of this machine"):
+        MavlinkSocket(Address("192.0.2.1", 14540), None)
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the command that installs it."""
+    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
+    with pytest.raises(LinkError, match=r"pip install pymavlink \(the extra"):
+        MavlinkSocket(Address("127.0.0.1", 0), None)
