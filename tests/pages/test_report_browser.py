@@ -1,13 +1,12 @@
 """The report in a real browser: no complaint, nothing too wide, and the drones move, by mouse and by key."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from mambo_sil.pages.report_page import report_page
-from tests.support.browser import Browser, browser
+from tests.support.browser import Browser
 from tests.support.results import FOLDERS
 
 PHONE_PX, DESK_PX = 360, 1280
@@ -30,13 +29,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page, _ = report_page([base / name for name in FOLDERS], lambda _: None)
     (base / "report.html").write_text(page, "utf-8")
     return base / "report.html"
-
-
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Return a tab of a browser for all tests of this file."""
-    with browser(tmp_path_factory.mktemp("profile")) as one:
-        yield one
 
 
 @pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])

@@ -1,5 +1,6 @@
 """Small programs for boards, without start-up code; and for simavr, another emulator of AVR, from reset."""
 
+import json
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,7 +10,9 @@ from typing import Final
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.board import emulated
 from mambo_sil.board.firmware.firmware_build import Builder
+from mambo_sil.flight.controllers.controller_library import batch_source
 from tests.support.bundles import place
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
@@ -39,6 +42,20 @@ def builder_with(board: str, *flags: str) -> Builder:
 def link(board: str, text: str, folder: Path, *flags: str, keep: tuple[str, ...] = ("run",)) -> Path:
     """Compile and link `text`, C with the functions `keep`, for a board."""
     return builder_with(board, *flags).guest({}, text, keep, folder)
+
+
+def link_step(name: str, assembly: str, folder: Path) -> Path:
+    """Build a program for a board in which the function nmpc_known of the assembly takes the step's place."""
+    declared = (
+        '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
+        "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
+        f"__asm({json.dumps(assembly)});\n"
+    )
+    glue = batch_source()
+    assert glue.count("nmpc_step(") == 2, "with a height, and without"
+    stepped = glue.replace("nmpc_step(", "nmpc_known(")
+    files = render(ONE_NORM, with_digest=False)
+    return board_builder(name).guest(files, declared + stepped, emulated.GUEST, folder)
 
 
 def link_controller(board: str, folder: Path, *flags: str, scalar: str = "float32") -> Path:

@@ -6,7 +6,7 @@ from types import ModuleType
 import pytest
 
 from tests.support.bundles import write_target
-from tests.support.crazyflie import Built, build
+from tests.support.crazyflie import Built, Crazyflie, build
 from tests.support.radio import Drone
 from tests.support.scripts import SETTINGS, modules_of, ready
 
@@ -15,6 +15,14 @@ from tests.support.scripts import SETTINGS, modules_of, ready
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Return the app for preset crazyflie, compiled."""
     return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+
+
+@pytest.fixture
+def app(built: Built) -> Crazyflie:
+    """Return a drone with the app, whose set-points are positions."""
+    found = built.app()
+    found.modes("modeAbs")
+    return found
 
 
 @pytest.fixture(scope="module")

@@ -99,10 +99,8 @@ def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built, 
     assert not {name for name, value in zip(AGE_MUTANTS, wrong, strict=True) if value < 1.2 * right}
 
 
-def test_a_set_point_that_no_other_follows_does_not_run_away(built: Built) -> None:
+def test_a_set_point_that_no_other_follows_does_not_run_away(app: Crazyflie) -> None:
     """It is carried on for 500 ms, then it rests; after two seconds at 0.5 m/s^2 it would be a metre away."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0]))
     flown_since(app, np.zeros(7), 200)
     assert app.logged("saturated") == 0
@@ -136,10 +134,8 @@ def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) 
         assert content(app.flown) == content(app.setpoint)
 
 
-def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
+def test_height_and_yaw_stay_with_the_firmware(app: Crazyflie) -> None:
     """Of a set-point of ours only x, y, roll and pitch change."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.position.z, app.setpoint.attitude.yaw, app.setpoint.mode.yaw = (
         1.25,
         30.0,
@@ -187,10 +183,8 @@ def test_a_take_over_tells_the_controller_the_present_attitude(built: Built) -> 
     assert app.update(np.full(7, np.nan)) == (0.0, 0.0)
 
 
-def test_the_first_step_is_in_the_first_tick(built: Built) -> None:
+def test_the_first_step_is_in_the_first_tick(app: Crazyflie) -> None:
     """Whenever the first set-point of ours comes."""
-    app = built.app()
-    app.modes("modeAbs")
     app.time_ms = 1004
     app.aim(np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     app.place(np.zeros(7))
@@ -198,10 +192,8 @@ def test_the_first_step_is_in_the_first_tick(built: Built) -> None:
     assert app.flown.mode.x == app.host.modeDisable
 
 
-def test_the_parameter_on_leaves_all_to_the_firmware(built: Built) -> None:
+def test_the_parameter_on_leaves_all_to_the_firmware(app: Crazyflie) -> None:
     """It switches in flight, without another controller number."""
-    app = built.app()
-    app.modes("modeAbs")
     app.update(np.zeros(7))
     assert app.flown.mode.x == app.host.modeDisable
     for on, expected in ((0, app.host.modeAbs), (1, app.host.modeDisable)):
@@ -210,10 +202,8 @@ def test_the_parameter_on_leaves_all_to_the_firmware(built: Built) -> None:
         assert app.flown.mode.x == expected
 
 
-def test_lost_positions_are_counted_and_end_level(built: Built) -> None:
+def test_lost_positions_are_counted_and_end_level(app: Crazyflie) -> None:
     """The controller flies on by its estimate, then level; the next good state is flown as ever."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.array([0.5, 0.5, 0.0, 0.0, 0.0, 0.0]))
     flown_since(app, np.zeros(7), 3)
     before = app.logged("refused")
@@ -226,10 +216,8 @@ def test_lost_positions_are_counted_and_end_level(built: Built) -> None:
     assert app.logged("status") == 0
 
 
-def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None:
+def test_the_log_shows_commands_saturation_and_disturbance(app: Crazyflie) -> None:
     """In degrees, and in the firmware's frame: a disturbance to the left is positive along y."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.array([9.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     roll, pitch = flown_since(app, np.zeros(7), 60)[-1]
     assert (app.logged("roll"), app.logged("pitch")) == (roll, pitch)

@@ -47,11 +47,9 @@ def filtered(app: Crazyflie, time_ms: int, delay_ms: int) -> None:
 
 @pytest.mark.parametrize("delay_ms", [0, 3, 7])
 def test_the_position_is_that_of_now_whenever_the_filter_predicts_and_measures(
-    delay_ms: int, built: Built
+    delay_ms: int, app: Crazyflie
 ) -> None:
     """Between predictions the filter holds it, and a measurement 7 ms after one makes it 7 ms too new."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.zeros(6))
     for offset_ms in range(10):
         app.ticks += 10  # another controller flew: the next tick takes over
@@ -74,10 +72,8 @@ def swept(app: Crazyflie, time_ms: int) -> None:
     app.tick()
 
 
-def test_several_measurements_a_prediction_are_dated_by_their_mean(built: Built) -> None:
+def test_several_measurements_a_prediction_are_dated_by_their_mean(app: Crazyflie) -> None:
     """As those of base stations: each lowers the variance by less than one of a camera; none is lost."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.zeros(6))
     app.host.host_variances, app.state.position.x = [1e-4, 1e-4], 0.0
     for time_ms in range(100):
@@ -92,10 +88,8 @@ def test_several_measurements_a_prediction_are_dated_by_their_mean(built: Built)
         assert app.logged("x") == pytest.approx(0.001 * (1990 + offset_ms), abs=0.0025)
 
 
-def test_an_estimate_without_variances_is_taken_as_it_is(built: Built) -> None:
+def test_an_estimate_without_variances_is_taken_as_it_is(app: Crazyflie) -> None:
     """That of another estimator, whatever its position does."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.zeros(6))
     app.state.velocity.x = 1.0
     for time_ms in range(200):
@@ -123,10 +117,8 @@ def test_a_slow_stream_of_set_points_is_carried_on_by_its_jerk(built: Built) -> 
     assert worst[1] > 1.3 * worst[0]
 
 
-def test_a_jump_of_the_acceleration_is_no_jerk(built: Built) -> None:
+def test_a_jump_of_the_acceleration_is_no_jerk(app: Crazyflie) -> None:
     """A millisecond after the high-level commander's set-point at rest one comes that accelerates."""
-    app = built.app()
-    app.modes("modeAbs")
     app.aim(np.zeros(6))
     app.place(np.zeros(7))
     app.tick()

@@ -8,10 +8,8 @@ import pytest
 from tests.support.crazyflie import TURNED, Built, Crazyflie, content, flown_since, send
 
 
-def test_a_slow_set_point_is_carried_on_for_half_a_second(built: Built) -> None:
+def test_a_slow_set_point_is_carried_on_for_half_a_second(app: Crazyflie) -> None:
     """At its age by the clock, though half of the ticks are lost; then it rests."""
-    app = built.app()
-    app.modes("modeAbs")
     send(app, 1.0, 0.5, 0.2)
     app.place(np.zeros(7))
     for age_ms in range(0, 700, 2):
@@ -26,10 +24,8 @@ def test_a_slow_set_point_is_carried_on_for_half_a_second(built: Built) -> None:
     assert app.logged("step") % 2**16 > 0
 
 
-def test_a_stream_of_set_points_that_ends_is_noticed(built: Built) -> None:
+def test_a_stream_of_set_points_that_ends_is_noticed(app: Crazyflie) -> None:
     """After 120 ms where they came every 10 ms: the set-point rests before the supervisor levels out."""
-    app = built.app()
-    app.modes("modeAbs")
     for k in range(500):
         send(app, 0.005 * k, 0.5)
         app.update(np.zeros(7))
@@ -39,10 +35,8 @@ def test_a_stream_of_set_points_that_ends_is_noticed(built: Built) -> None:
         assert app.logged("targetVx") == (pytest.approx(0.5, abs=0.01) if age_ms < 120 else 0.0)
 
 
-def test_lost_ticks_cost_no_steps(built: Built) -> None:
+def test_lost_ticks_cost_no_steps(app: Crazyflie) -> None:
     """A step every 10 ms of the clock, whatever the task missed."""
-    app = built.app()
-    app.modes("modeAbs")
     send(app, 0.0)
     app.place(np.zeros(7))
     before = app.logged("step")
@@ -52,10 +46,8 @@ def test_lost_ticks_cost_no_steps(built: Built) -> None:
     assert app.logged("step") - before == pytest.approx(200, abs=2)
 
 
-def test_an_acceleration_that_is_not_given_is_estimated(built: Built) -> None:
+def test_an_acceleration_that_is_not_given_is_estimated(app: Crazyflie) -> None:
     """From the velocities of set-points that come ten times a second: near that of the circle, and smooth."""
-    app = built.app()
-    app.modes("modeAbs")
     app.place(np.zeros(7))
     found = []
     for k in range(100):
@@ -75,10 +67,8 @@ def test_an_acceleration_that_is_not_given_is_estimated(built: Built) -> None:
 @pytest.mark.parametrize(
     "number", ["position.x", "position.z", "velocity.y", "acceleration.z", "attitude.yaw"]
 )
-def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, built: Built) -> None:
+def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, app: Crazyflie) -> None:
     """The one before flies on, with its height and heading; the log counts it."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.mode.yaw = app.host.modeAbs
     app.setpoint.position.z, app.setpoint.attitude.yaw = 1.25, 30.0
     send(app, 0.5)
@@ -97,10 +87,8 @@ def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, bu
     assert app.logged("refused") == refused + 20
 
 
-def test_a_first_set_point_that_is_not_finite_stays_here(built: Built) -> None:
+def test_a_first_set_point_that_is_not_finite_stays_here(app: Crazyflie) -> None:
     """At the place and the heading of the drone."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.position.x = math.nan
     here = np.array([0.3, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
     app.update(here)
@@ -108,10 +96,8 @@ def test_a_first_set_point_that_is_not_finite_stays_here(built: Built) -> None:
     assert app.flown.position.z == 1.0
 
 
-def test_every_kind_of_set_point_flies_in_one_mode(built: Built) -> None:
+def test_every_kind_of_set_point_flies_in_one_mode(app: Crazyflie) -> None:
     """The PID controller resets itself at a change of mode: the heading of a quaternion becomes an angle."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.mode.yaw = app.host.modeAbs
     app.setpoint.attitude.yaw = 30.0
     app.update(TURNED)
@@ -126,10 +112,8 @@ def test_every_kind_of_set_point_flies_in_one_mode(built: Built) -> None:
     assert app.flown.attitude.yaw == pytest.approx(30.0, abs=1e-4)
 
 
-def test_a_heading_is_carried_on_by_its_rate(built: Built) -> None:
+def test_a_heading_is_carried_on_by_its_rate(app: Crazyflie) -> None:
     """A full-state set-point gives it."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.mode.yaw = app.host.modeAbs
     app.setpoint.attitude.yaw, app.setpoint.attitudeRate.yaw = 30.0, 100.0
     send(app, 0.0)
@@ -139,10 +123,8 @@ def test_a_heading_is_carried_on_by_its_rate(built: Built) -> None:
     assert app.flown.attitude.yaw == pytest.approx(40.0)
 
 
-def test_the_heading_turns_slowly_and_the_short_way(built: Built) -> None:
+def test_the_heading_turns_slowly_and_the_short_way(app: Crazyflie) -> None:
     """By 4 rad/s at most from where the drone points, also across south."""
-    app = built.app()
-    app.modes("modeAbs")
     app.setpoint.mode.yaw, app.setpoint.attitude.yaw = app.host.modeAbs, -170.0
     app.place(np.array([0, 0, 0, 0, 0, 0, math.radians(-160.0)]))
     headings = []
@@ -155,10 +137,8 @@ def test_the_heading_turns_slowly_and_the_short_way(built: Built) -> None:
     assert turned[-1] == pytest.approx(30.0, abs=1e-3)
 
 
-def test_on_the_ground_it_flies_level(built: Built) -> None:
+def test_on_the_ground_it_flies_level(app: Crazyflie) -> None:
     """While the supervisor sees no flight, and within 5 cm of the height of take-off."""
-    app = built.app()
-    app.modes("modeAbs")
     send(app, 2.0)
     steps = app.logged("step")
     app.host.host_is_flying = False
@@ -219,10 +199,8 @@ def test_a_lost_position_is_told_and_ends_on_the_floor(built: Built) -> None:
     assert app.flown.mode.z == app.host.modeAbs
 
 
-def test_a_position_that_comes_back_is_flown_on(built: Built) -> None:
+def test_a_position_that_comes_back_is_flown_on(app: Crazyflie) -> None:
     """Before the descent has begun."""
-    app = built.app()
-    app.modes("modeAbs")
     send(app, 0.5)
     app.place(np.zeros(7))
     measured_for(app, 200, measuring=True)
@@ -232,10 +210,8 @@ def test_a_position_that_comes_back_is_flown_on(built: Built) -> None:
     assert (app.logged("lost"), app.logged("status")) == (0, 0)
 
 
-def test_without_a_position_no_flight_begins(built: Built) -> None:
+def test_without_a_position_no_flight_begins(app: Crazyflie) -> None:
     """The motors stay off."""
-    app = built.app()
-    app.modes("modeAbs")
     send(app, 0.5)
     app.host.host_is_flying = False
     app.state.position.z = 0.0

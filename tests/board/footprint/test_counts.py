@@ -1,6 +1,5 @@
 """Instruction counts are exact and of consecutive ticks; the search starts from the plan of its tick."""
 
-import json
 import re
 from collections import Counter
 from pathlib import Path
@@ -10,11 +9,10 @@ import numpy as np
 import pytest
 import unicorn
 
-from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
+from mambo_sil.board.emulated import EmulatedController, build_guest
 from mambo_sil.board.emulation.unicorn_machine import UnicornMachine
 from mambo_sil.board.firmware.disassembly import disassemble
 from mambo_sil.board.firmware.elf import Image, load
@@ -28,10 +26,10 @@ from mambo_sil.board.footprint.counts import (
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.controller_library import batch_source
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.model.derive.chosen_tilt import chosen_text
+from tests.support.linking import link_step
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 
@@ -125,26 +123,13 @@ def counted(settings: Settings, elf: Path, ticks: int, searched: int) -> Instruc
     return count_instructions(settings, elf, "cortex-m4", ticks, searched)
 
 
-def known_function(name: str, assembly: str, folder: Path) -> Path:
-    """Build a program for a board in which the function nmpc_known of the assembly takes the step's place."""
-    declared = (
-        '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
-        "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
-        f"__asm({json.dumps(assembly)});\n"
-    )
-    glue = batch_source()
-    assert glue.count("nmpc_step(") == 2, "with a height, and without"
-    stepped = glue.replace("nmpc_step(", "nmpc_known(")
-    return board_builder(name).guest(render(MAMBO, with_digest=False), declared + stepped, GUEST, folder)
-
-
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", CORES)
 def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
     """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
     skipped = SKIPPED.get(name, ())
     assembly = ASSEMBLY.format(**WORDS.get(name, THUMB), skipped="\n".join(skipped))
-    elf = known_function(name, assembly, tmp_path)
+    elf = link_step(name, assembly, tmp_path)
     controller = CountingController(MAMBO, elf, CORES[name])
     for _ in range(2):
         controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
@@ -181,7 +166,7 @@ nmpc_known:
 
 def test_loads_in_an_it_block_before_a_page_are_counted_right(tmp_path: Path) -> None:
     """Unicorn passes on the conditions of the block, in which a wide branch is no valid instruction."""
-    elf = known_function("crazyflie", PAGE_AFTER_IT, tmp_path)
+    elf = link_step("crazyflie", PAGE_AFTER_IT, tmp_path)
     controller = CountingController(MAMBO, elf, "cortex-m4")
     controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
     assert controller.steps[-1].accepted

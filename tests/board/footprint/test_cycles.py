@@ -1,6 +1,5 @@
 """Modelled cycles are those of the manuals: functions counted by hand, and what each class adds."""
 
-import json
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,7 @@ import pytest
 
 from mambo_codegen import boards
 from mambo_codegen.boards import MODELLED, FlashWait
-from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
-from mambo_sil.board.emulated import GUEST
 from mambo_sil.board.emulation.executed import Executed
 from mambo_sil.board.firmware.elf import load
 from mambo_sil.board.footprint import timing_arm
@@ -20,10 +17,10 @@ from mambo_sil.board.footprint.counts import CountingController
 from mambo_sil.board.footprint.cycles import MODELS, CycleModel, ModelledCycles
 from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.board.footprint.timing import NONE, Cycles
-from mambo_sil.flight.controllers.controller_library import batch_source
+from tests.support.linking import link_step
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 
-SETTINGS = presets.load("mambo-1norm")
 BOTH = (".text", ".balign 16", ".global nmpc_known")
 ARM = (*BOTH, ".syntax unified", ".thumb", ".type nmpc_known, %function", ".thumb_func")
 AVR = (*BOTH, ".type nmpc_known, @function")
@@ -110,18 +107,12 @@ def build_known(name: str, folder: Path) -> Path:
     head, rows = KNOWN[name]
     body = (text for text, *_ in rows)
     assembly = "\n".join([*head, "nmpc_known:", *body, ".size nmpc_known, . - nmpc_known", ""])
-    declared = (
-        '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
-        "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
-        f"__asm({json.dumps(assembly)});\n"
-    )
-    glue = declared + batch_source().replace("nmpc_step(", "nmpc_known(")
-    return board_builder(name).guest(render(SETTINGS, with_digest=False), glue, GUEST, folder)
+    return link_step(name, assembly, folder)
 
 
 def step_known(name: str, elf: Path, flash: FlashWait | None = None) -> tuple[Counter[str], ModelledCycles]:
     """Execute the function once; returns its instructions and cycles."""
-    controller = CountingController(SETTINGS, elf, CORES[name], modelled=True, flash=flash)
+    controller = CountingController(ONE_NORM, elf, CORES[name], modelled=True, flash=flash)
     controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
     (step,) = controller.steps
     assert step.cycles is not None

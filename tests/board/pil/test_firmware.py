@@ -24,7 +24,7 @@ from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.serial_port import open_port
 from tests.support.command import run, unwrapped
 from tests.support.height_settings import height_settings
-from tests.support.serial_line import Line, build_firmware, serial_line
+from tests.support.serial_line import Line, build_firmware, edited, serial_line
 from tests.support.tools import without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -168,9 +168,7 @@ def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
     assert reference.split() == ["reference", "NumPy", board.split()[-1]]
     assert board.startswith("board      host process")
 
-    def weigh_otherwise(files: dict[str, str]) -> None:
-        files["pil.c"] = files["pil.c"].replace("(int)number, get(body)", "(int)number + 1, get(body)")
-
+    weigh_otherwise = edited("pil.c", "(int)number, get(body)", "(int)number + 1, get(body)")
     other = build_firmware(presets.preset("mambo"), "host", tmp_path / "other", weigh_otherwise)
     with serial_line(other) as line:
         said, _ = run("same-bits", "--port", line.port, "--steps", "200", code=1)

@@ -14,6 +14,7 @@ from mambo_sil.experiment.campaign.campaign_file import default
 from mambo_sil.experiment.margins.many_drones import campaign_drones
 from mambo_sil.experiment.margins.margins_record import PICTURES, RESPONSES
 from tests.support.command import run
+from tests.support.height_settings import height_settings
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
@@ -69,20 +70,34 @@ def test_an_unstable_loop_exits_1() -> None:
 
 @pytest.mark.long
 def test_results_are_pictures_and_files_that_report_shows() -> None:
-    """The folder has three pictures, responses, the drawn drones and a summary; a page shows them."""
-    _, written = run("margins", "--campaign", "default", "--drones", "3", "-o", "out")
+    """The folder has three pictures, responses, the drawn drones and a summary; a page shows them.
+
+    The height is the third axis, broken at the command only.
+    """
+    Path("c.toml").write_text(to_toml(height_settings()), "utf-8")
+    drawn = ("--campaign", "default", "--drones", "3")
+    said, written = run("margins", "c.toml", "--vehicle", "crazyflie", *drawn, "-o", "out")
+    assert "height: gain margin at the command" in said
+    assert "height: gain margin at the motors" not in said
     files = {*PICTURES, RESPONSES, "drones.csv", "summary.json"}
     assert {path.name for path in Path("out").iterdir()} == files
     assert all(name in written for name in files)
     rows = list(csv.DictReader(Path("out/drones.csv").read_text("utf-8").splitlines()))
     assert [row["drone"] for row in rows] == ["0", "1", "2"]
     assert len({row["mass_kg"] for row in rows}) == 3
+    assert "height_command_gain_up" in rows[0]
+    responses = Path("out", RESPONSES).read_text("utf-8")
+    assert ("height,command," in responses, "roll,motors," in responses) == (True, True)
+    assert "height,motors," not in responses
     many = json.loads(Path("out/summary.json").read_text("utf-8"))["many"]
+    assert {one["axis"] for one in many["spreads"]} == {"roll", "pitch", "height"}
     spread = next(one for one in many["spreads"] if one["figure"] == "gain margin")
     gains = [float(row["roll_command_gain_up"]) for row in rows]
     assert (spread["worst"], spread["median"]) == pytest.approx((min(gains), sorted(gains)[1]), rel=1e-5)
     run("report", "out")
-    assert "tolerates" in Path("report.html").read_text("utf-8")
+    page = Path("report.html").read_text("utf-8")
+    assert "height: tolerates" in page
+    assert "bode of roll, pitch and height" in page
 
 
 @pytest.mark.long

@@ -143,29 +143,6 @@ def test_command_shows_the_height_beside_roll_and_pitch() -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("in_an_empty_folder")
-def test_results_and_report_have_the_height() -> None:
-    """Responses, drawn drones, pictures and report have the third axis, broken at the command only."""
-    Path("c.toml").write_text(to_toml(height_settings()), "utf-8")
-    said, _ = run(
-        "margins", "c.toml", "--vehicle", "crazyflie", "--campaign", "default", "--drones", "2", "-o", "out"
-    )
-    assert "height: gain margin at the command" in said
-    assert "height: gain margin at the motors" not in said
-    many = json.loads(Path("out/summary.json").read_text("utf-8"))["many"]
-    assert {one["axis"] for one in many["spreads"]} == {"roll", "pitch", "height"}
-    assert "height_command_gain_up" in Path("out/drones.csv").read_text("utf-8").splitlines()[0]
-    responses = Path("out/response.csv").read_text("utf-8")
-    assert "height,command," in responses
-    assert "roll,motors," in responses
-    assert "height,motors," not in responses
-    run("report", "out")
-    page = Path("report.html").read_text("utf-8")
-    assert "bode of roll, pitch and height" in page
-    assert "height: tolerates" in page
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("in_an_empty_folder")
 def test_design_judges_the_height() -> None:
     """`design` prints the margins of the height, and warns of a thrust that may be quicker than modelled."""
     _, said = run("design", "crazyflie", "-o", "c.toml")

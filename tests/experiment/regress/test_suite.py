@@ -1,17 +1,18 @@
-"""Suites: lists of values multiply flights, keys of one flight are checked, all errors are reported."""
+"""Suites: lists multiply flights, keys are checked, all errors are told, and flights are flown in batches."""
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 
 import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
-from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, fly_scenarios
-from mambo_sil.experiment.inputs import load_entrant
+from mambo_sil.experiment.campaign.executors import Pool
+from mambo_sil.experiment.inputs import Entrant, load_entrant
 from mambo_sil.experiment.regress.suite_file import MOST_FLIGHTS, FlightSuite, load_suite
-from mambo_sil.flight.names import IN_SPACE
+from mambo_sil.experiment.regress.suite_flights import _batches, demand_flyable, fly_suite
 from mambo_sil.flight.scenario import Scenario
-from mambo_sil.model.derive.derived_settings import controller_text
 
 
 def suite(folder: Path, text: str) -> FlightSuite:
@@ -228,43 +229,63 @@ def test_what_is_no_suite_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert load_suite("envelope").name == "envelope"
 
 
-def test_the_envelope_has_33_headings_over_the_full_turn() -> None:
-    """Ten groups: five courses with the true state and through sensors, each with a bound on the IAE."""
-    found = load_suite("envelope")
-    groups = {flight.group for flight in found.flights}
-    assert len(groups) == 10
-    for group in groups:
-        flights = [flight for flight in found.flights if flight.group == group]
-        yaws_rad = [flight.scenario.yaw_rad for flight in flights]
-        assert len(set(yaws_rad)) == 33
-        assert max(yaws_rad) - min(yaws_rad) == pytest.approx(6.28318)
-        assert all("iae_m_s" in flight.bounds for flight in flights)
-        sensors = {flight.scenario.sensors for flight in flights}
-        assert sensors == {"mambo-derotated" if group.endswith("-sensors") else "true"}
+def controller(folder: Path, period_s: float) -> Entrant:
+    """Return preset table1 with another update period."""
+    path = folder / "slow.toml"
+    path.write_text(f"horizon.update_period_s = {period_s}\n", "utf-8")
+    return load_entrant("slow.toml", folder, "test")
 
 
-def test_the_suite_in_space_flies_every_course_and_condition() -> None:
-    """All curves with a height; heavy, sagging, unloaded, in gusts and close to the ground."""
-    flights = [flight.scenario for flight in load_suite("space").flights]
-    assert set(IN_SPACE) <= {one.trajectory for one in flights}
-    for key in ("battery_sag_1_s", "payload_kg", "vertical_gust_m_s2", "ground_effect_radius_m"):
-        assert any(getattr(one, key) for one in flights), key
-    assert any(one.mass_kg == pytest.approx(1.3 * one.vehicle.body.mass_kg) for one in flights)
+@pytest.mark.parametrize(
+    ("flights", "duration_s", "workers", "sizes"),
+    [
+        (1, 1.0, 1, [1]),
+        (20, 1.0, 1, [20]),
+        (45, 1.0, 1, [20, 20, 5]),
+        (45, 1.0, 2, [20, 20, 5]),
+        (45, 1.0, 4, [12, 12, 12, 9]),
+        (3, 1.0, 8, [1, 1, 1]),
+        (6, 2500.0, 1, [4, 2]),
+        (5, 3600.0, 1, [2, 2, 1]),
+    ],
+)
+def test_a_batch_is_a_share_of_the_flights_up_to_a_limit(
+    tmp_path: Path, *, flights: int, duration_s: float, workers: int, sizes: list[int]
+) -> None:
+    """At most 20 flights, 10000 s of flight, and no more than leaves a batch for each worker."""
+    seeds = "7" if flights == 1 else f"{{ from = 1, to = {flights}, count = {flights} }}"
+    found = suite(tmp_path, f"[flights.eight]\nduration_s = {duration_s}\nseed = {seeds}")
+    batches = list(_batches(found, workers))
+    assert [len(batch) for batch in batches] == sizes
+    assert list(chain.from_iterable(batches)) == list(range(flights))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["space", "height"])
-def test_no_bound_of_a_suite_in_space_is_exceeded_or_twice_what_is_flown(name: str, tmp_path: Path) -> None:
-    """Suite `space` by preset crazyflie with the stock altitude loop, `height` by what design derives."""
-    suite, source = load_suite(name), "crazyflie"
-    if name == "height":
-        derived = tmp_path / "controller.toml"
-        derived.write_text(controller_text(vehicle_toml.load("crazyflie"), "crazyflie"), "utf-8")
-        source = str(derived)
-    entrant = load_entrant(source, tmp_path, "test")
-    for group in dict.fromkeys((one.group, one.scenario.duration_s) for one in suite.flights):
-        flights = [one for one in suite.flights if (one.group, one.scenario.duration_s) == group]
-        rows = fly_scenarios([entrant], [one.scenario for one in flights], lambda _: None)
-        for metric, bound in flights[0].bounds.items():
-            worst = max(float(row[f"{entrant.name}_{metric}"]) for row in rows)
-            assert 0.5 * bound <= worst <= bound, (group, metric, worst)
+def test_flights_are_flown_in_groups_of_one_kind_and_come_back_in_order(tmp_path: Path) -> None:
+    """Durations, starts and sensors cannot be mixed in a batch; each row is that of the flight alone."""
+    found = suite(
+        tmp_path,
+        """
+        [flights.eight]
+        yaw_rad = [0.0, 0.5]
+        duration_s = [0.2, 0.1]
+        sensors = ["true", "mambo"]
+        """,
+    )
+    pd, finished = load_entrant("pd", tmp_path, "test"), list[int]()
+    with ThreadPoolExecutor(1) as thread:
+        rows = fly_suite(found, pd, Pool(thread, 1, lambda _: None), finished.append)
+    assert finished == [0, 2, 4, 6, 8]
+    for row, flight in zip(rows, found.flights, strict=True):
+        (alone,) = fly_scenarios([pd], [flight.scenario])
+        assert {f"pd_{key}": value for key, value in row.items()} == alone
+
+
+def test_a_flight_that_cannot_be_simulated_is_named(tmp_path: Path) -> None:
+    """Its duration against the update period, which must be a multiple of the tick."""
+    found = suite(tmp_path, "[flights.eight]\nduration_s = 1.0\n[flights.brief]\nduration_s = 0.01")
+    demand_flyable(found, controller(tmp_path, 0.01), "here")
+    with pytest.raises(
+        InvalidSettingsError,
+        match=r"^here: flights\.brief: duration_s = 0\.01 must be .*update_period_s = 0\.02",
+    ):
+        demand_flyable(found, controller(tmp_path, 0.02), "here")

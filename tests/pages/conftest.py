@@ -1,4 +1,4 @@
-"""The default page, and a tab of a browser, for the tests of a module."""
+"""A tab of a browser, and the default page of the playground, for the tests of a module."""
 
 import json
 from collections.abc import Iterator
