@@ -1,4 +1,4 @@
-"""Tables and pictures of README and the manual are those of this code."""
+"""Tables and pictures of README and the manual, and generated interfaces, are those of this code."""
 
 import json
 import subprocess
@@ -29,6 +29,7 @@ from benchmarks.evidence.item import (
 )
 from benchmarks.evidence.items import ITEMS
 from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
+from benchmarks.generated import interfaces
 from benchmarks.peers.ours import ONE_NORM
 from mambo_codegen import __version__
 from mambo_codegen.settings import presets
@@ -211,3 +212,9 @@ def test_an_unknown_item_is_refused() -> None:
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ran.returncode == 2
     assert ran.stderr.startswith("table3: is no item of evidence; there are table2, ")
+
+
+@pytest.mark.parametrize(("path", "text"), [pytest.param(*one, id=one[0].stem) for one in interfaces()])
+def test_interfaces_are_those_of_the_declarations(path: Path, text: str) -> None:
+    """Of another layout of its records the engine would read and write wrong memory."""
+    assert path.read_text("utf-8") == text, "run `make generated`, and commit what changes"

@@ -12,7 +12,7 @@ from tests.support.browser import Browser, Page, browser
 from tests.support.tools import require
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
     """Return the default page and its summary."""
     require("clang", "clang")

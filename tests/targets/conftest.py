@@ -1,4 +1,4 @@
-"""The Crazyflie's app and its scripts, generated once for the tests of a module."""
+"""The Crazyflie's app and its scripts, generated once."""
 
 from pathlib import Path
 from types import ModuleType
@@ -11,7 +11,7 @@ from tests.support.radio import Drone
 from tests.support.scripts import SETTINGS, modules_of, ready
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Return the app for preset crazyflie, compiled."""
     return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("crazyflie")))
@@ -25,7 +25,7 @@ def app(built: Built) -> Crazyflie:
     return found
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the target."""
     return write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("app"))

@@ -14,8 +14,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.desk import desk_library
 from mambo_sil.board.desk.desk_flight import Desk, DeskConditions, DeskSensors
-from tests.support.desk_radio import DeskDrone, largest_m, ready_on_desk
-from tests.support.scripts import SETTINGS, at_call, run
+from tests.support.scripts import SETTINGS, DeskDrone, at_call, largest_m, ready_on_desk, run
 
 GOTO = ("goto", "--size", "0.5")
 CONDITIONS: dict[str, dict[str, Any]] = {

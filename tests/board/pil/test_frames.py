@@ -11,8 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
 from mambo_sil.board.pil.serial_frames import (
     LONGEST_PAYLOAD,
@@ -22,7 +20,7 @@ from mambo_sil.board.pil.serial_frames import (
     encode,
     frame_bytes,
 )
-from tests.support.bundles import place
+from tests.support.bundles import write_target
 from tests.support.tools import require
 
 payloads = st.binary(min_size=1, max_size=LONGEST_PAYLOAD) | st.lists(
@@ -78,8 +76,7 @@ def test_a_payload_that_is_too_long_is_a_mistake() -> None:
 def frames_c(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Return the generated C of frames, compiled with strict warnings as errors."""
     compiler = require(request.param, request.param)
-    files = render_target(presets.preset("mambo"), TARGETS["pil"], with_digest=False)
-    folder = place(files, tmp_path_factory.mktemp("frames"))
+    folder = write_target("pil", presets.preset("mambo"), tmp_path_factory.mktemp("frames"))
     flags = [*COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-fPIC", "-shared"]
     line = [compiler, *flags, "pil_frame.c", "-o", "frames.so"]
     done = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)

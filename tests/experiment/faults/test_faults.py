@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,6 +46,7 @@ from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.fault_check import check, judge
 from tests.support.one_norm import ONE_NORM
 from tests.support.quadratic import quadratic_settings
+from tests.support.shell import shell
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -325,12 +325,8 @@ def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
     (tmp_path / "caller.c").write_text(CALLER.replace("LINES", lines[1]), "utf-8")
     sources = sorted(map(str, (tmp_path / "bundle").glob("*.c")))
     command = [compiler, *COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-Ibundle", "caller.c", *sources]
-    built = subprocess.run(
-        [*command, "-o", "caller"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert built.returncode == 0, built.stderr
-    printed = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True).stdout
-    good, *refused = map(float, printed.split())
+    shell(*command, "-o", "caller", folder=tmp_path)
+    good, *refused = map(float, shell(tmp_path / "caller").split())
     assert good != 0
     assert refused == [good] * 4 + [0.0] * 2
 

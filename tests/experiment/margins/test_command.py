@@ -102,10 +102,10 @@ def test_results_are_pictures_and_files_that_report_shows() -> None:
 
 @pytest.mark.long
 def test_draws_do_not_depend_on_how_many_there_are() -> None:
-    """Drone 2 of three is drone 2 of eleven; its sensors are those of the campaign, or given."""
-    few, many = (list(campaign_drones(preset("mambo"), default(), drones)) for drones in (3, 11))
-    assert len(many) == 11
-    assert list(map(repr, few)) == list(map(repr, many[:3]))
+    """Drone 1 of two is drone 1 of four; its sensors are those of the campaign, or given."""
+    few, many = (list(campaign_drones(preset("mambo"), default(), drones)) for drones in (2, 4))
+    assert len(many) == 4
+    assert list(map(repr, few)) == list(map(repr, many[:2]))
     first = ("--campaign", "default", "--drones", "1")
     drawn, true = measured(*first), measured(*first, "--sensors", "true")
     assert drawn["many"]["spreads"] != true["many"]["spreads"]

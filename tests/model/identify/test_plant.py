@@ -15,6 +15,7 @@ from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Outcome
 from mambo_sil.flight.traces import write_csv
@@ -31,14 +32,6 @@ from mambo_sil.model.identify.signals import COMMANDS, START_THRUST, THRUST_COMM
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Commanded:
-    """A command and its status."""
-
-    command_rad: Array
-    status: NDArray[np.int64]
-
-
 @dataclass
 class WithSines:
     """The PD controller with a sum of sines on its commands."""
@@ -52,7 +45,7 @@ class WithSines:
         phase = 2.0 * np.pi * 0.01 * self.updates * np.array(SINES_HZ)
         self.updates += 1
         sines = 0.01 * np.array([np.sin(phase + np.arange(6.0) ** 2).sum(), np.cos(phase).sum()])
-        return Commanded(np.asarray(outcome.command_rad, np.float64) + sines, outcome.status)
+        return Applied(np.asarray(outcome.command_rad, np.float64) + sines, outcome.status)
 
 
 @pytest.fixture(scope="module")

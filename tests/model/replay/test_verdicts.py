@@ -136,35 +136,14 @@ def test_missing_numbers_cost_their_rows(hover: Table) -> None:
 
 def test_a_calm_axis_fails_no_flight() -> None:
     """In still air without noise, along x: roll stays 0."""
-    run(
-        "fly",
-        "crazyflie",
-        "--vehicle",
-        "crazyflie",
-        "--trajectory",
-        "step",
-        "--duration-s",
-        "8",
-        "--no-pictures",
-    )
-    table = list(csv.reader(Path("flight/trace.csv").read_text("utf-8").splitlines()))
+    table = flown("--trajectory", "step", "--duration-s", "8")
     assert judged(without(table, [400, 500, 600])).verdict is ReplayVerdict.YES
     assert judged(sent(table, lambda commands: 1.05 * commands)).verdict is ReplayVerdict.NO
 
 
 def test_a_log_in_which_nothing_moves_tells_nothing() -> None:
     """Any controller commands 0 there: exit 2, and what to log."""
-    run(
-        "fly",
-        "crazyflie",
-        "--vehicle",
-        "crazyflie",
-        "--trajectory",
-        "hover",
-        "--duration-s",
-        "8",
-        "--no-pictures",
-    )
+    flown("--trajectory", "hover", "--duration-s", "8")
     said, _ = run("replay", "flight/trace.csv", "crazyflie", code=2)
     assert said.startswith("CANNOT TELL whether it was this controller: the commands hardly move")
 
