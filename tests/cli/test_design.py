@@ -60,20 +60,6 @@ def test_a_log_gives_settings_with_two_commands() -> None:
 
 
 @pytest.mark.long
-def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
-    """At the worst ends of the intervals a loop stands too little, and the widest interval is in the way."""
-    Path("mine.toml").write_text(DRONE, "utf-8")
-    _, certain = run("design", "mine.toml")
-    wide = "\n[uncertainty]\nroll_dead_time_s = 0.08\nroll_gain = 0.01\n"
-    Path("mine.toml").write_text(DRONE + wide, "utf-8")
-    _, said = run("design", "mine.toml", "--force")
-    assert "warning" not in certain
-    said = unwrapped(said)
-    assert "(true state, at the worst of the intervals in [uncertainty])" in said
-    assert "the main cause is the interval of attitude.roll.dead_time_s +- 0.08: " in said
-
-
-@pytest.mark.long
 def test_it_warns_of_slow_motors() -> None:
     """A Mambo with motors of 0.12 s crashes and is unstable through its sensors, and they are named."""
     text = run("vehicles", "mambo")[0]

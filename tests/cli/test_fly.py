@@ -124,12 +124,6 @@ def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
     assert header == ",".join((*CSV_COLUMNS, *SEEN_COLUMNS))
 
 
-def test_waypoints_fly(tmp_path: Path) -> None:
-    """A CSV file is a trajectory."""
-    (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
-    run("fly", "--trajectory", "way.csv", "--duration-s", "2", "--no-pictures")
-
-
 def test_polynomial_pieces_fly(tmp_path: Path) -> None:
     """A CSV file with a duration in its header has pieces, and a bad one is named by its line."""
     header = ",".join(("Duration", *(f"{axis}^{k}" for axis in ("x", "y", "z", "yaw") for k in range(8))))

@@ -119,4 +119,5 @@ def test_faults_and_what_design_writes() -> None:
     write_settings("../light.toml")
     run("design", "light.toml", "-o", "made/derived.toml")
     assert 'vehicle = "../light.toml"' in Path("made/derived.toml").read_text("utf-8")
-    assert run("faults", "made/derived.toml")[0].startswith("made/derived.toml on light: ")
+    assert run("faults", "made/derived.toml", "-o", "out")[0].startswith("made/derived.toml on light: ")
+    assert json.loads(Path("out/summary.json").read_text("utf-8"))["vehicle"]["name"] == "light"

@@ -174,10 +174,8 @@ def test_a_suite_flies_any_drone() -> None:
 
 
 @pytest.mark.long
-def test_faults_and_sweeps_state_their_drone() -> None:
-    """In their summaries."""
-    run("faults", "--vehicle", "mine.toml", "-o", "faults")
-    assert summary("faults")["vehicle"]["name"] == "mine"
+def test_a_sweep_states_its_drone() -> None:
+    """In its summary; `faults` does in test_vehicle_of_settings."""
     small = ["--vary", "cost.response_time_s=0.2:0.2:1"]
     run("sweep", *small, "--vehicle", "mine.toml", "-o", "mine")
     run("sweep", *small, "-o", "mambo")

@@ -82,16 +82,6 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
     demand_same_bits(summary, 21, names[board])
 
 
-@pytest.mark.long
-def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
-    """The target of such a controller has two more numbers."""
-    settings = with_option(presets.preset("mambo"), "target.acceleration", "given")
-    (tmp_path / "given.toml").write_text(to_toml(settings), "utf-8")
-    with serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line:
-        summary = flown(line, "given.toml", "--duration-s", "0.2")
-    demand_same_bits(summary, 21, "host process")
-
-
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "scalar", "acceleration"),

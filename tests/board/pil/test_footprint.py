@@ -10,7 +10,7 @@ from mambo_codegen.settings import presets
 from mambo_sil.board.footprint.on_board import choose_board
 from mambo_sil.errors import BoardError
 from tests.support.command import run, unwrapped
-from tests.support.serial_line import Faults, build_firmware, edited, serial_line
+from tests.support.serial_line import build_firmware, edited, serial_line
 from tests.support.tools import board_builder, without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -107,19 +107,6 @@ def test_other_bits_fail(tmp_path: Path) -> None:
     assert "STEPS HAVE OTHER BITS THAN ON THIS MACHINE" in unwrapped(said)
     run("report", "out", "-o", "report.html")
     assert "of the period; OTHER BITS on host process" in Path("report.html").read_text("utf-8")
-
-
-@pytest.mark.long
-def test_a_lost_reply_is_made_good(tmp_path: Path) -> None:
-    """As in a flight: every step is measured once, and the fault is in the summary."""
-    board_builder("crazyflie")
-    chunks = iter(range(10**6))
-    faults = Faults(from_board=lambda chunk: b"" if next(chunks) == 50 else chunk)
-    with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil"), faults) as line:
-        summary = json.loads(run("footprint", "--port", line.port, "--board", "crazyflie", "--json")[0])
-    measured = summary["boards"][0]["on_board"]
-    assert (measured["ticks"], measured["different_steps"]) == (300, 0)
-    assert measured["link_faults"]["repeated"] >= 1
 
 
 @pytest.mark.parametrize(("says", "name"), [("STM32F405", "crazyflie"), ("Arduino Mega 2560", "mega")])

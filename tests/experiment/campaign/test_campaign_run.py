@@ -31,7 +31,7 @@ from mambo_sil.experiment.campaign.campaign_run import (
 from mambo_sil.experiment.campaign.executors import Pool, cluster, processes, report_share
 from mambo_sil.experiment.campaign.store import DATABASE
 from mambo_sil.flight.scenario import read_record
-from tests.support.command import command, run, without
+from tests.support.command import command, run
 from tests.support.tools import require_module
 
 FLIGHTS = 6
@@ -381,14 +381,13 @@ def test_scheduler_and_workers_exclude_each_other(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_missing_dask_is_named(tmp_path: Path) -> None:
+def test_missing_dask_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The message says how to install it for the Python that runs; no folder is made."""
-    line = ("campaign", "--scheduler", "tcp://127.0.0.1:1")
-    done = command(*line, folder=tmp_path, script=without("distributed"))
-    assert (done.returncode, done.stdout) == (2, "")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    line = ("campaign", "--scheduler", "tcp://127.0.0.1:1", "-o", str(tmp_path / "out"))
     install = shlex.join([sys.executable, "-m", "pip", "install", "distributed"])
-    assert done.stderr == f"--scheduler needs Dask; install it: {install}\n"
-    assert not list(tmp_path.iterdir())
+    assert run(*line, code=2) == ("", f"--scheduler needs Dask; install it: {install}\n")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("scheme", ["tls", "ucx"])
