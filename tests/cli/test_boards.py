@@ -45,13 +45,7 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
     assert values["flash"] == sum(board["flash_sections"].values()) == sum(board["flash_bytes"].values())
     assert values["stack"] == sum(frame["bytes"] for frame in board["stack_path"])
     counts = board["instructions"]
-    assert 0 < counts["least"] <= counts["mean"] <= counts["most_met"]
-    cycles = board["cycles"]
-    assert counts["most_met"] < cycles["most_met"]
-    assert board["cycles_estimate"] == [cycles["fewest"], cycles["most_with_wait"]]
-    assert cycles["least"] <= cycles["mean"] <= cycles["most_met"]
-    assert cycles["fewest"] < cycles["most_met"] < cycles["most_with_wait"]
-    assert board["cycles_source"] == "model: Cortex-M4 TRM, ARM DDI 0439D"
+    assert 0 < counts["least"] <= counts["mean"] <= counts["most_met"] < board["cycles"]["most_met"]
 
     page = (out / "footprint.html").read_text("utf-8")
     assert "<img" not in page
@@ -65,18 +59,15 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
 @pytest.mark.long
 @pytest.mark.usefixtures("_crazyflie")
 def test_over_budget_is_exit_1_with_names_and_excess(tmp_path: Path) -> None:
-    """A board of one's own with little flash: the table says OVER, a line below by how much and where."""
+    """A board of one's own with little flash: the answer says OVER, a line below by how much."""
     text = (Path(boards.__file__).parent / "data" / "boards" / "crazyflie.toml").read_text("utf-8")
     (tmp_path / "own.toml").write_text(text.replace("flash_bytes = 16_384", "flash_bytes = 2_000"))
     said, talk = run("footprint", "--board", "own.toml", code=1)
     assert talk == ""
     lines = said.splitlines()
     assert lines[0].startswith("own: OVER, ")
-    row = next(line for line in lines if line.startswith("own  "))
-    assert row.endswith("OVER")
-    flash = int(row.split()[1])
+    flash = next(int(line.split()[1]) for line in lines if line.startswith("own  "))
     assert f"own: flash {flash} B is over its budget of 2000 B by {flash - 2000} B" in lines
-    assert any(line.startswith("own: largest symbols: nmpc_") for line in lines)
     assert not any("RAM" in line or "stack" in line for line in lines[2:] if "budget" in line)
 
 

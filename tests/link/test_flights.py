@@ -307,14 +307,6 @@ def test_an_error_of_the_program_makes_the_drone_land() -> None:
     assert flight.autopilot.mode == STACKS["ardupilot"].land
 
 
-def test_an_autopilot_that_refuses_to_arm_says_why() -> None:
-    """Over the wire."""
-    flight = Hovering("px4", Condition(refuses="Preflight Fail: compass"))
-    with pytest.raises(PilotError, match="PX4 did not arm within 15 s, and says: Preflight Fail: compass"):
-        flight.fly(1.0)
-    assert not flight.updates
-
-
 def fly_by_an_estimator(vehicle: VehicleFile) -> tuple[float, float]:
     """Fly settings for `vehicle` by an estimator that errs; return rms of command changes and errors."""
     link, updates, away_m = WiredLink("px4", SEEN, Condition(seed=5)), list[Update](), list[float]()
