@@ -303,9 +303,9 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
     assert app.logged("limits") & 4 == 4
 
 
-def test_missing_variances_are_said_once(tmp_path: Path) -> None:
+def test_missing_variances_are_said_once(built: Built) -> None:
     """In the worker's task, when the app starts: a lost position goes unnoticed then."""
-    quiet = build(write_target("crazyflie", SETTINGS, tmp_path)).host()
+    quiet = built.host()
     quiet.host_has_variances = False
     app = Crazyflie(quiet)
     scheduled = app.host.host_scheduled

@@ -58,11 +58,16 @@ def test_quantiles_are_named_by_their_shares() -> None:
     assert list(quantiles(np.arange(3.0))) == ["0", "0.05", "0.25", "0.5", "0.75", "0.95", "1"]
 
 
+def table(**columns: list[float]) -> dict[str, np.ndarray]:
+    """Return a table of controllers a and b with the given columns; by default nothing crashes."""
+    n = len(next(iter(columns.values())))
+    healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
+    return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
+
+
 def compared(ratios: list[float]) -> tuple[float, float]:
     """Return the interval of the median of ratios."""
-    n = len(ratios)
-    table = {"a_iae_m_s": np.array(ratios), "b_iae_m_s": np.ones(n), "a_crashed": np.zeros(n)}
-    found = improvement(table | {"b_crashed": np.zeros(n)}, "a", "b", "iae_m_s")
+    found = improvement(table(a_iae_m_s=ratios, b_iae_m_s=[1.0] * len(ratios)), "a", "b", "iae_m_s")
     assert found is not None
     return float(found.low), float(found.high)
 
@@ -87,10 +92,7 @@ def test_the_interval_of_the_median_of_two_values_follows_from_the_binomial_dist
 
 def test_an_index_of_0_is_infinitely_better() -> None:
     """A ratio to it is no error and no warning."""
-    table = {"a_iae_m_s": np.ones(3), "b_iae_m_s": np.zeros(3)} | {
-        f"{name}_crashed": np.zeros(3) for name in "ab"
-    }
-    found = improvement(table, "a", "b", "iae_m_s")
+    found = improvement(table(a_iae_m_s=[1.0] * 3, b_iae_m_s=[0.0] * 3), "a", "b", "iae_m_s")
     assert found is not None
     assert (found.median, found.better.count) == (math.inf, 3)
 
@@ -131,13 +133,6 @@ def test_all_controllers_are_compared_with_the_first(sensed: bool, spatial: bool
     assert spread["b"].quantiles["iae_m_s"]["1"] == math.inf
     hopeless = table | {f"{name}_crashed": np.ones(4) for name in "ab"}
     assert {one.controller for one in improvements(hopeless, "abc", sensed=sensed)} == {"c"}
-
-
-def table(**columns: list[float]) -> dict[str, np.ndarray]:
-    """Return a table of controllers a and b with the given columns; by default nothing crashes."""
-    n = len(next(iter(columns.values())))
-    healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
-    return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
 
 
 def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
@@ -185,11 +180,10 @@ def test_improvement_is_the_median_of_the_ratios() -> None:
 def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
     """For lognormal ratios the interval contains exp(mu) and has about the asymptotic width."""
     ratios = np.exp(np.random.default_rng(1).normal(math.log(3.0), 0.5, 1000))
-    found = improvement(table(a_iae_m_s=ratios.tolist(), b_iae_m_s=[1.0] * 1000), "a", "b", "iae_m_s")
-    assert found is not None
-    assert found.low < 3.0 < found.high
+    low, high = compared(ratios.tolist())
+    assert low < 3.0 < high
     width = 2.0 * 1.96 * 3.0 * 0.5 * math.sqrt(math.pi / 2.0 / 1000)
-    assert found.high - found.low == pytest.approx(width, rel=0.25)
+    assert high - low == pytest.approx(width, rel=0.25)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
@@ -197,10 +191,7 @@ def test_the_interval_of_the_median_is_that_of_all_resamples(n: int) -> None:
     """Its ends are quantiles of the medians of all n^n resamples, each equally probable."""
     ratios = [float(2**k) for k in range(n)]
     medians = sorted(median(resample) for resample in product(ratios, repeat=n))
-    found = improvement(table(a_iae_m_s=ratios, b_iae_m_s=[1.0] * n), "a", "b", "iae_m_s")
-    assert found is not None
-    ends = [medians[math.ceil(tail * len(medians)) - 1] for tail in (0.025, 0.975)]
-    assert [found.low, found.high] == ends
+    assert list(compared(ratios)) == [medians[math.ceil(tail * len(medians)) - 1] for tail in (0.025, 0.975)]
 
 
 def test_a_crash_is_infinitely_bad() -> None:
