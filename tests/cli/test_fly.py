@@ -2,39 +2,20 @@
 
 import csv
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from mambo_codegen.errors import INTERRUPTED
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.loop import fly
 from mambo_sil.flight.names import PD_NAMES, PdName
 from mambo_sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
-from tests.support.command import HEARS_CTRL_C, MAIN, command, run, unwrapped
+from tests.support.command import MAIN, command, run, unwrapped
 from tests.support.one_norm import ONE_NORM
 
 PLAIN = ("--json", "--no-pictures")
-
-
-def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
-    """A signal in the middle of the imports: no traceback."""
-    (tmp_path / "typer.py").write_text(f"{HEARS_CTRL_C}import os\nos.kill(os.getpid(), signal.SIGINT)\n")
-    search = os.pathsep.join([str(tmp_path), *sys.path])
-    done = subprocess.run(
-        [sys.executable, "-m", "mambo_nmpc", "presets"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": search},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "")
 
 
 def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:

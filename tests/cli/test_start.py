@@ -1,9 +1,15 @@
-"""Help and completion: what they say, and that they need not wait for what only commands need."""
+"""The command before its work: help, completion, what it imports, and signals while it starts."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
+from mambo_codegen.errors import INTERRUPTED
 from mambo_sil.cli.app import PANELS
-from tests.support.command import MAIN, command, run
+from tests.support.command import HEARS_CTRL_C, MAIN, command, run
 
 HEAVY = {"capstone", "cffi", "elftools", "jinja2", "matplotlib", "numpy", "optuna", "scipy", "unicorn"}
 SETTINGS = "mambo_codegen.settings.model"
@@ -86,3 +92,63 @@ def test_the_shell_completes_commands_presets_and_boards(
         monkeypatch.setenv(name, value)
     done = command(script=f"import sys; sys.argv[0] = 'mambo-nmpc'; {MAIN}")
     assert done.stdout.split() == expected, done.stderr
+
+
+TERMINATE = "os.kill(os.getpid(), signal.SIGTERM)"
+DURING_IMPORT = f"""
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "mambo_sil.cli.settings":
+            {TERMINATE}
+sys.meta_path.insert(0, Finder())
+"""
+DURING_PARSING = f"""
+from mambo_sil.cli import command
+make_context = command.RootGroup.make_context
+def make(*arguments, **options):
+    {TERMINATE}
+    return make_context(*arguments, **options)
+command.RootGroup.make_context = make
+"""
+DURING_COMMAND = f"""
+from mambo_sil.cli import command
+echo = command.typer.echo
+def stop(*arguments, **options):
+    {TERMINATE}
+    echo(*arguments, **options)
+command.typer.echo = stop
+"""
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("when", [DURING_IMPORT, DURING_PARSING, DURING_COMMAND])
+def test_a_terminated_command_exits_with_143(when: str) -> None:
+    """While modules are imported, while the command line is parsed, and while the command runs."""
+    script = f"import os, signal, sys\n{when}\nfrom mambo_nmpc.__main__ import main\nmain()"
+    done = command("presets", script=script)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", "")
+
+
+def test_a_command_started_with_ctrl_c_ignored_goes_on() -> None:
+    """As in the background of a script, where the shell ignores it: the command leaves that as it is."""
+    interrupted = DURING_COMMAND.replace("SIGTERM", "SIGINT")
+    ignored = "import os, signal, sys\nsignal.signal(signal.SIGINT, signal.SIG_IGN)"
+    script = f"{ignored}\n{interrupted}\nfrom mambo_nmpc.__main__ import main\nmain()"
+    done = command("presets", script=script)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "mambo-1norm" in done.stdout
+
+
+def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
+    """A signal in the middle of the imports: no traceback."""
+    (tmp_path / "typer.py").write_text(f"{HEARS_CTRL_C}import os\nos.kill(os.getpid(), signal.SIGINT)\n")
+    search = os.pathsep.join([str(tmp_path), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-m", "mambo_nmpc", "presets"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": search},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "")
