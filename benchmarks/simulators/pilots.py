@@ -7,8 +7,8 @@ import numpy as np
 
 from mambo_codegen.settings import controller_toml, presets
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.height_hold import HeightHold
 from mambo_sil.api.options import with_options
+from mambo_sil.api.set_points import HeightHold
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile

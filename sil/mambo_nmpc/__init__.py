@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from mambo_sil.api.flights import Flown, fly
     from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.api.options import ControllerOptions
-    from mambo_sil.api.outcome import StepOutcome
-    from mambo_sil.api.states import DroneState, TargetState
+    from mambo_sil.api.states import DroneState, StepOutcome, TargetState
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
     from mambo_sil.link.pilot import Pilot
@@ -46,7 +45,7 @@ _HOMES: Final = {
     "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
     "Pilot": "mambo_sil.link.pilot",
-    "StepOutcome": "mambo_sil.api.outcome",
+    "StepOutcome": "mambo_sil.api.states",
     "TargetState": "mambo_sil.api.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
     "attitude_of_quaternion": "mambo_sil.api.frames",

@@ -19,7 +19,7 @@ from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import CurvePoint, Trajectory, curve, sample
-from mambo_sil.api import heading
+from mambo_sil.api import set_points
 from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
@@ -271,7 +271,7 @@ def test_a_saved_controller_goes_on_as_the_first(name: str) -> None:
 def test_the_heading_turns_by_the_shorter_way_at_a_bounded_rate(made: Callable[[], Controller]) -> None:
     """From the measured one, across the south, by `nmpc_slew_heading`; without a target it stays."""
     pilot = made()
-    state, most_rad = aloft(yaw_rad=3.0), heading.HEADING_RATE_RAD_S * pilot.update_period_s
+    state, most_rad = aloft(yaw_rad=3.0), set_points.HEADING_RATE_RAD_S * pilot.update_period_s
     expected = np.array([3.0])
     for _ in range(20):
         expected = slew_heading(method_of(pilot.settings), expected, [-3.0], [most_rad])

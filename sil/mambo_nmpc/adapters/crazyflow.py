@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.adapters.contact import touches_floor
+from mambo_nmpc.adapters import touches_floor
 from mambo_nmpc.curves import Trajectory, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion, yaw_to_ned

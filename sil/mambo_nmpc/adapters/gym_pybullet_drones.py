@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mambo_nmpc.adapters import packages
-from mambo_nmpc.adapters.contact import touches_floor
+from mambo_nmpc.adapters import demand_period, load, touches_floor
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.api.states import DroneState, TargetState
@@ -27,7 +26,7 @@ def pybullet_control(drone_model: Any, controller: Controller) -> Any:
     """
     if controller.n != 1:
         raise ArgumentError(f"controller: was made for {controller.n} drones; a BaseControl flies one")
-    base = packages.load("gym_pybullet_drones.control.DSLPIDControl", INSTALL).DSLPIDControl
+    base = load("gym_pybullet_drones.control.DSLPIDControl", INSTALL).DSLPIDControl
 
     class NmpcControl(base):  # type: ignore[misc, valid-type] # a class of an untyped package
         """A position controller with the interface `BaseControl`."""
@@ -48,10 +47,7 @@ def pybullet_control(drone_model: Any, controller: Controller) -> Any:
             target_vel: NDArray[np.float64],
         ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
             """Return thrust (PWM), attitude (intrinsic X-Y-Z, rad) and position error (m)."""
-            if abs(control_timestep - controller.update_period_s) > 1e-6:
-                rule = f"be {controller.update_period_s:g}, the update period of the controller"
-                fix = f"make it with update_period_s={control_timestep!r}"
-                raise ArgumentError(f"control_timestep = {control_timestep!r} must {rule}: {fix}")
+            demand_period("control_timestep", control_timestep, controller)
             length_m, offset_m = map(self._getURDFParameter, ("length", "collision_z_offset"))
             contact = touches_floor(cur_pos, cur_vel, length_m / 2.0 - offset_m)
             state = DroneState.in_frame("NWU", cur_pos, cur_vel, attitude_of_quaternion(cur_quat), contact)

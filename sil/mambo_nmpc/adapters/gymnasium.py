@@ -4,7 +4,7 @@ from typing import Any, Final, Literal, Unpack
 
 import numpy as np
 
-from mambo_nmpc.adapters import packages
+from mambo_nmpc.adapters import load
 from mambo_nmpc.curves import CurvePoint, curve, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import command_in_frame, vectors_to_ned
@@ -16,7 +16,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.names import CurveName
 
-gymnasium: Any = packages.load("gymnasium", "pip install gymnasium")
+gymnasium: Any = load("gymnasium", "pip install gymnasium")
 Environment: Any = gymnasium.Env
 
 HEIGHT_M: Final = 1.0

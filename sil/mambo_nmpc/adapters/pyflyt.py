@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from mambo_nmpc.adapters import demand_period
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import wrapped
 from mambo_sil.api.states import DroneState, TargetState
@@ -33,10 +34,7 @@ def pyflyt_controller(drone: Any, controller: Controller, *, rate_gain_1_s: floa
     require_number("rate_gain_1_s", rate_gain_1_s, 0.1, 100.0)
     if controller.n != 1:
         raise ArgumentError(f"controller: was made for {controller.n} drones; a ControlClass flies one")
-    if abs(drone.control_period - controller.update_period_s) > 1e-6:
-        rule = f"be {controller.update_period_s:g}, the update period of the controller"
-        fix = f"make it with update_period_s={drone.control_period!r}"
-        raise ArgumentError(f"control_period = {drone.control_period!r} must {rule}: {fix}")
+    demand_period("control_period", drone.control_period, controller)
     mass_kg = float(drone.p.getDynamicsInfo(drone.Id, -1)[0])
     motors = drone.motors
     most_n = float(np.sum(np.ravel(motors.thrust_coef) * np.ravel(motors.max_rpm) ** 2))

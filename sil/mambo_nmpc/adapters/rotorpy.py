@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mambo_nmpc.adapters.contact import touches_floor
+from mambo_nmpc.adapters import touches_floor
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.api.states import DroneState, TargetState

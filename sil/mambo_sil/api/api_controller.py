@@ -14,11 +14,9 @@ from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
-from mambo_sil.api.heading import Heading
-from mambo_sil.api.height_hold import HeightHold
 from mambo_sil.api.options import ControllerOptions, with_options
-from mambo_sil.api.outcome import StepOutcome
-from mambo_sil.api.states import DroneState, TargetState
+from mambo_sil.api.set_points import Heading, HeightHold
+from mambo_sil.api.states import DroneState, StepOutcome, TargetState
 from mambo_sil.arguments import (
     as_numbers,
     is_whole,
@@ -242,7 +240,7 @@ class Controller:
         """
         if not self._method.has_height:
             raise ArgumentError("set_thrust needs settings with [height]")
-        return self._compiled.set_thrust(self._thrusts(thrust_m_s2))
+        return self._compiled.set_thrust(self._one_each("thrust_m_s2", thrust_m_s2))
 
     def shift(
         self,
@@ -262,12 +260,7 @@ class Controller:
         velocity = np.zeros_like(position)
         if velocity_change_m_s is not None:
             velocity = self._changes("velocity_change_m_s", velocity_change_m_s)
-        heading = as_numbers("heading_change_rad", heading_change_rad)
-        if heading.ndim and heading.size != self.n:
-            raise ArgumentError(
-                f"heading_change_rad: has shape {heading.shape}; it must be () or {(self.n,)}"
-            )
-        heading = np.broadcast_to(heading.reshape(-1), self.n)
+        heading = self._one_each("heading_change_rad", heading_change_rad)
         status = self._compiled.shift(np.column_stack([position, velocity, heading]))
         self._heading.shift(np.where(status == 0, heading, 0.0))
         return status
@@ -374,7 +367,7 @@ class Controller:
             left_out, rule = thrust_m_s2 is None, "be left out: the settings have no [height]"
             require(left_out, "thrust_m_s2", thrust_m_s2, rule)
             return angles
-        return np.column_stack([angles, self._thrusts(thrust_m_s2)])
+        return np.column_stack([angles, self._one_each("thrust_m_s2", thrust_m_s2)])
 
     def _changes(self, name: str, values: ArrayLike) -> FloatArray:
         """Return changes (n, 2) of vectors, with `[height]` (n, 3), up; raises ArgumentError."""
@@ -390,11 +383,11 @@ class Controller:
             raise ArgumentError(f"{name}: has no z; the height wants x, y, z (..., 3)")
         return vectors * (1.0, 1.0, -1.0)
 
-    def _thrusts(self, thrust_m_s2: ArrayLike | None) -> FloatArray:
-        """Return thrusts (n,) of one value, or of a batch; raises ArgumentError."""
-        array = as_numbers("thrust_m_s2", thrust_m_s2)
+    def _one_each(self, name: str, values: ArrayLike | None) -> FloatArray:
+        """Return numbers (n,) of one for all drones, or of a batch; raises ArgumentError."""
+        array = as_numbers(name, values)
         if array.ndim and array.size != self.n:
-            raise ArgumentError(f"thrust_m_s2: has shape {array.shape}; it must be () or {(self.n,)}")
+            raise ArgumentError(f"{name}: has shape {array.shape}; it must be () or {(self.n,)}")
         return np.broadcast_to(array.reshape(-1), self.n)
 
     def _chosen(self, which: ArrayLike | None) -> NDArray[np.bool_]:

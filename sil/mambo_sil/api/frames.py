@@ -41,7 +41,7 @@ def vectors_to_ned(frame: FrameName, vectors: ArrayLike, name: str = "vectors") 
     Raises ArgumentError for another frame, and for other shapes; it calls the vectors `name`.
     """
     require_choice("frame", frame, FRAMES)
-    array = _with_columns(name, vectors, 2, 3)
+    array = with_columns(name, vectors, 2, 3)
     if frame == "NED":
         return array
     columns = array.shape[-1]
@@ -51,7 +51,7 @@ def vectors_to_ned(frame: FrameName, vectors: ArrayLike, name: str = "vectors") 
 def attitude_to_ned(frame: FrameName, attitude_rad: ArrayLike) -> FloatArray:
     """Return roll, pitch, yaw (..., 3) in NED of those in another frame; raises ArgumentError."""
     require_choice("frame", frame, FRAMES)
-    array = _with_columns("attitude_rad", attitude_rad, 3)
+    array = with_columns("attitude_rad", attitude_rad, 3)
     if frame == "NED":
         return array
     converted = array.copy()
@@ -79,7 +79,7 @@ def command_in_frame(frame: FrameName, command_rad: ArrayLike) -> FloatArray:
     Raises ArgumentError for a frame other than NED, ENU and NWU, and for other shapes.
     """
     require_choice("frame", frame, FRAMES)
-    array = _with_columns("command_rad", command_rad, 2)
+    array = with_columns("command_rad", command_rad, 2)
     return array if frame == "NED" else np.asarray(array * [1.0, -1.0])
 
 
@@ -93,7 +93,7 @@ def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
 
     NaN gives NaN. Raises ArgumentError for a length other than 1, and for other shapes.
     """
-    x, y, z, w = np.moveaxis(_with_columns("quaternion", quaternion, 4), -1, 0)
+    x, y, z, w = np.moveaxis(with_columns("quaternion", quaternion, 4), -1, 0)
     with np.errstate(over="ignore"):
         length = np.sqrt(x * x + y * y + z * z + w * w)
     off = np.abs(length - 1.0) > LENGTH_TOLERANCE
@@ -104,7 +104,7 @@ def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
-def _with_columns(name: str, values: ArrayLike, *counts: int) -> FloatArray:
+def with_columns(name: str, values: ArrayLike, *counts: int) -> FloatArray:
     """Return an array; raises ArgumentError unless the length of its last axis is one of `counts`."""
     array = as_numbers(name, values)
     if array.ndim == 0 or array.shape[-1] not in counts:

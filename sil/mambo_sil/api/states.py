@@ -1,14 +1,21 @@
-"""What a controller receives: the states of n drones and of their targets, in NED."""
+"""What n controllers receive, the states of drones and of their targets in NED, and what a step returns."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.numbers.representation import PREVIEW_TIMES
-from mambo_sil.api.frames import FrameName, attitude_to_ned, vectors_to_ned, yaw_to_ned
-from mambo_sil.arguments import as_numbers, require
+from mambo_sil.api.frames import (
+    FrameName,
+    attitude_to_ned,
+    command_in_frame,
+    vectors_to_ned,
+    with_columns,
+    yaw_to_ned,
+)
+from mambo_sil.arguments import of_shape, require, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError
 
@@ -40,9 +47,7 @@ class DroneState:
         batch = position.shape[:-1]
         object.__setattr__(self, "position_m", position)
         object.__setattr__(self, "velocity_m_s", _vectors("velocity_m_s", velocity_m_s, batch))
-        attitude = as_numbers("attitude_rad", attitude_rad)
-        _require_shape("attitude_rad", attitude, (*batch, 3))
-        object.__setattr__(self, "attitude_rad", attitude)
+        object.__setattr__(self, "attitude_rad", of_shape("attitude_rad", attitude_rad, (*batch, 3)))
         contact = np.asarray(grounded)
         good = contact.dtype == np.bool_ and contact.shape in ((), batch)
         require(good, "grounded", grounded, f"be a truth value, or such of shape {batch}")
@@ -112,14 +117,11 @@ class TargetState:
         batch = position.shape[:-1]
         acceleration, yaw, preview = acceleration_m_s2, yaw_rad, preview_m_s2
         if preview is not None:
-            preview = as_numbers("preview_m_s2", preview)
-            _require_shape("preview_m_s2", preview, (*batch, PREVIEW_TIMES, 3))
+            preview = of_shape("preview_m_s2", preview, (*batch, PREVIEW_TIMES, 3))
         if acceleration is not None:
             acceleration = _vectors("acceleration_m_s2", acceleration, batch)
         if yaw is not None:
-            yaw = as_numbers("yaw_rad", yaw)
-            _require_shape("yaw_rad", yaw, (), batch)
-            yaw = np.broadcast_to(yaw, batch)
+            yaw = np.broadcast_to(of_shape("yaw_rad", yaw, (), batch), batch)
         object.__setattr__(self, "position_m", position)
         object.__setattr__(self, "velocity_m_s", _vectors("velocity_m_s", velocity_m_s, batch))
         object.__setattr__(self, "acceleration_m_s2", acceleration)
@@ -153,16 +155,60 @@ class TargetState:
         return self.position_m.shape[:-1]
 
 
+@dataclass(frozen=True, eq=False)
+class StepOutcome:
+    """The commands of one step, in batches of the shape of the states.
+
+    command_rad: (..., 2) roll and pitch, never beyond the tilt limit.
+    status:      (...) 0, or why an input was refused, such as NaN or a position out of range
+                 (`mambo_codegen.methods.shared.inputs.Status`).
+    saturated:   (...) whether a command lies at the tilt limit; None with a 1-norm.
+    cost:        (...) of the plan; None with a quadratic cost, as the next.
+    plan_rad:    (..., control, 2) the moves.
+    active:      (...) the limits that act (`mambo_codegen.methods.shared.limits.ActiveLimit`), if any.
+    thrust_m_s2: (...) thrust over mass; None without `[height]` in the settings and `height`, as the next.
+    yaw_rad:     (...) heading.
+    """
+
+    command_rad: NDArray[Any]
+    status: NDArray[np.int64]
+    saturated: NDArray[np.bool_] | None = None
+    cost: NDArray[Any] | None = None
+    plan_rad: NDArray[Any] | None = None
+    active: NDArray[np.int64] | None = None
+    thrust_m_s2: NDArray[Any] | None = None
+    yaw_rad: FloatArray | None = None
+
+    def attitude_thrust(
+        self, frame: FrameName, *, mass_kg: float | None = None, most_thrust_m_s2: float | None = None
+    ) -> FloatArray:
+        """Return roll, pitch, yaw and thrust (..., 4), angles in a frame by name.
+
+        The thrust is over the mass, in m/s^2; with `mass_kg` in N; with `most_thrust_m_s2`, the largest
+        thrust over the mass, a share of it, at most 1. Raises ArgumentError without a thrust.
+        """
+        if self.thrust_m_s2 is None or self.yaw_rad is None:
+            raise ArgumentError(
+                'attitude_thrust needs settings with [height], or a controller made with height = "pid", say'
+            )
+        if mass_kg is not None and most_thrust_m_s2 is not None:
+            raise ArgumentError(f"mass_kg = {mass_kg!r} must be left out with most_thrust_m_s2, or that")
+        thrust = np.asarray(self.thrust_m_s2, np.float64)
+        if mass_kg is not None:
+            require_number("mass_kg", mass_kg, 0.001, 1000.0)
+            thrust = thrust * mass_kg
+        if most_thrust_m_s2 is not None:
+            require_number("most_thrust_m_s2", most_thrust_m_s2, 1.0, 1000.0)
+            thrust = np.minimum(thrust / most_thrust_m_s2, 1.0)
+        command = np.empty((*thrust.shape, 4))
+        command[..., :2] = command_in_frame(frame, self.command_rad)
+        command[..., 2] = yaw_to_ned(frame, self.yaw_rad)
+        command[..., 3] = thrust
+        return command
+
+
 def _vectors(name: str, values: ArrayLike, batch: tuple[int, ...] | None = None) -> FloatArray:
     """Return vectors (*batch, 2) or (*batch, 3), without a batch of any; raises ArgumentError for others."""
-    array = as_numbers(name, values)
-    if batch is not None:
-        _require_shape(name, array, (*batch, 2), (*batch, 3))
-    elif array.ndim == 0 or array.shape[-1] not in (2, 3):
-        raise ArgumentError(f"{name}: has shape {array.shape}; it must be (..., 2) or (..., 3)")
-    return array
-
-
-def _require_shape(name: str, array: FloatArray, *shapes: tuple[int, ...]) -> None:
-    if array.shape not in shapes:
-        raise ArgumentError(f"{name}: has shape {array.shape}; it must be {' or '.join(map(str, shapes))}")
+    if batch is None:
+        return with_columns(name, values, 2, 3)
+    return of_shape(name, values, (*batch, 2), (*batch, 3))
