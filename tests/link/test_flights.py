@@ -14,9 +14,9 @@ from mambo_sil.api.states import TargetState
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
 from mambo_sil.flight.trajectories import Circle, Gerono
-from mambo_sil.link.flight_log import write_log
 from mambo_sil.link.life_cycle import Phase
 from mambo_sil.link.pilot import Pilot
+from mambo_sil.link.pilot_report import write_log
 from mambo_sil.link.records import PX4, STACKS, Arm, SetAttitude, SetMode, px4_mode
 from mambo_sil.link.simulated import STARTS_M, Condition
 from mambo_sil.link.steering import Update

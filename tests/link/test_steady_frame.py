@@ -6,12 +6,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from mambo_sil.api.frames import turned_tilt
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.link.records import EstimatedState
 from mambo_sil.link.steady_frame import LONGEST_S, SteadyFrame
-from mambo_sil.link.tilt import turned_tilt
 
 FASTEST_RAD_S = 2.5
 """Rate of a circle of 2 m: 5 m/s, and 1.3 g."""

@@ -88,6 +88,19 @@ def wrapped(angle_rad: ArrayLike) -> FloatArray:
     return np.asarray(np.remainder(np.asarray(angle_rad) + math.pi, 2.0 * math.pi) - math.pi)
 
 
+def turned_tilt(roll_rad: float, pitch_rad: float, turn_rad: float) -> tuple[float, float]:
+    """Return roll and pitch, Z-Y-X, at a heading that is `turn_rad` further: the thrust points as before.
+
+    An autopilot turns its thrust to where a quaternion points in the world, and the heading after that,
+    slower: roll and pitch of a set-point are those of its own heading, not of the drone's.
+    """
+    sine, cosine = math.sin(turn_rad), math.cos(turn_rad)
+    ahead, right = math.cos(roll_rad) * math.sin(pitch_rad), -math.sin(roll_rad)
+    down = math.cos(roll_rad) * math.cos(pitch_rad)
+    ahead, right = cosine * ahead + sine * right, cosine * right - sine * ahead
+    return math.asin(min(max(-right, -1.0), 1.0)), math.atan2(ahead, down)
+
+
 def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
     """Return roll, pitch, yaw (..., 3) of unit quaternions [x, y, z, w] (..., 4), in their own frame.
 

@@ -1,35 +1,13 @@
-"""The two ends that a pilot can have: a real autopilot, in real time, or a simulated one, in its own time."""
+"""The links of a pilot: to a real autopilot, in real time, and to a simulated one, in its own time."""
 
 import time
-from typing import Any, Protocol
+from typing import Any
 
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.link.messages import RecordReader
 from mambo_sil.link.records import Record, Stack
 from mambo_sil.link.simulated import Condition, SimulatedAutopilot
 from mambo_sil.link.sockets import Address, MavlinkSocket
-
-
-class AutopilotLink(Protocol):
-    """What the pilot's loop needs of a link."""
-
-    @property
-    def mav(self) -> Any:
-        """Pymavlink's MAVLink object, which sends."""
-        ...
-
-    def now_s(self) -> float:
-        """Return the time of the pilot's clock."""
-        ...
-
-    def receive(self) -> list[Record]:
-        """Return what has come; wait a moment for it."""
-        ...
-
-    def close(self) -> None:
-        """Close its sockets."""
-        ...
-
 
 WAIT_S = 0.005
 """How long a loop waits for a message."""

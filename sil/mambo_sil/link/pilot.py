@@ -22,7 +22,7 @@ from mambo_sil.errors import ArgumentError, PilotError
 from mambo_sil.flight.trajectories import Trajectory
 from mambo_sil.link.courses import Along, Place, TargetCourse, TargetProgram
 from mambo_sil.link.life_cycle import LifeCycle, Phase
-from mambo_sil.link.links import AutopilotLink, SimulatedLink, UdpLink
+from mambo_sil.link.links import SimulatedLink, UdpLink
 from mambo_sil.link.messages import send_order
 from mambo_sil.link.records import PX4, STACKS, EstimatedState, SetMode
 from mambo_sil.link.sockets import parse_link
@@ -49,7 +49,7 @@ class Pilot:
     def __init__(
         self,
         controller: Controller,
-        open_link: Callable[[], AutopilotLink],
+        open_link: Callable[[], UdpLink],
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
         watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
     ) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_sil.api.frames import wrapped
+from mambo_sil.api.frames import turned_tilt, wrapped
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.ground import carry_on_ground
@@ -45,7 +45,6 @@ from mambo_sil.link.records import (
     Text,
 )
 from mambo_sil.link.sockets import Address, MavlinkSocket
-from mambo_sil.link.tilt import turned_tilt
 
 STARTS_M: Final = (0.7, -0.4, 0.0)
 """Where the drone stands; its estimator has another origin, as that of a real one."""
@@ -91,7 +90,8 @@ class SimulatedAutopilot:
         """What was ordered since the start, without heartbeats."""
         self.drift_m_s: FloatArray = np.zeros(3)
         """Error of the estimated velocity, with which the estimated position drifts away."""
-        self._error_m: FloatArray = np.zeros(3)
+        self.error_m: FloatArray = np.zeros(3)
+        """Error of the estimated position."""
         self._error_rad, self._resets = 0.0, 0
         self.silent = False
         """Whether it sends nothing."""
@@ -128,14 +128,9 @@ class SimulatedAutopilot:
 
     def reset_estimator(self, by_m: FloatArray, by_rad: float = 0.0) -> None:
         """Move the estimate by a jump; the velocity is right from now on."""
-        self._error_m, self._error_rad = self._error_m + by_m, self._error_rad + by_rad
+        self.error_m, self._error_rad = self.error_m + by_m, self._error_rad + by_rad
         self.drift_m_s = np.zeros(3)
         self._resets += 1
-
-    @property
-    def error_m(self) -> FloatArray:
-        """Error of the estimated position (3,)."""
-        return self._error_m
 
     def tick(self) -> None:
         """Obey what has come, move on by a tick, and send what is due."""
@@ -146,7 +141,7 @@ class SimulatedAutopilot:
                 self._obey(order)
         seen = self.true if self._suite is None else self._suite.estimate(self.true)
         estimate = self._estimate(seen)
-        self._error_m = self._error_m + self.drone.step_s * self.drift_m_s
+        self.error_m = self.error_m + self.drone.step_s * self.drift_m_s
         self._fall_back()
         with np.errstate(all="ignore"):
             self._advance(seen, estimate)
@@ -158,19 +153,13 @@ class SimulatedAutopilot:
         """Return the estimate, with the jumps of its frame; its origin is where the drone starts."""
         attitude_rad = seen.euler_rad[:, 0] + np.array([0.0, 0.0, self._error_rad])
         attitude_rad[2] = float(wrapped(attitude_rad[2]))
-        position_m = seen.position_m[:, 0] - np.array(STARTS_M) + self._error_m
+        position_m = seen.position_m[:, 0] - np.array(STARTS_M) + self.error_m
         velocity_m_s = seen.velocity_m_s[:, 0] + self.drift_m_s
         if self._errors is not None:
             self._errors.advance()
             position_m = position_m + self._errors.position_m
             velocity_m_s = velocity_m_s + self._errors.velocity_m_s
-        return EstimatedState(
-            self.time_s,
-            position_m,
-            velocity_m_s,
-            attitude_rad,
-            self._resets,
-        )
+        return EstimatedState(self.time_s, position_m, velocity_m_s, attitude_rad, self._resets)
 
     def _obey(self, order: Order) -> None:
         match order:
@@ -246,18 +235,14 @@ class SimulatedAutopilot:
 
     def _hold(self, estimate: EstimatedState) -> tuple[FloatArray, float]:
         """Return roll, pitch (2,) and thrust in N towards its own aim: its own controller, a PD."""
-        if self.mode == self.stack.land:
-            descent_m_s = DESCENT_M_S
-        else:
-            if self.mode == self.stack.guided and isinstance(self._set_point, SetPosition):
-                self._aim_m = self._set_point.position_m + np.array(STARTS_M) - self._error_m
-            descent_m_s = math.nan
-        place_m = estimate.position_m + np.array(STARTS_M) - self._error_m
+        if self.mode == self.stack.guided and isinstance(self._set_point, SetPosition):
+            self._aim_m = self._set_point.position_m + np.array(STARTS_M) - self.error_m
+        place_m = estimate.position_m + np.array(STARTS_M) - self.error_m
         velocity_m_s = estimate.velocity_m_s - self.drift_m_s
         wanted_m_s = np.clip(POSITION_1_S * (self._aim_m - place_m), -SPEED_M_S, SPEED_M_S)
         wanted_m_s[2] = np.clip(wanted_m_s[2], -CLIMB_M_S, DESCENT_M_S)
-        if math.isfinite(descent_m_s):
-            wanted_m_s[2] = descent_m_s
+        if self.mode == self.stack.land:
+            wanted_m_s[2] = DESCENT_M_S
         north, east, down = (VELOCITY_1_S * (wanted_m_s - velocity_m_s)).tolist()
         yaw_rad = float(estimate.attitude_rad[2]) - self._error_rad
         ahead = north * math.cos(yaw_rad) + east * math.sin(yaw_rad)

@@ -9,12 +9,11 @@ import numpy as np
 
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import wrapped
+from mambo_sil.api.frames import turned_tilt, wrapped
 from mambo_sil.api.states import DroneState, StepOutcome, TargetState
 from mambo_sil.errors import LinkError
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
-from mambo_sil.link.tilt import turned_tilt
 
 PAUSE_S: Final = 0.1
 """Time without an estimate after which the controller begins anew, at the present attitude."""
@@ -125,13 +124,13 @@ class Steering:
         return self.controller.step(state, target)
 
     def _goal(self, target: TargetState) -> TargetState:
-        """Return the target that the controller gets for one of the course."""
-        return self._turned(self.frame.moved(target))
+        """Return the target that the controller gets for one of the course.
 
-    def _turned(self, target: TargetState) -> TargetState:
-        """Return a target with the heading at which the controller began, if it has none."""
-        yaw_rad = self._heading_rad if target.yaw_rad is None else target.yaw_rad
-        return TargetState(target.position_m, target.velocity_m_s, target.acceleration_m_s2, yaw_rad)
+        It has the heading at which the controller began, if the course says none.
+        """
+        moved = self.frame.moved(target)
+        yaw_rad = self._heading_rad if moved.yaw_rad is None else moved.yaw_rad
+        return TargetState(moved.position_m, moved.velocity_m_s, moved.acceleration_m_s2, yaw_rad)
 
     def _send(
         self, estimate: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float

@@ -11,7 +11,7 @@ from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, 
 
 if TYPE_CHECKING:
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.link.links import AutopilotLink
+    from mambo_sil.link.links import UdpLink
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.steering import Update
 
@@ -50,9 +50,8 @@ def pilot(
     from mambo_sil.cli.fly.one_flight import curve_of
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.errors import PilotError
-    from mambo_sil.link.flight_log import write_log
     from mambo_sil.link.pilot import Pilot
-    from mambo_sil.link.pilot_report import LOG, PilotSummary
+    from mambo_sil.link.pilot_report import LOG, PilotSummary, write_log
     from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
@@ -90,7 +89,7 @@ def pilot(
 
 def _opener(
     source: str, link: str | None, simulate: str | None, vehicle: str | None
-) -> "Callable[[], AutopilotLink]":
+) -> "Callable[[], UdpLink]":
     """Return what opens the link that the options describe; raises LinkError, BadParameter."""
     from mambo_sil.link.links import SimulatedLink, UdpLink
     from mambo_sil.link.records import STACKS
