@@ -6,7 +6,7 @@ bundle decodes. A tape is a sequence of calls of one controller, which is initia
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.methods.shared.inputs import Status, choose
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.step_rows import StepRows
+from mambo_sil.verify.step_inputs import StepRows
 
 Tape = NDArray[Any]
 """A sequence of calls, an array of `call_type`."""
@@ -52,42 +52,42 @@ class ApiFunction(IntEnum):
     SHIFT = 8
 
 
-_POINTERS: Final = {
-    ApiFunction.STEP: NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND,
-    ApiFunction.RESET: NULL_SELF | NULL_FIRST,
-    ApiFunction.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
-    ApiFunction.INIT: NULL_SELF,
-    ApiFunction.SET_LIMITS: NULL_SELF | NULL_FIRST,
-    ApiFunction.SET_THRUST: NULL_SELF,
-    ApiFunction.SLEW_HEADING: 0,
-    ApiFunction.SET_MEASURED: NULL_SELF,
-    ApiFunction.SHIFT: NULL_SELF | NULL_FIRST | NULL_SECOND,
-}
+class ApiCall(NamedTuple):
+    """How calls of a function are written.
+
+    quantities: of the numbers that it reads.
+    pointers:   mask of its pointer arguments.
+    written_as: function in bits 0 and 1 of a call's byte; two bits are too few, so bits 6 and 7 tell others.
+    """
+
+    quantities: tuple[str, ...]
+    pointers: int
+    written_as: int
+
 
 _OTHER_BIT, _LAST_BIT = 64, 128
-_WRITTEN_AS: Final = {
-    ApiFunction.SHIFT: ApiFunction.STEP | _LAST_BIT,
-    ApiFunction.SET_LIMITS: ApiFunction.SET_WEIGHTS | _OTHER_BIT,
-    ApiFunction.SET_THRUST: ApiFunction.INIT | _OTHER_BIT,
-    ApiFunction.SLEW_HEADING: ApiFunction.RESET | _OTHER_BIT,
-    ApiFunction.SET_MEASURED: ApiFunction.STEP | _OTHER_BIT,
-}
-"""How functions are written for which two bits are too few; of two that are written at once, the later."""
 
 
-def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
-    """Return the quantities of the numbers that each function reads."""
-    return {
-        ApiFunction.STEP: StepRows(method).quantities,
-        ApiFunction.RESET: method.command,
-        ApiFunction.SET_WEIGHTS: method.setter_quantities,
-        ApiFunction.INIT: method.command,
-        ApiFunction.SET_LIMITS: method.limiting.quantities if method.limiting else (),
-        ApiFunction.SET_THRUST: THRUST,
-        ApiFunction.SLEW_HEADING: ("yaw",) * 3,
-        ApiFunction.SET_MEASURED: ("position",),
-        ApiFunction.SHIFT: method.shift,
+def api_of(method: Method) -> dict[ApiFunction, ApiCall]:
+    """Return the functions of a controller's C; of two that are written at once, the later counts."""
+    every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
+    step, reset, setter, init = ApiFunction.STEP, ApiFunction.RESET, ApiFunction.SET_WEIGHTS, ApiFunction.INIT
+    functions = {
+        step: ApiCall(StepRows(method).quantities, every, step),
+        reset: ApiCall(method.command, NULL_SELF | NULL_FIRST, reset),
+        setter: ApiCall(method.setter_quantities, NULL_SELF | NULL_FIRST, setter),
+        init: ApiCall(method.command, NULL_SELF, init),
+        ApiFunction.SHIFT: ApiCall(method.shift, NULL_SELF | NULL_FIRST | NULL_SECOND, step | _LAST_BIT),
     }
+    if method.limiting is not None:
+        limits = ApiCall(method.limiting.quantities, NULL_SELF | NULL_FIRST, setter | _OTHER_BIT)
+        functions[ApiFunction.SET_LIMITS] = limits
+    if method.has_height:
+        functions[ApiFunction.SET_THRUST] = ApiCall(THRUST, NULL_SELF, init | _OTHER_BIT)
+    functions[ApiFunction.SLEW_HEADING] = ApiCall(("yaw",) * 3, 0, reset | _OTHER_BIT)
+    if method.guard is not None:
+        functions[ApiFunction.SET_MEASURED] = ApiCall(("position",), NULL_SELF, step | _OTHER_BIT)
+    return functions
 
 
 def call_type(settings: Settings) -> np.dtype[Any]:
@@ -114,10 +114,11 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
 
 def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
     """Return a call of `function` for each row of values (n, k); `nulls` is the mask of null pointers."""
-    made = np.zeros(len(values), call_type(settings))
-    made["call"] = _WRITTEN_AS.get(function, function) | (nulls << 2)
     method = method_of(settings)
-    quantities = _quantities(method)[function][: values.shape[1]]
+    called = api_of(method)[function]
+    made = np.zeros(len(values), call_type(settings))
+    made["call"] = called.written_as | (nulls << 2)
+    quantities = called.quantities[: values.shape[1]]
     made["values"][:, : values.shape[1]] = method.numbers.quantize(values, quantities)
     return made
 
@@ -149,67 +150,49 @@ class _Runs:
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
         self._method = method_of(settings)
-        self._quantities, self._rows = _quantities(self._method), StepRows(self._method)
+        self._api, self._rows = api_of(self._method), StepRows(self._method)
         self._controller: Any = self._method.reference_controller(n)
         self._fresh = self._controller.memory
-        self._others = {
-            function: written
-            for function, written in _WRITTEN_AS.items()
-            if {
-                ApiFunction.SET_LIMITS: self._method.limiting is not None,
-                ApiFunction.SET_THRUST: self._method.has_height,
-                ApiFunction.SLEW_HEADING: True,
-                ApiFunction.SET_MEASURED: self._method.guard is not None,
-                ApiFunction.SHIFT: True,
-            }[function]
-        }
         self._level: dict[str, Any] = {"command_rad": 0}
         if self._method.has_height:
             self._level["thrust_m_s2"] = self._controller.outcome["thrust_m_s2"][0]
 
     def make(self, now: Tape) -> Outcomes:
         """Make one call (n,) on each controller, and return the outcomes (n,)."""
-        controller = self._controller
-        function = now["call"] & 3
-        for wanted, written in self._others.items():
-            read = 3 | (written & ~3)
-            function = np.where((now["call"] & read) == written, np.uint8(wanted), function)
+        controller, method = self._controller, self._method
+        function = np.zeros(len(now), np.uint8)
+        for wanted, called in self._api.items():
+            read = 3 | (called.written_as & ~3)
+            function = np.where((now["call"] & read) == called.written_as, np.uint8(wanted), function)
         nulls = (now["call"] >> 2) & 15
-        null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
-
-        def call(wanted: ApiFunction, made: Callable[[NDArray[Any]], NDArray[np.int64]]) -> NDArray[np.int64]:
-            before, quantities = controller.memory, self._quantities[wanted]
-            values = now["values"][:, : len(quantities)]
-            status = made(self._method.numbers.to_si(values, *quantities))
-            controller.memory = choose((function == wanted) & ~null, controller.memory, before)
-            return status
+        pointers = [self._api[one].pointers if one in self._api else 0 for one in ApiFunction]
+        null = (nulls & np.array(pointers)[function]) != 0
 
         def step(values: NDArray[Any]) -> NDArray[np.int64]:
             inputs = self._rows.split(values)
             status: NDArray[np.int64] = controller.step(inputs.state, inputs.target, inputs.thrust).status
             return status
 
-        set_other = getattr(controller, self._method.setter)
-        outcome = np.zeros(len(now), outcome_type(self._settings))
+        runs: dict[ApiFunction, Callable[[NDArray[Any]], NDArray[np.int64]]] = {
+            ApiFunction.RESET: controller.reset,
+            ApiFunction.SET_WEIGHTS: getattr(controller, method.setter),
+            ApiFunction.SET_LIMITS: controller.set_limits,
+            ApiFunction.SET_THRUST: lambda values: controller.set_thrust(values[:, 0]),
+            ApiFunction.SET_MEASURED: lambda values: controller.set_position_measured(values[:, 0] > 0),
+            ApiFunction.SHIFT: controller.shift,
+            ApiFunction.STEP: step,
+        }
+        status = np.zeros(len(now), np.int64)
         with np.errstate(all="ignore"):
-            resets = call(ApiFunction.RESET, controller.reset)
-            others = call(ApiFunction.SET_WEIGHTS, set_other)
-            limits, thrusts, measured = (np.zeros_like(others) for _ in range(3))
-            if ApiFunction.SET_LIMITS in self._others:
-                limits = call(ApiFunction.SET_LIMITS, controller.set_limits)
-            if ApiFunction.SET_THRUST in self._others:
-                thrusts = call(ApiFunction.SET_THRUST, lambda values: controller.set_thrust(values[:, 0]))
-            if ApiFunction.SET_MEASURED in self._others:
-                measured = call(
-                    ApiFunction.SET_MEASURED,
-                    lambda values: controller.set_position_measured(values[:, 0] > 0),
-                )
-            shifts = call(ApiFunction.SHIFT, controller.shift)
-            steps = call(ApiFunction.STEP, step)
-            none, slewed = np.zeros_like(steps), self._slewed(now)
+            for wanted in (one for one in runs if one in self._api):
+                before, is_meant = controller.memory, function == wanted
+                made = runs[wanted](self._si_values(now, wanted))
+                controller.memory = choose(is_meant & ~null, controller.memory, before)
+                status = np.where(is_meant, made, status)
+            slewed = self._slewed(now)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, none, limits, thrusts, none, measured, shifts])
+        outcome = np.zeros(len(now), outcome_type(self._settings))
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)
@@ -222,12 +205,15 @@ class _Runs:
         outcome["command_rad"][:, 0] = np.where(turns, slewed, outcome["command_rad"][:, 0])
         return outcome
 
+    def _si_values(self, now: Tape, function: ApiFunction) -> NDArray[Any]:
+        """Return the numbers that a function reads, in SI units."""
+        quantities = self._api[function].quantities
+        return self._method.numbers.to_si(now["values"][:, : len(quantities)], *quantities)
+
     def _slewed(self, now: Tape) -> NDArray[Any]:
         """Return the headings (n,) of calls of nmpc_slew_heading, in the numbers of the C."""
-        numbers, quantities = self._method.numbers, self._quantities[ApiFunction.SLEW_HEADING]
-        given = numbers.to_si(now["values"][:, : len(quantities)], *quantities)
-        slewed = slew_heading(self._method, *given.T)
-        return numbers.quantize(slewed[:, np.newaxis], quantities[:1])[:, 0]
+        slewed = slew_heading(self._method, *self._si_values(now, ApiFunction.SLEW_HEADING).T)
+        return self._method.numbers.quantize(slewed[:, np.newaxis], ("yaw",))[:, 0]
 
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:
         self._controller.memory = choose(chosen, self._fresh, self._controller.memory)

@@ -15,19 +15,8 @@ from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.calls import (
-    NULL_COMMAND,
-    NULL_FIRST,
-    NULL_SECOND,
-    NULL_SELF,
-    ApiFunction,
-    Outcomes,
-    Tape,
-    answers,
-    calls,
-)
-from mambo_sil.verify.step_inputs import StepInputs, random_steps
-from mambo_sil.verify.step_rows import POSITION, TILT, VELOCITY, YAW, StepRows
+from mambo_sil.verify.calls import ApiFunction, Outcomes, Tape, answers, api_of, calls
+from mambo_sil.verify.step_inputs import POSITION, TILT, VELOCITY, YAW, StepInputs, StepRows, random_steps
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -245,20 +234,9 @@ def _both(*limits: float) -> tuple[Sequence[float], Sequence[float]]:
 
 def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     """Pass every combination of null pointers to every function; initialise a used controller."""
-    every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
-    for function, pointers in (
-        (ApiFunction.STEP, every),
-        (ApiFunction.RESET, NULL_SELF | NULL_FIRST),
-        (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
-        (ApiFunction.INIT, NULL_SELF),
-        (ApiFunction.SHIFT, NULL_SELF | NULL_FIRST | NULL_SECOND),
-        *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
-        *([(ApiFunction.SET_THRUST, NULL_SELF)] if method_of(settings).has_height else []),
-        *([(ApiFunction.SET_MEASURED, NULL_SELF)] if method_of(settings).guard is not None else []),
-    ):
-        for nulls in range(pointers + 1):
-            takes_one = function in {ApiFunction.SET_THRUST, ApiFunction.SET_MEASURED}
-            values = [[0.1]] if takes_one else [[0.1, 0.2]]
+    for function, called in api_of(method_of(settings)).items():
+        for nulls in range(called.pointers + 1 if called.pointers else 0):
+            values = [[0.1]] if len(called.quantities) == 1 else [[0.1, 0.2]]
             made = calls(settings, function, np.array(values), nulls)
             yield _surround(settings, rng, made)
 

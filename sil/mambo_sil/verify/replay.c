@@ -9,8 +9,6 @@
 #include <sys/resource.h>
 
 #include "nmpc_self_test.h"
-#if defined(NMPC_POSITION_BITS)
-#endif
 
 #if defined(__has_feature)
 #if __has_feature(memory_sanitizer)
@@ -177,15 +175,19 @@ static int passes_self_test(nmpc_t *self)
 #define NMPC_REPLAY_THRUST(thrust_m_s2) (thrust_m_s2),
 #endif
 
+/* A number of the C in SI units. */
+static float in_si(nmpc_sum_t number, int bits)
+{
+    return (float)number / (float)((nmpc_sum_t)1 << bits);
+}
+
 static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_float_command_t *found,
                     const nmpc_command_t *command)
 {
-    const float unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
-
-    return (status == expected) && (found->roll_rad == ((float)command->roll_rad * unit_rad))
-           && (found->pitch_rad == ((float)command->pitch_rad * unit_rad))
+    return (status == expected) && (found->roll_rad == in_si(command->roll_rad, NMPC_ANGLE_BITS))
+           && (found->pitch_rad == in_si(command->pitch_rad, NMPC_ANGLE_BITS))
 #ifdef NMPC_FUZZ_SET_THRUST
-           && (found->thrust_m_s2 == ((float)command->thrust_m_s2 / (float)((nmpc_sum_t)1 << NMPC_THRUST_BITS)))
+           && (found->thrust_m_s2 == in_si(command->thrust_m_s2, NMPC_THRUST_BITS))
 #endif
         ;
 }
@@ -193,10 +195,9 @@ static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_flo
 /* The largest float that does not exceed a number. */
 static float largest_float(nmpc_real_t number, int bits)
 {
-    const float unit = 1.0f / (float)((nmpc_sum_t)1 << bits);
-    const float found = (float)number * unit;
+    const float found = in_si(number, bits);
 
-    return (((double)found / (double)unit) > (double)number) ? (found * 0.99999994f) : found;
+    return (((double)found * (double)((nmpc_sum_t)1 << bits)) > (double)number) ? (found * 0.99999994f) : found;
 }
 
 /* A level command, with a height the command of hover. */
@@ -328,17 +329,13 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
     int axis;
 
 #ifdef NMPC_FUZZ_SET_THRUST
-    is_good = is_good
-              && (found.height_m == ((float)expected.height_m / (float)((nmpc_sum_t)1 << NMPC_POSITION_BITS)))
-              && (found.climb_m_s == ((float)expected.climb_m_s / (float)((nmpc_sum_t)1 << NMPC_VELOCITY_BITS)));
+    is_good = is_good && (found.height_m == in_si(expected.height_m, NMPC_POSITION_BITS))
+              && (found.climb_m_s == in_si(expected.climb_m_s, NMPC_VELOCITY_BITS));
 #endif
     for (axis = 0; is_good && (axis < 2); axis++) {
-        is_good = (found.position_m[axis]
-                   == ((float)expected.position_m[axis] / (float)((nmpc_sum_t)1 << NMPC_POSITION_BITS)))
-                  && (found.velocity_m_s[axis]
-                      == ((float)expected.velocity_m_s[axis] / (float)((nmpc_sum_t)1 << NMPC_VELOCITY_BITS)))
-                  && (found.disturbance_m_s2[axis]
-                      == ((float)expected.disturbance_m_s2[axis] / (float)((nmpc_sum_t)1 << NMPC_DISTURBANCE_BITS)));
+        is_good = (found.position_m[axis] == in_si(expected.position_m[axis], NMPC_POSITION_BITS))
+                  && (found.velocity_m_s[axis] == in_si(expected.velocity_m_s[axis], NMPC_VELOCITY_BITS))
+                  && (found.disturbance_m_s2[axis] == in_si(expected.disturbance_m_s2[axis], NMPC_DISTURBANCE_BITS));
     }
     return is_good;
 }
@@ -358,8 +355,7 @@ static int sets_alike(nmpc_t *self, nmpc_t *other)
 static int tells_alike(const nmpc_t *self, const nmpc_t *other)
 {
     return (nmpc_last_cost(self) == nmpc_last_cost(other))
-           && (nmpc_float_last_cost(self)
-               == ((float)nmpc_last_cost(other) / (float)((nmpc_sum_t)1 << NMPC_COST_BITS)));
+           && (nmpc_float_last_cost(self) == in_si(nmpc_last_cost(other), NMPC_COST_BITS));
 }
 #endif
 
@@ -386,7 +382,7 @@ static int turns_alike(void)
     const float found_rad = nmpc_float_slew_heading(0.25f, -0.5f, 0.0625f);
     const nmpc_real_t expected = nmpc_slew_heading(NMPC_YAW(0.25), NMPC_YAW(-0.5), NMPC_YAW(0.0625));
 
-    return found_rad == ((float)expected / (float)((nmpc_sum_t)1 << NMPC_YAW_BITS));
+    return found_rad == in_si(expected, NMPC_YAW_BITS);
 }
 
 /* A step with floats gives the same as one with the equal numbers of fixed point; floats outside every format are
