@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_sil.cli.command import load
 from mambo_sil.cli.fly.commands import FAULTS_FILES
+from mambo_sil.cli.options import load
 from tests.support.command import run
 
 

@@ -1,4 +1,4 @@
-"""The root of `mambo-nmpc`, which turns errors into a message and an exit code; options that commands share.
+"""The root of `mambo-nmpc`, which turns errors into a message and an exit code.
 
 Results go to stdout, messages to stderr. This module imports nothing slow, because `--help` imports it.
 """
@@ -9,8 +9,7 @@ import os
 import signal
 import sys
 import traceback
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Never
+from typing import Annotated, Any, Never
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -21,43 +20,15 @@ from mambo_codegen.errors import (
     INTERRUPTED,
     NO_READER,
     TERMINATED,
-    FileExistsRefusedError,
     MamboNmpcError,
     Terminated,
-    UnwritableError,
     echo,
 )
-
-if TYPE_CHECKING:
-    from mambo_codegen.settings.model import Settings
 
 EXIT_CODES = (
     "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
     "130 interrupted; 141 the reader of the output closed it; 143 terminated."
 )
-
-
-def complete_presets(incomplete: str) -> list[str]:
-    """Return the presets that begin with `incomplete`, for the shell; it completes files itself."""
-    from mambo_codegen.settings.toml_file import PRESETS
-
-    return [name for name in PRESETS.names() if name.startswith(incomplete)]
-
-
-Source = Annotated[
-    str, typer.Argument(help="A preset or a controller.toml.", autocompletion=complete_presets)
-]
-OptionalSource = Annotated[
-    str | None,
-    typer.Argument(
-        help="A preset or a controller.toml; by default mambo, with --for the preset of the target.",
-        autocompletion=complete_presets,
-    ),
-]
-Scalar = Annotated[
-    str | None, typer.Option(help="Scalar type of the C: float32, float64 or fixed.", metavar="TYPE")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
 
 
 class RootGroup(TyperGroup):
@@ -181,51 +152,6 @@ def _root_options(
     ] = False,
 ) -> None:
     """Generate model predictive control of a small drone in static-memory C99, and fly it in simulation."""
-
-
-def output_option(about: str) -> Any:
-    """Return the option -o, a path; `about` is its help."""
-    return typer.Option("--output", "-o", help=about, metavar="PATH")
-
-
-OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]
-Overwrite = Annotated[bool, typer.Option("--force", help="Overwrite the file.")]
-
-
-def write_file(text: str, output: Path, *, force: bool) -> bool:
-    """Write `text` to a file, whole or not at all, or print it for `-`; return whether it is a file.
-
-    Raises FileExistsRefusedError unless `force`, UnwritableError.
-    """
-    from mambo_codegen.atomic import put
-    from mambo_codegen.plain_file import find_obstacle
-
-    if str(output) == "-":
-        typer.echo(text, nl=False)
-        return False
-    name = echo(str(output))
-    place = Path(os.path.realpath(output))
-    if obstacle := find_obstacle(output):
-        raise UnwritableError(f"{name}: is {obstacle}, not a file; name one, or print to stdout with -o -")
-    try:
-        if os.path.lexists(output) and not force:
-            raise FileExistsRefusedError(
-                f"{name}: already exists; name another with -o, or overwrite it with --force"
-            )
-        put(place, text.encode())
-    except OSError as error:
-        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
-    return True
-
-
-def load(source: str, scalar: str | None) -> "Settings":
-    """Load a preset or a controller.toml; replace its scalar type unless `scalar` is None."""
-    from mambo_codegen.settings import controller_toml, presets
-
-    settings = presets.load(source)
-    if scalar is None:
-        return settings
-    return controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
 
 
 def examples(*lines: str) -> str:

@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
-from mambo_sil.cli.command import output_option
-from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show, show_result
+from mambo_sil.cli.options import (
+    AsJson,
+    Drone,
+    Results,
+    Scalar,
+    Source,
+    load,
+    output_option,
+    show,
+    show_result,
+)
 from mambo_sil.verify.check_list import CHECKS
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import typer
 
 from mambo_codegen.bundle.targets import TARGETS, complete_targets, default_source, find_target
 from mambo_codegen.errors import DriftError, echo
-from mambo_sil.cli.command import (
+from mambo_sil.cli.options import (
     AsJson,
     OptionalSource,
     Scalar,

@@ -1,23 +1,65 @@
-"""What commands share: option types, and printing of results."""
+"""What commands share: options, loading what they name, and printing of results."""
 
-from collections.abc import Sequence
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from mambo_codegen.errors import echo
-from mambo_codegen.settings.toml_file import BOARDS
-from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
+from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_codegen.settings.toml_file import BOARDS, PRESETS
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.flight.names import present_sensors
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
+    from mambo_codegen.settings.model import Settings
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
     from mambo_sil.results.summary import ReportedSummary, Summary
 
-__all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
+
+BOARD_NAMES: Final = BOARDS.names()
+VEHICLE_NAMES: Final = VEHICLES.names()
+
+
+def _completing(names: Sequence[str]) -> Callable[[str], list[str]]:
+    """Return what completes one of `names` for the shell, which completes files itself."""
+
+    def complete(incomplete: str) -> list[str]:
+        return [name for name in names if name.startswith(incomplete)]
+
+    return complete
+
+
+complete_presets, complete_boards, complete_vehicles = map(
+    _completing, (PRESETS.names(), BOARD_NAMES, VEHICLE_NAMES)
+)
+
+Source = Annotated[
+    str, typer.Argument(help="A preset or a controller.toml.", autocompletion=complete_presets)
+]
+OptionalSource = Annotated[
+    str | None,
+    typer.Argument(
+        help="A preset or a controller.toml; by default mambo, with --for the preset of the target.",
+        autocompletion=complete_presets,
+    ),
+]
+Scalar = Annotated[
+    str | None, typer.Option(help="Scalar type of the C: float32, float64 or fixed.", metavar="TYPE")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
+
+
+def output_option(about: str) -> Any:
+    """Return the option -o, a path; `about` is its help."""
+    return typer.Option("--output", "-o", help=about, metavar="PATH")
+
+
+OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]
+Overwrite = Annotated[bool, typer.Option("--force", help="Overwrite the file.")]
 
 _OUTPUT: Final = output_option("Folder for the results; overwrites earlier ones.")
 Results = Annotated[Path, _OUTPUT]
@@ -26,9 +68,6 @@ Workers = Annotated[
     int | None,
     typer.Option(help="Processes on this machine; by default one for each processor.", min=1, max=1024),
 ]
-
-BOARD_NAMES: Final = BOARDS.names()
-VEHICLE_NAMES: Final = VEHICLES.names()
 
 
 def sensors_option(names: Sequence[str], about: str) -> Any:
@@ -40,20 +79,7 @@ def sensors_option(names: Sequence[str], about: str) -> Any:
             raise typer.BadParameter(f"{text!r} is not one of {', '.join(map(repr, names))}.")
         return str(name)
 
-    def complete(incomplete: str) -> list[str]:
-        return [name for name in names if name.startswith(incomplete)]
-
-    return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=complete)
-
-
-def complete_boards(incomplete: str) -> list[str]:
-    """Return the boards that begin with `incomplete`, for the shell."""
-    return [name for name in BOARD_NAMES if name.startswith(incomplete)]
-
-
-def complete_vehicles(incomplete: str) -> list[str]:
-    """Return the shipped vehicles that begin with `incomplete`, for the shell."""
-    return [name for name in VEHICLE_NAMES if name.startswith(incomplete)]
+    return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=_completing(names))
 
 
 Boards = Annotated[
@@ -65,20 +91,16 @@ Boards = Annotated[
         autocompletion=complete_boards,
     ),
 ]
-
-
-def _vehicle_option(about: str) -> Any:
-    """Return the option --vehicle; `about` ends its help."""
-    return typer.Option(
+Drone = Annotated[
+    str | None,
+    typer.Option(
         "--vehicle",
-        help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml{about}.",
+        help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml; "
+        "by default that of the file, or mambo.",
         metavar="NAME",
         autocompletion=complete_vehicles,
-    )
-
-
-Drone = Annotated[str | None, _vehicle_option("; by default that of the file, or mambo")]
-
+    ),
+]
 PortName = Annotated[
     str | None,
     typer.Option(
@@ -96,12 +118,48 @@ Baud = Annotated[
 ]
 
 
+def write_file(text: str, output: Path, *, force: bool) -> bool:
+    """Write `text` to a file, whole or not at all, or print it for `-`; return whether it is a file.
+
+    Raises FileExistsRefusedError unless `force`, UnwritableError.
+    """
+    from mambo_codegen.atomic import put
+    from mambo_codegen.plain_file import find_obstacle
+
+    if str(output) == "-":
+        typer.echo(text, nl=False)
+        return False
+    name = echo(str(output))
+    place = Path(os.path.realpath(output))
+    if obstacle := find_obstacle(output):
+        raise UnwritableError(f"{name}: is {obstacle}, not a file; name one, or print to stdout with -o -")
+    try:
+        if os.path.lexists(output) and not force:
+            raise FileExistsRefusedError(
+                f"{name}: already exists; name another with -o, or overwrite it with --force"
+            )
+        put(place, text.encode())
+    except OSError as error:
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
+    return True
+
+
+def load(source: str, scalar: str | None) -> "Settings":
+    """Load a preset or a controller.toml; replace its scalar type unless `scalar` is None."""
+    from mambo_codegen.settings import controller_toml, presets
+
+    settings = presets.load(source)
+    if scalar is None:
+        return settings
+    return controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
+
+
 def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
     """Load the drone of --vehicle, else that which the settings of `sources` are for, else the Mambo.
 
     Raises InvalidSettingsError for settings of several drones, and what `vehicle_toml` raises.
     """
-    from mambo_codegen.errors import InvalidSettingsError, echo
+    from mambo_codegen.errors import InvalidSettingsError
     from mambo_sil.drone.vehicles import vehicle_toml
 
     if vehicle is not None:
@@ -140,3 +198,18 @@ def show_result(
     show(summary, result_text(summary.result(folder or Path())), as_json=as_json)
     if folder is not None and files:
         typer.echo(f"{echo(str(folder))}: {', '.join(files)}", err=True)
+
+
+@contextlib.contextmanager
+def continued_later(folder: Path, finished: Callable[[], int], total: int, things: str) -> Iterator[None]:
+    """If the block is interrupted, say how many of `total` things are finished."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        with contextlib.suppress(OSError):
+            typer.echo(
+                f"{echo(str(folder))}: stopped with {finished()} of {total} {things} finished; "
+                "the same command continues from there",
+                err=True,
+            )
+        raise

@@ -9,30 +9,31 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, write_file
 from mambo_sil.cli.options import (
     VEHICLE_NAMES,
     AsJson,
     Drone,
     OptionalResults,
+    OutputFile,
+    Overwrite,
     Results,
     Workers,
+    complete_presets,
     complete_vehicles,
+    continued_later,
     load_drone,
     output_option,
     sensors_option,
     show_result,
+    write_file,
 )
 from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind, TargetAcceleration
 from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
-    from optuna import Study
-
     from mambo_codegen.settings.model import Settings
     from mambo_sil.cli.progress import Bar
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-    from mambo_sil.model.tune.tuning_file import Tuning
     from mambo_sil.model.tune.tuning_report import TuneSummary
 
 
@@ -298,11 +299,12 @@ def _tune(
     workers: int,
     storage: str | None,
 ) -> "TuneSummary":
-    """Run the missing trials and write the results."""
+    """Run the missing trials and write the results; if interrupted print how many are finished."""
     from mambo_sil.errors import StudyError
+    from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.campaign.store import claim, convert_os_errors
     from mambo_sil.model.tune import tuning_file
-    from mambo_sil.model.tune.study import demand_optuna, finished_trials, open_study, owner_of
+    from mambo_sil.model.tune.study import demand_optuna, finished_trials, open_study, owner_of, search
     from mambo_sil.model.tune.tuning_report import finish
     from mambo_sil.results.folders import create_folder, lock
 
@@ -321,38 +323,15 @@ def _tune(
             bar(len(finished_trials(study)))
             if len(finished_trials(study)) < trials:
                 owner = owner_of(output, storage)
-                _search(tuning, study, owner, trials, bar, workers=workers, folder=output)
+                bar.stage("tuning")
+                with (
+                    continued_later(output, lambda: len(finished_trials(study)), trials, "trials"),
+                    processes(workers) as pool,
+                ):
+                    search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
             found = finished_trials(study)
         bar.stage("drawing the front")
         return finish(tuning, found, output)
-
-
-def _search(
-    tuning: "Tuning",
-    study: "Study",
-    owner: str,
-    trials: int,
-    bar: "Bar",
-    *,
-    workers: int,
-    folder: Path,
-) -> None:
-    """Search until `trials` are finished; if interrupted print how many are."""
-    from mambo_sil.experiment.campaign.executors import processes
-    from mambo_sil.model.tune.study import finished_trials, search
-
-    bar.stage("tuning")
-    try:
-        with processes(workers) as pool:
-            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
-    except KeyboardInterrupt:
-        with contextlib.suppress(OSError):
-            typer.echo(
-                f"{echo(str(folder))}: stopped with {len(finished_trials(study))} of {trials} trials "
-                "finished; the same command continues from there",
-                err=True,
-            )
-        raise
 
 
 def diff(

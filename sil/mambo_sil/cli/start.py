@@ -8,8 +8,17 @@ from typing import Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, output_option, write_file
-from mambo_sil.cli.options import AsJson, Drone, load_drone, show
+from mambo_sil.cli.options import (
+    AsJson,
+    Drone,
+    OutputFile,
+    Overwrite,
+    complete_presets,
+    load_drone,
+    output_option,
+    show,
+    write_file,
+)
 from mambo_sil.results.terminal import sentence
 
 

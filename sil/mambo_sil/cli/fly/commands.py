@@ -16,6 +16,7 @@ from mambo_sil.cli.options import (
     Scalar,
     Source,
     Workers,
+    continued_later,
     demand_port,
     load,
     load_drone,
@@ -113,7 +114,10 @@ def _fly_campaign(
     from mambo_sil.experiment.campaign.executors import cluster, processes
 
     chosen = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
-    with open_campaign(chosen, output) as store:
+    with (
+        open_campaign(chosen, output) as store,
+        continued_later(output, lambda: len(store.finished), flights, "flights"),
+    ):
         bar(len(store.finished))
         try:
             if missing_flights(store, flights):
@@ -125,12 +129,6 @@ def _fly_campaign(
         except KeyboardInterrupt:
             with contextlib.suppress(UnwritableError):
                 store.export()
-            with contextlib.suppress(OSError):
-                typer.echo(
-                    f"{echo(str(output))}: stopped with {len(store.finished)} of {flights} flights finished; "
-                    "the same command continues from there",
-                    err=True,
-                )
             raise
 
 

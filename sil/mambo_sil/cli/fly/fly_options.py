@@ -8,8 +8,17 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from mambo_sil.cli.command import AsJson, Scalar, complete_presets
-from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards, sensors_option
+from mambo_sil.cli.options import (
+    AsJson,
+    Baud,
+    Drone,
+    PortName,
+    Results,
+    Scalar,
+    complete_boards,
+    complete_presets,
+    sensors_option,
+)
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import (
     CURVE_NAMES,
