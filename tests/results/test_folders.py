@@ -11,8 +11,8 @@ import pytest
 
 from mambo_codegen.errors import ForeignFilesError, MamboNmpcError, UnwritableError
 from mambo_sil.errors import BusyError, ScratchError
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.results.folders import SUMMARY, new_results
-from mambo_sil.results.scratch import scratch_folder
 from mambo_sil.results.summary import Summary
 
 

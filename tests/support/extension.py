@@ -21,7 +21,7 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.numbers.literals import C_TYPES, SUM_TYPES
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.controller_library import with_default_prefix
-from mambo_sil.results.cache import build_cached
+from mambo_sil.results.build_folders import build_cached
 from tests.support.bundles import place
 from tests.support.tools import require_file, toolchain
 

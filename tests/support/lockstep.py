@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.serial_frames import DELIMITER, Receiver, decode
-from mambo_sil.board.pil.serial_messages import REPLY, Kind, split
+from mambo_sil.board.pil.protocol import DELIMITER, REPLY, Kind, Receiver, decode, split
 from mambo_sil.board.pil.serial_port import READ_S
 from tests.support.serial_line import build_firmware
 

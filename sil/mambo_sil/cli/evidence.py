@@ -56,9 +56,9 @@ def verify(
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
     from mambo_sil.cli.progress import counting_bar
+    from mambo_sil.results.build_folders import check_tmpdir
     from mambo_sil.results.folders import SUMMARY, digests, new_results
     from mambo_sil.results.html_page import results_page
-    from mambo_sil.results.scratch import check_tmpdir
     from mambo_sil.verify.check import CheckOutcome
     from mambo_sil.verify.verify_report import PAGE, VerifySummary, summarise
 

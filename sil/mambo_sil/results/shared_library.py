@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from mambo_codegen.errors import BuildError, CacheError
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.results.cache import build_cached
+from mambo_sil.results.build_folders import build_cached, write_sources
 
 if TYPE_CHECKING:
     import _cffi_backend
@@ -68,9 +68,7 @@ def built_library(source: LibrarySource, toolchain: Toolchain) -> Path:
 
     def build(folder: Path) -> Path:
         files = source.files()
-        for path, text in files.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(text, "utf-8")
+        write_sources(files, folder)
         units = sorted(path for path in files if path.endswith((".c", ".cpp")))
         library = folder / f"{source.name}.so"
         toolchain.run([*_flags(source, toolchain), *units, "-o", library.name, *source.libraries], folder)

@@ -5,7 +5,7 @@ from typing import Final
 
 from mambo_codegen.bundle.flags import WARNING_FLAGS
 from mambo_codegen.settings.model import Settings
-from mambo_sil.results.scratch import scratch_folder
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.verify.check import Result, Subject, combine
 from mambo_sil.verify.tools import missing, run
 

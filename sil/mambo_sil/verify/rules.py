@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.bundle.flags import RULE_FLAGS
-from mambo_sil.results.scratch import scratch_folder
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.verify.check import Result, Subject, failed, incomplete, passed
 from mambo_sil.verify.tools import TIME_LIMIT_S, missing, run
 

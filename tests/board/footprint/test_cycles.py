@@ -10,9 +10,9 @@ import pytest
 from mambo_codegen import boards
 from mambo_codegen.boards import MODELLED, FlashWait
 from mambo_codegen.settings import presets
-from mambo_sil.board.emulation.executed import Executed
+from mambo_sil.board.emulation.core import Executed
 from mambo_sil.board.firmware.elf import load
-from mambo_sil.board.footprint import timing_arm
+from mambo_sil.board.footprint import timing
 from mambo_sil.board.footprint.counts import CountingController
 from mambo_sil.board.footprint.cycles import MODELS, CycleModel, ModelledCycles
 from mambo_sil.board.footprint.measure import measure_footprint
@@ -173,7 +173,7 @@ def test_a_class_that_is_missing_changes_the_sum(
     """No table of the model can be lost unnoticed."""
     elf = build_known("crazyflie", tmp_path)
     _, right = step_known("crazyflie", elf)
-    monkeypatch.setattr(timing_arm, table, CLASSES[table])
+    monkeypatch.setattr(timing, table, CLASSES[table])
     _, wrong = step_known("crazyflie", elf)
     assert wrong.without_wait != right.without_wait
 

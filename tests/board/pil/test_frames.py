@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.settings import presets
-from mambo_sil.board.pil.serial_frames import (
+from mambo_sil.board.pil.protocol import (
     LONGEST_PAYLOAD,
     LONGEST_STUFFED,
     Receiver,

@@ -17,7 +17,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.board_controller import BoardStep
 from mambo_sil.board.pil.connection import Connection, Patience
 from mambo_sil.board.pil.pil_report import real_time_of, real_time_text, wall_clock
-from mambo_sil.board.pil.serial_messages import NAMED_STEPS, OUT_OF_STEP, REPLY, Kind, StepReply, TimedReply
+from mambo_sil.board.pil.protocol import NAMED_STEPS, OUT_OF_STEP, REPLY, Kind, StepReply, TimedReply
 from mambo_sil.board.pil.timed import OLDEST_INPUTS, Arrival, TimedController
 from mambo_sil.drone.plant.link import NOT_CALLED, Link
 from mambo_sil.drone.plant.vehicle import Vehicle

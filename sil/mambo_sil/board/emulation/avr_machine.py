@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import Toolchain, host_toolchain
-from mambo_sil.board.emulation.arena import Arena
-from mambo_sil.board.emulation.executed import Executed
+from mambo_sil.board.emulation.core import Arena, Executed
 from mambo_sil.board.emulation.gdb import GdbStub
 from mambo_sil.board.firmware.avr import DISASSEMBLER, SKIPS, decode
 from mambo_sil.board.firmware.elf import load
 from mambo_sil.errors import EmulationError, EmulatorError
-from mambo_sil.results.cache import build_cached
+from mambo_sil.results.build_folders import build_cached
 
 _EMULATOR: Final = "qemu-system-avr"
 _TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux", DISASSEMBLER: "binutils-avr"}

@@ -12,8 +12,7 @@ import unicorn
 from elftools.elf.elffile import ELFFile
 from unicorn import arm_const, riscv_const
 
-from mambo_sil.board.emulation.arena import Arena
-from mambo_sil.board.emulation.executed import Executed
+from mambo_sil.board.emulation.core import Arena, Executed
 from mambo_sil.board.firmware.disassembly import disassemble
 from mambo_sil.board.firmware.elf import load
 from mambo_sil.errors import EmulationError

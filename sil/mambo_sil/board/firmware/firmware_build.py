@@ -18,6 +18,7 @@ from mambo_codegen.boards import Board
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import Toolchain
+from mambo_sil.results.build_folders import write_sources
 
 ENTRY: Final = "run"
 PREFIX: Final = "nmpc"
@@ -88,14 +89,10 @@ class Builder:
         bundle = place.parent.resolve() / f"bundle-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
         parts = [bundle / Path(source).with_suffix(".o").name for source in chosen]
         if not all(part.is_file() for part in parts):
-            _write(files, bundle)
+            write_sources(files, bundle)
             self._run(self.toolchain, [*flags, "-c", *chosen], bundle)
-        _write(main, place)
-        self._run(
-            self.toolchain,
-            [*flags, *define, f"-I{bundle}", "-c", *main],
-            place,
-        )
+        write_sources(main, place)
+        self._run(self.toolchain, [*flags, *define, f"-I{bundle}", "-c", *main], place)
         objects = [*(Path(source).with_suffix(".o").name for source in main), *map(str, parts)]
         kept = [f"-Wl,-e,{keep[0]}", *(f"-Wl,-u,{symbol}" for symbol in keep[1:])]
         link = [*core, *objects, *_LINK, *address, *kept, *self.board.compiler.libraries]
@@ -113,12 +110,6 @@ class Builder:
                 f"{self.board.core.value} that takes {' '.join(compiler.flags)} (compiler.candidates and "
                 f"compiler.flags of the board; Debian: {' '.join(compiler.packages)})\n{error}"
             ) from error
-
-
-def _write(sources: dict[str, str], place: Path) -> None:
-    for path, text in sources.items():
-        (place / path).parent.mkdir(parents=True, exist_ok=True)
-        (place / path).write_text(text, "utf-8")
 
 
 def builder(board: Board, optimisation: str | None = None) -> Builder:

@@ -17,7 +17,7 @@ from mambo_sil.board.pil.connection import Connection
 from mambo_sil.errors import EmulatorError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
-from mambo_sil.results.scratch import scratch_folder
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.results.terminal import sentence, table
 
 HOST_COMPILERS: Final = ("gcc", "clang")

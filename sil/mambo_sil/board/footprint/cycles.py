@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from mambo_codegen.boards import FlashWait
-from mambo_sil.board.emulation.executed import Executed
+from mambo_sil.board.emulation.core import Executed
 from mambo_sil.board.firmware.elf import Image
-from mambo_sil.board.footprint.timing import Cycles, Timing
-from mambo_sil.board.footprint.timing_arm import cortex_m0plus, cortex_m4
-from mambo_sil.board.footprint.timing_avr import atmega2560
+from mambo_sil.board.footprint.timing import Cycles, Timing, atmega2560, cortex_m0plus, cortex_m4
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from mambo_sil.board.footprint.cycles import MODELS
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.errors import EmulatorError, FlightError
 from mambo_sil.flight.controllers.controller_library import with_default_prefix
-from mambo_sil.results.scratch import scratch_folder
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.results.summary import Number
 
 COUNTED_TICKS: Final = 300

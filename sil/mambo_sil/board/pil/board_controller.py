@@ -11,7 +11,7 @@ from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import COMMAND, THRUST
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.connection import Connection
-from mambo_sil.board.pil.serial_messages import StepReply
+from mambo_sil.board.pil.protocol import StepReply
 from mambo_sil.drone.plant.arrays import IntArray
 from mambo_sil.flight.controllers.compiled import CompiledController, as_array, as_arrays
 

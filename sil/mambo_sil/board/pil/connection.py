@@ -18,8 +18,7 @@ from mambo_codegen.bundle.bundle import GENERATOR
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.serial_frames import Receiver, encode, frame_bytes
-from mambo_sil.board.pil.serial_messages import (
+from mambo_sil.board.pil.protocol import (
     DAMAGED,
     HEAD_BYTES,
     OUT_OF_STEP,
@@ -27,7 +26,10 @@ from mambo_sil.board.pil.serial_messages import (
     REPLY,
     Greeting,
     Kind,
+    Receiver,
     StepReply,
+    encode,
+    frame_bytes,
     request,
     split,
     step_reply_bytes,

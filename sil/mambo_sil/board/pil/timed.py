@@ -21,7 +21,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.board_controller import BoardInputs, BoardStep, ReportedThrust, desk_bits
 from mambo_sil.board.pil.connection import NO_FLIGHT, Connection, command_bytes
-from mambo_sil.board.pil.serial_messages import (
+from mambo_sil.board.pil.protocol import (
     DAMAGED,
     NAMED_STEPS,
     OUT_OF_STEP,

@@ -42,8 +42,8 @@ from mambo_sil.flight.scenario import (
 )
 from mambo_sil.flight.traces import Trace, write_csv, write_npz
 from mambo_sil.flight.trajectories import CURVES, Trajectory
+from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.results.folders import new_results
-from mambo_sil.results.scratch import scratch_folder
 
 CALM, GUSTS = "none", "gusts"
 TRACE_FILES = ("trace.csv", "trace.npz")

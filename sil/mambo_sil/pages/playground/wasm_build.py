@@ -16,7 +16,7 @@ from mambo_sil.flight.controllers.controller_library import c_files, glue, with_
 from mambo_sil.flight.engine.engine_library import texts
 from mambo_sil.flight.engine.native import PD_STEPS
 from mambo_sil.pages.playground.page_controllers import PageController
-from mambo_sil.results.cache import build_cached
+from mambo_sil.results.build_folders import build_cached, write_sources
 
 ENGINE_CALLS: Final = (
     *("engine_begin", "engine_update", "engine_start_sensors", "engine_fly"),
@@ -45,9 +45,7 @@ def module(one: PageController) -> bytes:
     compiler = _compiler()
 
     def build(folder: Path) -> Path:
-        for path, text in files.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(text, "utf-8")
+        write_sources(files, folder)
         compiler.run(arguments, folder)
         return folder / "drone.wasm"
 
