@@ -47,3 +47,37 @@ class Module {
     return new Kind(this.calls.memory.buffer, address, count);
   }
 }
+/* The flight that the native engine flew too: engine_fly with the same records and random numbers. */
+const TRACE_AXES = [3, 3, 3, 2, 1, 1, 3, 3, 3];
+const TARGET_PLACE = 3; /* in a trace, the target follows position, velocity and angles */
+const LEVEL_COLUMNS = 6, TARGET_COLUMNS = 9; /* x, y, vx, vy, ax, ay; and height, climb, its acceleration */
+const TRACED = [0, 1, 2, 3, 6, 7]; /* the columns without accelerations */
+
+async function sha256(parts) {
+  const whole = new Uint8Array(await new Blob(parts).arrayBuffer());
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", whole));
+  return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/* The digest of the trace of one controller's flight, as Trace.digest computes it. */
+async function traceDigest(entry, data) {
+  const module = await Module.load(entry), { proof } = data, { updates } = proof;
+  const times = Float64Array.from({ length: updates }, (_, update) => data.period_s * update);
+  const [simulation, flight, sensors, gusts] =
+    ["simulation", "flight", "sensors", "gusts"].map((name) => module.put(bytesOf(proof[name])));
+  const targets = new Float64Array(bytesOf(proof.targets).buffer), columns = targets.length / updates;
+  module.at(simulation + data.offsets.simulation.commands_thrust, 1, BigInt64Array)[0] = BigInt(entry.commands_thrust);
+  const arrays = TRACE_AXES.map((axes) => module.space(8 * axes * updates));
+  module.calls.engine_fly(
+    simulation, flight, 0n, module.put(new Uint8Array(times.buffer)), module.put(new Uint8Array(targets.buffer)),
+    module.pointers(sensors, gusts, 0), module.step, module.self, 0n, module.pointers(...arrays),
+  );
+  const parts = arrays.map((address, place) => module.at(address, TRACE_AXES[place] * updates));
+  parts.splice(TARGET_PLACE, 0, targets.filter((_, index) => TRACED.includes(index % columns)));
+  return sha256([times, ...parts]);
+}
+
+/* The digests in this browser, in the order of the drones; an error's message where a module fails. */
+function proveAll(data) {
+  return Promise.all(data.drones.map((entry) => traceDigest(entry, data).catch((error) => String(error))));
+}

@@ -26,8 +26,7 @@ from mambo_sil.results.summary import Summary
 
 STYLES: Final = ("style.css", "playground.css")
 SCRIPTS: Final = (
-    *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js", "view.js"),
-    *("marks.js", "wind.js", "inset.js", "field.js", "plots.js"),
+    *("module.js", "drone.js", "target.js", "world.js", "view.js", "marks.js", "field.js", "plots.js"),
     *("pointer.js", "controls.js", "playground.js"),
 )
 """The files of the page's script, in their order."""
