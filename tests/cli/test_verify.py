@@ -8,8 +8,7 @@ import pytest
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.results.terminal import result_text
-from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.check_list import CHECKS
+from mambo_sil.verify.check import CHECKS, CheckOutcome
 from mambo_sil.verify.verify_report import Verified, summarise, verdict
 from tests.support.command import run, unwrapped
 from tests.support.tools import require

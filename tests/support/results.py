@@ -58,8 +58,7 @@ from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.model.tune.study import FinishedTrial
 from mambo_sil.model.tune.tuning_report import TuneSummary
 from mambo_sil.verify import verify_report
-from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.check_list import CHECKS
+from mambo_sil.verify.check import CHECKS, CheckOutcome
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
 """A name of a file that is markup, the end of a script, and quotes."""

@@ -29,6 +29,8 @@ from mambo_sil.cli.options import (
     load_drone,
     show_result,
 )
+from mambo_sil.cli.progress import counting_bar, progress_bar
+from mambo_sil.results.folders import new_results
 
 if TYPE_CHECKING:
     from mambo_codegen.settings.model import Settings
@@ -57,8 +59,6 @@ def footprint(
     """
     from mambo_sil.board.footprint.footprint_report import FootprintSummary, summarise
     from mambo_sil.board.footprint.measure import measure_boards
-    from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.results.folders import new_results
 
     demand_port(port, baud)
     settings = load(source, scalar)
@@ -131,9 +131,7 @@ def sweep(
     from mambo_sil.board.emulation.machine import demand_emulator
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, write_points
-    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.executors import processes
-    from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
     chosen, drone = boards.load(board), load_drone(vehicle, source)
@@ -244,7 +242,6 @@ def same_bits(
         run_everywhere,
         run_on_board,
     )
-    from mambo_sil.cli.progress import progress_bar
 
     demand_port(port, baud)
     settings = load(source, scalar)

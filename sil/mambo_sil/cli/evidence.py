@@ -1,6 +1,7 @@
 """The commands of the panel Evidence: verify, regress, table2, report."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,17 +19,16 @@ from mambo_sil.cli.options import (
     show,
     show_result,
 )
-from mambo_sil.verify.check_list import CHECKS
+from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
+from mambo_sil.flight.names import PD_NAMES, PD_TITLES
+from mambo_sil.results.folders import SUMMARY, digests, new_results
+from mambo_sil.verify.check import CHECKS, CheckOutcome, Entry, Subject
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from mambo_codegen.settings.model import Settings
-    from mambo_sil.cli.progress import Bar
     from mambo_sil.experiment.campaign.campaign_flights import Row
     from mambo_sil.experiment.inputs import Entrant
     from mambo_sil.experiment.regress.suite_file import FlightSuite
-    from mambo_sil.verify.check_list import Entry
     from mambo_sil.verify.verify_report import Verified
 
 
@@ -55,11 +55,8 @@ def verify(
     """
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
-    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.results.build_folders import check_tmpdir
-    from mambo_sil.results.folders import SUMMARY, digests, new_results
     from mambo_sil.results.html_page import results_page
-    from mambo_sil.verify.check import CheckOutcome
     from mambo_sil.verify.verify_report import PAGE, VerifySummary, summarise
 
     settings = load(source, scalar)
@@ -83,7 +80,7 @@ def verify(
         raise typer.Exit(1)
 
 
-def _chosen_checks(only: str | None) -> "Sequence[Entry]":
+def _chosen_checks(only: str | None) -> Sequence[Entry]:
     """Return the checks that `only` names, in the registry's order; raises InvalidSettingsError."""
     if only is None:
         return CHECKS
@@ -96,11 +93,8 @@ def _chosen_checks(only: str | None) -> "Sequence[Entry]":
     return [entry for entry in CHECKS if entry.name in names]
 
 
-def _run_checks(
-    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar"
-) -> "list[Verified]":
+def _run_checks(chosen: Sequence[Entry], settings: "Settings", folder: Path, bar: Bar) -> "list[Verified]":
     """Run the checks one after the other, each in its own folder."""
-    from mambo_sil.verify.check import Subject
     from mambo_sil.verify.tools import versions
     from mambo_sil.verify.verify_report import Verified
 
@@ -162,8 +156,6 @@ def regress(
     )
     from mambo_sil.experiment.regress.suite_file import load_suite
     from mambo_sil.experiment.regress.suite_flights import demand_flyable
-    from mambo_sil.flight.names import PD_NAMES
-    from mambo_sil.results.folders import SUMMARY, digests, new_results
 
     place = f"--controller {echo(controller)}"
     entrant = load_entrant(controller, Path(), place)
@@ -193,7 +185,6 @@ def regress(
 
 def _fly_suite(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
     """Fly the suite on all processors; show the progress."""
-    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.regress.suite_flights import fly_suite
     from mambo_sil.flight.engine.engine_library import chosen_engine
@@ -229,17 +220,9 @@ def table2(
 
     For readers of the paper; nothing else needs it.
     """
-    from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.experiment.table2.table2 import (
-        PRESETS,
-        Table2Summary,
-        fly_table2,
-        judge_table2,
-    )
+    from mambo_sil.experiment.table2.table2 import PRESETS, Table2Summary, fly_table2, judge_table2
     from mambo_sil.experiment.table2.table2_plots import DRAWN, draw_figure3
-    from mambo_sil.flight.names import PD_TITLES
     from mambo_sil.flight.traces import write_npz
-    from mambo_sil.results.folders import new_results
 
     if sensors:
         _fly_with_sensors(output, scalar, as_json=as_json)
@@ -259,14 +242,7 @@ def table2(
 
 
 def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
-    from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.experiment.table2.sensed import (
-        PRESETS,
-        SensedSummary,
-        fly_sensed,
-        sensed_markdown,
-    )
-    from mambo_sil.results.folders import new_results
+    from mambo_sil.experiment.table2.sensed import PRESETS, SensedSummary, fly_sensed, sensed_markdown
 
     settings = {name: load(name, scalar) for name in PRESETS}
     with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
@@ -292,7 +268,6 @@ def report(
 
     To show results to somebody, or to keep them.
     """
-    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 

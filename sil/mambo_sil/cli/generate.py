@@ -9,14 +9,8 @@ import typer
 
 from mambo_codegen.bundle.targets import TARGETS, complete_targets, default_source, find_target
 from mambo_codegen.errors import DriftError, echo
-from mambo_sil.cli.options import (
-    AsJson,
-    OptionalSource,
-    Scalar,
-    complete_presets,
-    load,
-    output_option,
-)
+from mambo_codegen.settings.toml_file import PRESETS
+from mambo_sil.cli.options import AsJson, OptionalSource, Scalar, complete_presets, load, output_option
 
 if TYPE_CHECKING:
     from mambo_codegen.bundle.bundle import Changes, Drift
@@ -61,7 +55,6 @@ def generate(
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render, render_target
     from mambo_codegen.settings import controller_toml
-    from mambo_codegen.settings.toml_file import PRESETS
 
     if check and (force or dry_run):
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")

@@ -17,7 +17,10 @@ from mambo_sil.cli.options import (
     sensors_option,
     show_result,
 )
+from mambo_sil.cli.progress import counting_bar
+from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
+from mambo_sil.results.folders import SUMMARY
 
 if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_file import Campaign
@@ -65,7 +68,6 @@ def margins(
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES
     from mambo_sil.experiment.margins.margins_run import MarginSubject, measure
-    from mambo_sil.results.folders import SUMMARY
 
     if campaign is not None and uncertainty:
         raise typer.BadParameter("leave out one of the two", param_hint="--campaign, --uncertainty")
@@ -100,7 +102,6 @@ def _measure_drawn(
     subject: "MarginSubject", named: str, drawing: "Campaign", drones: int, output: Path | None
 ) -> "MarginsSummary":
     """Measure the first drones of a campaign, too; show the progress."""
-    from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.campaign_file import demand_flyable
     from mambo_sil.experiment.margins.many_drones import campaign_drones
     from mambo_sil.experiment.margins.margins_run import Many, measure
@@ -121,7 +122,6 @@ def _campaign(
 
     Its drone is `vehicle`, else the one that its file names, else `of_settings`, the one of the settings.
     """
-    from mambo_sil.errors import FlightError
     from mambo_sil.experiment.campaign import campaign_file
     from mambo_sil.flight.scenario import choose_sensors
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, UnwritableError, echo
 from mambo_codegen.settings.toml_file import BOARDS, PRESETS
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.flight.names import present_sensors
@@ -159,7 +159,6 @@ def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
 
     Raises InvalidSettingsError for settings of several drones, and what `vehicle_toml` raises.
     """
-    from mambo_codegen.errors import InvalidSettingsError
     from mambo_sil.drone.vehicles import vehicle_toml
 
     if vehicle is not None:
@@ -171,7 +170,7 @@ def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
     return vehicle_toml.load(named[0] if named else vehicle_toml.DEFAULT)
 
 
-def load_boards(names: "Sequence[str] | None") -> "Sequence[Board]":
+def load_boards(names: Sequence[str] | None) -> "Sequence[Board]":
     """Return the boards called `names`, each once, or every board for None."""
     from mambo_codegen import boards
 

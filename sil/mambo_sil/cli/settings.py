@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_codegen.errors import echo
+from mambo_codegen.errors import BuildError, echo
+from mambo_codegen.settings.toml_file import PRESETS
 from mambo_sil.cli.options import (
     VEHICLE_NAMES,
     AsJson,
@@ -27,12 +28,15 @@ from mambo_sil.cli.options import (
     show_result,
     write_file,
 )
+from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
+from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.errors import FlightError, StudyError
 from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind, TargetAcceleration
+from mambo_sil.results.folders import SUMMARY, create_folder, lock, new_results
 from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
     from mambo_codegen.settings.model import Settings
-    from mambo_sil.cli.progress import Bar
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
     from mambo_sil.model.tune.tuning_report import TuneSummary
 
@@ -42,8 +46,6 @@ def list_presets(as_json: AsJson = False) -> None:
 
     To choose the settings to start from.
     """
-    from mambo_codegen.settings.toml_file import PRESETS
-
     described = {name: PRESETS.description(name) for name in PRESETS.names()}
     if as_json:
         typer.echo(json.dumps(described, indent=2))
@@ -76,7 +78,6 @@ def vehicles(
 
     When you describe a drone of your own.
     """
-    from mambo_sil.drone.vehicles import VEHICLES
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
     if name is not None and (schema or as_json):
@@ -142,7 +143,6 @@ def identify(
         return
     if not logs:
         raise typer.BadParameter("name a flight log, or --manoeuvre FILE", param_hint="LOG...")
-    from mambo_sil.cli.progress import progress_bar
     from mambo_sil.model.identify.columns import parse_columns
     from mambo_sil.model.identify.curves import curves_csv
     from mambo_sil.model.identify.identify import identify as fit
@@ -150,7 +150,6 @@ def identify(
     from mambo_sil.model.identify.identify_plots import draw_fit
     from mambo_sil.model.identify.identify_record import CURVES, MODEL, PICTURES, VEHICLE, IdentifySummary
     from mambo_sil.model.identify.identify_report import model_text, vehicle_text
-    from mambo_sil.results.folders import SUMMARY, new_results
 
     chosen = parse_columns(columns)
     with progress_bar("reading") as bar:
@@ -234,8 +233,6 @@ def _print_judgement(settings: "Settings", drone: "VehicleFile") -> bool:
 
     Margins of what does not fly well are printed only if they say why. Without a compiler say so.
     """
-    from mambo_codegen.errors import BuildError
-    from mambo_sil.errors import FlightError
     from mambo_sil.model.derive.derived_flight import fly_derived
     from mambo_sil.model.derive.derived_margins import judge_margins
 
@@ -277,13 +274,10 @@ def tune(
 
     When the settings of `design` are not good enough, and an hour of search is worth it.
     """
-    from mambo_sil.cli.progress import counting_bar
-
     with counting_bar("starting", "trials", trials) as bar:
         count = workers or os.cpu_count() or 1
         summary = _tune(source, vehicle, output, trials, bar, workers=count, storage=storage)
     from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT
-    from mambo_sil.results.folders import SUMMARY
 
     written = (CONTROLLER, f"{FRONT}.csv", f"{FRONT}.png", f"{FRONT}.svg", SUMMARY)
     show_result(summary, output, written, as_json=as_json)
@@ -294,19 +288,17 @@ def _tune(
     vehicle: str | None,
     output: Path,
     trials: int,
-    bar: "Bar",
+    bar: Bar,
     *,
     workers: int,
     storage: str | None,
 ) -> "TuneSummary":
     """Run the missing trials and write the results; if interrupted print how many are finished."""
-    from mambo_sil.errors import StudyError
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.campaign.store import claim, convert_os_errors
     from mambo_sil.model.tune import tuning_file
     from mambo_sil.model.tune.study import demand_optuna, finished_trials, open_study, owner_of, search
     from mambo_sil.model.tune.tuning_report import finish
-    from mambo_sil.results.folders import create_folder, lock
 
     tuning = tuning_file.default(vehicle) if source is None else tuning_file.read(source, vehicle)
     demand_optuna()
@@ -357,10 +349,8 @@ def diff(
     After a change of settings: what it does to the flight before you fly it.
     """
     from mambo_codegen.settings import presets
-    from mambo_sil.cli.progress import progress_bar
     from mambo_sil.experiment.compare.compare import compare
     from mambo_sil.experiment.compare.diff_record import PICTURES
-    from mambo_sil.results.folders import SUMMARY
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:

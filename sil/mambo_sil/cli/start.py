@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mambo_codegen.errors import echo
+from mambo_codegen.settings.toml_file import PRESETS
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
@@ -19,6 +20,7 @@ from mambo_sil.cli.options import (
     show,
     write_file,
 )
+from mambo_sil.cli.progress import progress_bar
 from mambo_sil.results.terminal import sentence
 
 
@@ -37,7 +39,6 @@ def init(
     To begin with settings of your own.
     """
     from mambo_codegen.settings import controller_toml, presets
-    from mambo_codegen.settings.toml_file import PRESETS
 
     text = controller_toml.to_toml(presets.preset(preset), PRESETS.description(preset))
     if write_file(text, output, force=force):
@@ -77,7 +78,6 @@ def playground(
 
     To see how controllers fly before you read a figure.
     """
-    from mambo_sil.cli.progress import progress_bar
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
     from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.results.html_page import new_page

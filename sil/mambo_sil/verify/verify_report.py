@@ -14,8 +14,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.results.blocks import CommandResult, Details, Facts, Listing, Note, ResultTable
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.summary import ReportedSummary
-from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.check_list import CHECKS
+from mambo_sil.verify.check import CHECKS, CheckOutcome
 
 PAGE: Final = "verify.html"
 

@@ -11,7 +11,6 @@
 #include "debug.h"
 #include "estimator.h"
 #include "log.h"
-#include "loops.h"
 #include "param.h"
 #include "power_distribution.h"
 #include "set_points.h"

@@ -1,11 +1,11 @@
 /* The firmware's PID controller, as its documentation describes it: angle and rate loops at 500 Hz, position and velocity loops
  * at 100 Hz, with the gains of the Crazyflie 2.1. */
-#include "loops.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "controller_pid.h"
+#include "set_points.h"
 
 #define TICKS_PER_ATTITUDE 2U
 #define TICKS_PER_POSITION 10U

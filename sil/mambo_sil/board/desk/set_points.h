@@ -31,4 +31,7 @@ enum trajectory_state set_points_state(void);
 /* Write the present set-point. */
 void set_points_now(setpoint_t *setpoint, const state_t *state, uint32_t now_ms);
 
+/* Write what the firmware's loops ask of the motors, as shares of the most (`loops.c`). */
+void mix(const control_t *control, double motors[4]);
+
 #endif

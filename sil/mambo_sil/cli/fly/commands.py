@@ -23,9 +23,11 @@ from mambo_sil.cli.options import (
     output_option,
     show_result,
 )
+from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
+from mambo_sil.errors import FlightError
+from mambo_sil.results.folders import SUMMARY, new_results
 
 if TYPE_CHECKING:
-    from mambo_sil.cli.progress import Bar
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
 
 
@@ -84,14 +86,12 @@ def campaign(
     """
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
-    from mambo_sil.cli.progress import counting_bar
 
     with counting_bar("starting", "flights", flights) as bar:
         summary = _fly_campaign(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
     from mambo_sil.experiment.campaign.campaign_records import RECORDS
     from mambo_sil.experiment.campaign.campaign_report import PICTURE
     from mambo_sil.experiment.campaign.store import TABLE
-    from mambo_sil.results.folders import SUMMARY
 
     files = (TABLE, SUMMARY, f"{PICTURE}.png", f"{PICTURE}.svg", f"{RECORDS}/")
     show_result(summary, output, files, as_json=as_json)
@@ -102,7 +102,7 @@ def _fly_campaign(
     vehicle: str | None,
     output: Path,
     flights: int,
-    bar: "Bar",
+    bar: Bar,
     *,
     workers: int | None,
     scheduler: str | None,
@@ -147,12 +147,9 @@ def faults(
 
     Before a first flight: what becomes of it if the state is lost, late, frozen or in other units.
     """
-    from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.errors import FlightError
     from mambo_sil.experiment.faults.fault_flights import fly_faults
     from mambo_sil.experiment.faults.faults_report import FaultsSummary, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
-    from mambo_sil.results.folders import new_results
 
     settings, drone = load(source, scalar), load_drone(vehicle, source)
     with new_results(output, FaultsSummary.command, FAULTS_FILES) as folder:
@@ -202,13 +199,7 @@ def replay(
     from mambo_sil.model.replay.log_replay import replay_log, write_curves
     from mambo_sil.model.replay.logged_inputs import SIGNALS
     from mambo_sil.model.replay.replay_plots import draw_replay
-    from mambo_sil.model.replay.replay_report import (
-        CURVES,
-        PICTURES,
-        LogReplaySummary,
-        summarise,
-    )
-    from mambo_sil.results.folders import SUMMARY, new_results
+    from mambo_sil.model.replay.replay_report import CURVES, PICTURES, LogReplaySummary, summarise
 
     settings = load(source, scalar)
     replayed = replay_log(log, parse_columns(columns, SIGNALS), settings)

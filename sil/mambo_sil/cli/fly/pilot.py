@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from mambo_sil.cli.fly.fly_options import CurveChoice, CurveRate, CurveSize, CurveTime
+from mambo_sil.cli.fly.fly_options import Course, CurveChoice, CurveRate, CurveSize, CurveTime
 from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show_result
+from mambo_sil.cli.progress import Bar, progress_bar
+from mambo_sil.errors import PilotError
+from mambo_sil.results.folders import new_results
 
 if TYPE_CHECKING:
-    from mambo_sil.cli.progress import Bar
     from mambo_sil.link.links import UdpLink
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.steering import Update
@@ -46,13 +48,9 @@ def pilot(
     Ctrl-C lands, a second one stops the motors. It has flown in simulation only.
     """
     from mambo_sil.api.api_controller import Controller
-    from mambo_sil.cli.fly.fly_options import Course
     from mambo_sil.cli.fly.one_flight import curve_of
-    from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.errors import PilotError
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.pilot_report import LOG, PilotSummary, write_log
-    from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
@@ -108,7 +106,7 @@ def _opener(
     return lambda: SimulatedLink(stack, drone)
 
 
-def _watch(bar: "Bar") -> "Callable[[Pilot], None]":
+def _watch(bar: Bar) -> "Callable[[Pilot], None]":
     """Return what shows the flight in a line."""
 
     def watch(flown: "Pilot") -> None:
