@@ -6,7 +6,6 @@ mode).
 """
 
 import math
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -178,30 +177,25 @@ def _send_estimate(mav: Any, estimate: EstimatedState, stream: Stream | None) ->
             )
 
 
-def _read_heartbeat(message: Any) -> Heartbeat:
-    return Heartbeat(
-        *(message.get_srcSystem(), message.get_srcComponent(), message.autopilot, message.type),
-        bool(message.base_mode & ARMED),
-        message.custom_mode,
-    )
-
-
-def _read_landed(message: Any) -> OnGround | None:
-    return OnGround(message.landed_state == ON_GROUND) if message.landed_state else None
-
-
-def _read_battery(message: Any) -> Battery | None:
-    return Battery(message.battery_remaining / 100.0) if message.battery_remaining >= 0 else None
-
-
-_READ: Final[dict[str, Callable[[Any], Record | None]]] = {
-    "HEARTBEAT": _read_heartbeat,
-    "PARAM_VALUE": lambda message: Parameter(message.param_id, message.param_value),
-    "COMMAND_ACK": lambda message: Answer(message.command, message.result == ACCEPTED),
-    "EXTENDED_SYS_STATE": _read_landed,
-    "SYS_STATUS": _read_battery,
-    "STATUSTEXT": lambda message: Text(message.text),
-}
+def _read_record(message: Any) -> Record | None:
+    """Return the record in a message, but for estimates; None for another one."""
+    found: Record | None = None
+    match message.get_type():
+        case "HEARTBEAT":
+            sender = message.get_srcSystem(), message.get_srcComponent()
+            armed = bool(message.base_mode & ARMED)
+            found = Heartbeat(*sender, message.autopilot, message.type, armed, message.custom_mode)
+        case "PARAM_VALUE":
+            found = Parameter(message.param_id, message.param_value)
+        case "COMMAND_ACK":
+            found = Answer(message.command, message.result == ACCEPTED)
+        case "EXTENDED_SYS_STATE" if message.landed_state:
+            found = OnGround(message.landed_state == ON_GROUND)
+        case "SYS_STATUS" if message.battery_remaining >= 0:
+            found = Battery(message.battery_remaining / 100.0)
+        case "STATUSTEXT":
+            found = Text(message.text)
+    return found
 
 
 class RecordReader:
@@ -216,8 +210,7 @@ class RecordReader:
 
     def read(self, message: Any) -> Record | None:
         """Return the record in a message; None for one that is of no use."""
-        read = _READ.get(message.get_type())
-        return self._estimate(message) if read is None else read(message)
+        return _read_record(message) or self._estimate(message)
 
     def _estimate(self, message: Any) -> EstimatedState | None:
         match message.get_type():

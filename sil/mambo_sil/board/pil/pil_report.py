@@ -33,6 +33,11 @@ class Spread(BaseModel):
         """Return the spread of `values`."""
         return cls(least=min(values), median=statistics.median(values), most=max(values))
 
+    @property
+    def milliseconds(self) -> str:
+        """Least, median and most, of times in s."""
+        return " / ".join(f"{1e3 * value:.3g}" for value in (self.least, self.median, self.most))
+
 
 class EmulatedCount(BaseModel):
     """Instructions of a step on an emulated core, over the flight that `footprint` counts."""
@@ -111,8 +116,7 @@ class BoardFlightSummary(FlySummary):
             rows.append(("emulated", emulated_text(self)))
         rows.append(("stack of a step", f"{self.stack_bytes} B"))
         if trip is not None:
-            milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
-            rows.append(("request to reply", f"{milliseconds} ms"))
+            rows.append(("request to reply", f"{trip.milliseconds} ms"))
         if self.real_time is not None:
             rows += zip(("real time", "", ""), real_time_text(self.real_time, self.steps), strict=True)
         rows.append(("link", link_text(self)))
@@ -215,11 +219,9 @@ def real_time_text(timed: RealTime, steps: int) -> list[str]:
     if timed.wall_period_s is not None:
         clock += f", {1e3 * timed.wall_period_s:.6g} ms of this machine's"
         clock += "" if timed.clocks_agree else ": THE CLOCKS DISAGREE"
-    spread = (timed.delay_s.least, timed.delay_s.median, timed.delay_s.most)
-    delay = " / ".join(f"{1e3 * value:.3g}" for value in spread)
     return [
         clock,
-        f"called {delay} ms after the end of a period (least, median, most)",
+        f"called {timed.delay_s.milliseconds} ms after the end of a period (least, median, most)",
         f"{timed.late_inputs} of {made} steps with late inputs, {timed.lost_replies} replies lost, "
         f"{timed.overruns} periods without a step",
     ]

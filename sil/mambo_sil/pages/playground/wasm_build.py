@@ -33,7 +33,6 @@ LIMIT_CALLS: Final = ("nmpc_default_limits", "nmpc_host_set_limits", "nmpc_host_
 _FLAGS: Final = (*COMPILE_FLAGS, "--target=wasm32", "-ffreestanding", "-nostdlib", "-Wl,--no-entry")
 _UNUSED: Final = ("evaluation.c", "faults.c")
 """No page evaluates flights, or injects faults, whose C wants the standard library."""
-_INCLUDES: Final = ("-I.",)
 
 
 def module(one: PageController) -> bytes:
@@ -41,7 +40,7 @@ def module(one: PageController) -> bytes:
     files, calls, step = program(one)
     exports = [f"-Wl,--export={name}" for name in calls]
     units = sorted(path for path in files if path.endswith(".c"))
-    arguments = [*_FLAGS, *_INCLUDES, f"-DCONTROLLER={step}", *exports, *units, "-o", "drone.wasm"]
+    arguments = [*_FLAGS, "-I.", f"-DCONTROLLER={step}", *exports, *units, "-o", "drone.wasm"]
     compiler = _compiler()
 
     def build(folder: Path) -> Path:
