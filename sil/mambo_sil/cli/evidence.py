@@ -21,6 +21,7 @@ from mambo_sil.cli.options import (
 )
 from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
+from mambo_sil.results.build_folders import check_tmpdir
 from mambo_sil.results.folders import SUMMARY, digests, new_results
 from mambo_sil.verify.check import CHECKS, CheckOutcome, Entry, Subject
 
@@ -55,7 +56,6 @@ def verify(
     """
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
-    from mambo_sil.results.build_folders import check_tmpdir
     from mambo_sil.results.html_page import results_page
     from mambo_sil.verify.verify_report import PAGE, VerifySummary, summarise
 

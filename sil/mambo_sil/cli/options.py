@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, UnwritableError, echo
+from mambo_codegen.plain_file import find_obstacle
 from mambo_codegen.settings.toml_file import BOARDS, PRESETS
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.flight.names import present_sensors
+from mambo_sil.results.terminal import result_text
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
@@ -123,9 +126,6 @@ def write_file(text: str, output: Path, *, force: bool) -> bool:
 
     Raises FileExistsRefusedError unless `force`, UnwritableError.
     """
-    from mambo_codegen.atomic import put
-    from mambo_codegen.plain_file import find_obstacle
-
     if str(output) == "-":
         typer.echo(text, nl=False)
         return False
@@ -192,8 +192,6 @@ def show_result(
     summary: "ReportedSummary", folder: Path | None, files: Sequence[str] = (), *, as_json: bool
 ) -> None:
     """Print `summary` as JSON, or its result as text, and the `files` written into `folder`, if any."""
-    from mambo_sil.results.terminal import result_text
-
     show(summary, result_text(summary.result(folder or Path())), as_json=as_json)
     if folder is not None and files:
         typer.echo(f"{echo(str(folder))}: {', '.join(files)}", err=True)

@@ -226,10 +226,6 @@ def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) 
     )
 
 
-def _modelled(footprint: Footprint) -> CycleCounts | None:
-    return None if footprint.counts is None else footprint.counts.cycles
-
-
 def _board(footprint: Footprint) -> BoardFootprint:
     return BoardFootprint(
         name=footprint.board.name,
@@ -245,7 +241,7 @@ def _board(footprint: Footprint) -> BoardFootprint:
         instance_bytes=footprint.instance_bytes,
         stack_path=() if footprint.stack is None else footprint.stack.path,
         instructions=footprint.counts,
-        cycles=_modelled(footprint),
+        cycles=None if footprint.counts is None else footprint.counts.cycles,
         cycles_source=footprint.cycles_source,
         cycles_estimate=footprint.cycles,
         time_s_estimate=footprint.time_s,
