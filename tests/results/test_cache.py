@@ -12,11 +12,11 @@ import pytest
 from mambo_codegen.errors import BuildError, CacheError
 from mambo_codegen.toolchain import Toolchain
 from mambo_codegen.user_cache import cache_folder
+from mambo_sil.results.build_folders import build_cached
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.tools import require, toolchain
 
 pytestmark = pytest.mark.usefixtures("empty_cache")
-from mambo_sil.results.build_folders import build_cached
 
 
 def make(folder: Path) -> Path:
