@@ -20,16 +20,18 @@ from mambo_sil.errors import StudyError
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.store import claim
 from mambo_sil.model.tune import tuning_file
-from mambo_sil.model.tune.front import IAE_ALLOWANCE, choose, pareto_front
 from mambo_sil.model.tune.study import (
     CRASH_ERROR_M,
     DRAWN_AT_RANDOM,
+    IAE_ALLOWANCE,
     ROUND,
     FinishedTrial,
+    choose,
     finished_trials,
     judge,
     open_study,
     owner_of,
+    pareto_front,
     propose,
     search,
 )

@@ -42,6 +42,11 @@ CRASH_ERROR_M: Final = 10.0
 
 DATABASE: Final = "study.db"
 
+IAE_ALLOWANCE: Final = 1.1
+"""Bound on the IAE of the chosen point, relative to the least IAE found."""
+RULE: Final = "the least command variation with an IAE within 10 % of the least found"
+"""How the point is chosen; stands in controller.toml."""
+
 _NAME: Final = "tuned"
 _OWNER: Final = "folder"
 _SEED_BYTES: Final = 8
@@ -174,6 +179,20 @@ def finished_trials(study: "Study") -> list[FinishedTrial]:
         for one in study.get_trials(deepcopy=False)
         if one.state.name == "COMPLETE"
     ]
+
+
+def pareto_front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
+    """Return the Pareto-optimal trials in IAE and command variation, sorted by IAE."""
+    front: list[FinishedTrial] = []
+    for trial in sorted(trials, key=lambda one: (one.iae_m_s, one.command_variation_rad, one.number)):
+        if not front or trial.command_variation_rad < front[-1].command_variation_rad:
+            front.append(trial)
+    return front
+
+
+def choose(front: Sequence[FinishedTrial]) -> FinishedTrial:
+    """Return the point of a front, which is sorted by IAE, according to `RULE`."""
+    return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
 
 
 def propose(tuning: Tuning, study: "Study", owner: str) -> "FrozenTrial":

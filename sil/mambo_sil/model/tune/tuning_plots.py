@@ -5,8 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mambo_sil.model.tune.front import choose, pareto_front
-from mambo_sil.model.tune.study import FinishedTrial
+from mambo_sil.model.tune.study import FinishedTrial, choose, pareto_front
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import COLUMN_INCHES, DOT, FLOWN, INK, SKY, VERMILION, style
 

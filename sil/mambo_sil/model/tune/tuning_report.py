@@ -1,16 +1,18 @@
-"""The record of a study: its result, and the summary in its folder."""
+"""The record of a study: its result, and the files in its folder."""
 
+import csv
+import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from mambo_codegen.atomic import put
+from mambo_codegen.settings import controller_toml
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.store import convert_os_errors
-from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv, pareto_front
-from mambo_sil.model.tune.study import FinishedTrial, study_name
+from mambo_sil.model.tune.study import RULE, FinishedTrial, choose, pareto_front, study_name
 from mambo_sil.model.tune.tuning_file import Tuning, round_value
 from mambo_sil.results.blocks import CommandResult, Details, Facts, ResultTable, Sentence
 from mambo_sil.results.folders import SUMMARY
@@ -107,3 +109,28 @@ def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> Tun
 
 def _rounded(trial: FinishedTrial) -> FinishedTrial:
     return replace(trial, values={path: round_value(value) for path, value in trial.values.items()})
+
+
+def front_csv(front: Sequence[FinishedTrial]) -> str:
+    """Return the front as CSV, one line per trial; `chosen` is 1 for the chosen one."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    keys = list(front[0].values)
+    writer.writerow(["trial", "chosen", "iae_m_s", "command_variation_rad", "crashed", *keys])
+    best = choose(front)
+    for one in front:
+        found = (one.number, int(one is best), one.iae_m_s, one.command_variation_rad, one.crashed)
+        writer.writerow([*found, *(round_value(one.values[key]) for key in keys)])
+    return text.getvalue()
+
+
+def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial]) -> str:
+    """Return the controller.toml of the chosen trial; its head names study, trial and result."""
+    best, flight = choose(pareto_front(trials)), tuning.file.flight
+    title = (
+        f"Found by mambo-nmpc tune: trial {best.number} of {len(trials)} in study {study_name(tuning)}, seed "
+        f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} random flights of {flight.duration_s:g} s "
+        f"on {flight.trajectory.text()}, sensors {flight.sensors}: mean IAE {best.iae_m_s:.4g} m s, command "
+        f"variation {best.command_variation_rad:.4g} rad an update, {best.crashed} crashed."
+    )
+    return controller_toml.to_toml(tuning.settings(best.values), title)
