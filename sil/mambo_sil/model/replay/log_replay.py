@@ -2,9 +2,9 @@
 
 import csv
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,25 @@ from mambo_sil.errors import ResultsError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.replay.logged_inputs import LoggedInputs, read_inputs
-from mambo_sil.model.replay.lost_inputs import AHEAD, BLOCK, LostInputs
-from mambo_sil.model.replay.stepping import begin, step
 
 AXES: Final = ("roll", "pitch")
 CURVE_COLUMNS: Final = ("time_s", *(f"{axis}_{kind}_rad" for kind in ("logged", "replayed") for axis in AXES))
 
 SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
+
+BLOCK: Final = 100
+"""Updates whose lost states are estimated at once."""
+AHEAD: Final = 50
+"""Further updates whose commands are read for that."""
+ESTIMATED: Final = 4
+"""Numbers of a state: position and velocity along x and y. Angles and height are slower, and interpolated."""
+COMMAND_NOISE_RAD: Final = 2e-5
+"""Standard deviation of what the model leaves of a command."""
+
+_UPWARDS: Final = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+_LEVEL: Final = [0, 1, 3, 4, 6]
+"""A jump with the height upwards, and the columns of one without."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +88,11 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     replayed_rad, status = np.zeros_like(inputs.command_rad), np.zeros(len(there), np.int64)
     for first, end, last in blocks:
         if inputs.begins[first]:
-            begin(controller, inputs, first)
+            _begin(controller, inputs, first)
         if lost is not None:
             state = lost.estimate(first, last, controller, state)
         for k in range(first, end):
-            done = step(controller, inputs, k, state[k : k + 1])
+            done = _step(controller, inputs, k, state[k : k + 1])
             replayed_rad[k], status[k] = done.command_rad[0], done.status[0]
     return LogReplay(
         time_s=inputs.time_s[there],
@@ -117,6 +128,96 @@ def _settled(inputs: LoggedInputs) -> NDArray[np.bool_]:
     begins[np.flatnonzero(inputs.is_logged)[0]] = True
     latest_s = np.maximum.accumulate(np.where(begins, time_s, -np.inf))
     return np.asarray(time_s - latest_s >= SETTLING_S)
+
+
+class LostInputs:
+    """Estimates the states that a log has lost from the commands that it has, block by block.
+
+    The controller itself is the model: its commands behind a lost row depend on the position and velocity
+    that it read there. A batch of controllers, each with one of these numbers changed, gives the slopes, and
+    least squares the numbers; how well a row between two others is interpolated is their prior.
+    """
+
+    def __init__(self, inputs: LoggedInputs, settings: Settings, most: int) -> None:
+        """Take a log that has lost `most` updates in the worst block."""
+        self._inputs = inputs
+        self._batch = CompiledController(settings, 1 + ESTIMATED * most)
+        self._deviation = _deviation(inputs)
+
+    def estimate(self, first: int, end: int, controller: CompiledController, state: FloatArray) -> FloatArray:
+        """Return `state` (k, n) with the lost rows of first..end - 1 and of what follows estimated.
+
+        No update but the first of these may begin anew; `controller` is as before the first, and stays so.
+        """
+        inputs, batch = self._inputs, self._batch
+        lost = first + np.flatnonzero(~inputs.is_logged[first:end])
+        count = ESTIMATED * len(lost)
+        if not count:
+            return state
+        batch.instances[:] = controller.instances
+        changes = dict(zip(lost.tolist(), np.arange(count).reshape(-1, ESTIMATED), strict=True))
+        commands = []
+        for k in range(first, end):
+            states = np.repeat(state[k : k + 1], batch.n, axis=0)
+            if k in changes:
+                states[1 + changes[k], np.arange(ESTIMATED)] += self._deviation[k]
+            commands.append(_step(batch, inputs, k, states).command_rad[: 1 + count])
+        there = inputs.is_logged[first:end]
+        found = np.asarray(commands, np.float64)[there]
+        slopes = (found[:, 1:] - found[:, :1]).transpose(0, 2, 1).reshape(-1, count) / COMMAND_NOISE_RAD
+        left = (inputs.command_rad[first:end][there] - found[:, 0]).reshape(-1) / COMMAND_NOISE_RAD
+        change = np.linalg.solve(slopes.T @ slopes + np.eye(count), slopes.T @ left)
+        estimated = state.copy()
+        estimated[lost, :ESTIMATED] += change.reshape(-1, ESTIMATED) * self._deviation[lost]
+        return estimated
+
+
+def _deviation(inputs: LoggedInputs) -> FloatArray:
+    """Return the standard deviations (k, 4) of interpolated positions and velocities.
+
+    They are those of rows that are there from the mean of the rows beside them, times the distance to the
+    next row that is there.
+    """
+    there, state = inputs.is_logged, inputs.state[:, :ESTIMATED]
+    middle = there[:-2] & there[1:-1] & there[2:]
+    error = (state[1:-1] - 0.5 * (state[:-2] + state[2:]))[middle]
+    spread = np.sqrt((error * error).mean(axis=0)) if len(error) else np.zeros(ESTIMATED)
+    rows, places = np.arange(len(there)), np.flatnonzero(there)
+    after = places[np.minimum(np.searchsorted(places, rows), len(places) - 1)]
+    before = places[np.maximum(np.searchsorted(places, rows, side="right") - 1, 0)]
+    distance = np.minimum(np.abs(after - rows), np.abs(rows - before))
+    return np.asarray(np.maximum(spread, 1e-6) * distance[:, np.newaxis])
+
+
+def _step(controller: CompiledController, inputs: LoggedInputs, k: int, states: FloatArray) -> Any:
+    """Step n controllers at update `k` with `states` (n, m); return their step.
+
+    A controller with a quadratic cost is told which command the log says was sent, so that an error of one
+    command is none of the next ones.
+    """
+    n, settings = len(states), controller.settings
+    commands_thrust = settings.height is not None
+    if inputs.jump[k].any():
+        change = inputs.jump[k] * _UPWARDS if commands_thrust else inputs.jump[k][_LEVEL]
+        controller.shift(np.repeat(change[np.newaxis], n, axis=0))
+    target = np.repeat(inputs.target[k : k + 1], n, axis=0)
+    if inputs.shift[k].any():
+        controller.shift(np.repeat(inputs.shift[k : k + 1], n, axis=0))
+    done = controller.step(states, target, None if commands_thrust else np.repeat(inputs.thrust_m_s2[k], n))
+    sent = np.repeat(inputs.command_rad[k : k + 1], n, axis=0)
+    if inputs.levelled[k]:
+        sent = np.zeros_like(sent)
+        done = replace(done, command_rad=sent.astype(done.command_rad.dtype))
+    if settings.cost.norm == "quadratic" and (inputs.is_logged[k] or inputs.levelled[k]):
+        controller.set_command(np.column_stack([sent, done.thrust_m_s2]) if commands_thrust else sent)
+    return done
+
+
+def _begin(controller: CompiledController, inputs: LoggedInputs, k: int) -> None:
+    """Reset a controller to what it began with at update `k`: the attitude, with a height the thrust."""
+    held = inputs.start_rad[k : k + 1]
+    commands_thrust = controller.settings.height is not None
+    controller.reset(np.column_stack([held, inputs.start_m_s2[k : k + 1]]) if commands_thrust else held)
 
 
 def write_curves(replay: LogReplay, path: Path) -> None:
