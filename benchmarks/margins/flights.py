@@ -21,8 +21,8 @@ from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
 from mambo_sil.experiment.inputs import Entrant
-from mambo_sil.experiment.margins.axis_margins import Margins
-from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.axis_margins import Margins, measure_loops
+from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.flight.scenario import flight_of
 
 FOLDER: Final = Path("build/margins")

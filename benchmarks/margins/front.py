@@ -26,7 +26,8 @@ from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
 from mambo_sil.experiment.inputs import Entrant
-from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.axis_margins import measure_loops
+from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.results.pictures import save

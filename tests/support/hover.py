@@ -13,10 +13,10 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import Link
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.experiment.margins.axis_margins import measure_loops
 from mambo_sil.experiment.margins.controller_jacobian import linear_controller
 from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians
-from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, SENT, PeriodicLoop, choose
-from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, SENT, PeriodicLoop, choose, hover_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
 from mambo_sil.flight.engine.simulate import fly

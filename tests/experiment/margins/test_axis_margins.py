@@ -17,6 +17,7 @@ from mambo_sil.experiment.margins.axis_margins import (
     frequencies,
     measure_axis,
     measure_height,
+    measure_loops,
     measure_poles,
 )
 from mambo_sil.experiment.margins.hover_loop import (
@@ -28,10 +29,11 @@ from mambo_sil.experiment.margins.hover_loop import (
     SEEN_OF,
     SENT,
     TURNING,
+    Loops,
     PeriodicLoop,
     choose,
+    hover_loops,
 )
-from mambo_sil.experiment.margins.hover_margins import Loops, hover_loops, measure_loops
 from mambo_sil.experiment.margins.loop_margins import sensitivity
 from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.flight.loop import Flight

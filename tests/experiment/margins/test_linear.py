@@ -14,8 +14,7 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law, linear_controller
 from mambo_sil.experiment.margins.drone_jacobians import drone_jacobians, repeating_ticks
-from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, BY_PUSH, PLACE, SENT
-from mambo_sil.experiment.margins.hover_margins import hover_loops
+from mambo_sil.experiment.margins.hover_loop import AT_COMMAND, BY_PUSH, PLACE, SENT, hover_loops
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight

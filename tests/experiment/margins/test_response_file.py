@@ -11,7 +11,7 @@ import pytest
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.margins.axis_margins import AxisName, PlaceName
-from mambo_sil.experiment.margins.hover_margins import Loops, hover_loops
+from mambo_sil.experiment.margins.hover_loop import Loops, hover_loops
 from mambo_sil.experiment.margins.response_file import Curve, read_responses, responses, write_responses
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Hover

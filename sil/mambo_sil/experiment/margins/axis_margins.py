@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.experiment.margins.hover_loop import (
     AT_COMMAND,
     AT_MOTORS,
@@ -18,10 +19,12 @@ from mambo_sil.experiment.margins.hover_loop import (
     SEEN_OF,
     SENT,
     TURNING,
+    Loops,
     PeriodicLoop,
     choose,
 )
 from mambo_sil.experiment.margins.loop_margins import LoopMargins, measure_loop
+from mambo_sil.flight.loop import Flight
 from mambo_sil.results.summary import Number
 
 TiltName = Literal["roll", "pitch"]
@@ -140,6 +143,17 @@ def frequencies(loop: PeriodicLoop, update_period_s: float, count: int) -> tuple
     limits = math.pi / update_period_s, math.pi / loop.step_s
     updates, ticks = (np.geomspace(SLOWEST_RAD_S, limit, count) for limit in limits)
     return updates, ticks
+
+
+def measure_loops(loops: Loops, flight: Flight, *, count: int = 400) -> tuple[Margins, ...]:
+    """Return the margins of the loops of a drone of a flight, from `count` frequencies."""
+    motors = not isinstance(flight.vehicle.loop, FirstOrderDrone)
+    period_s = flight.update_period_s
+    tilts = tuple(
+        measure_axis(loop, name, period_s, motors=motors, count=count)
+        for name, loop in zip(TILT_AXES, loops, strict=False)
+    )
+    return (*tilts, *(measure_height(loop, period_s, count=count) for loop in loops[len(tilts) :]))
 
 
 def measure_axis(

@@ -1,14 +1,23 @@
 """Controller, link and drone as one periodic linear system: the closed loop of one axis at hover."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.experiment.margins.controller_jacobian import LinearController
-from mambo_sil.experiment.margins.drone_jacobians import DroneJacobians, Signals
+from mambo_sil.experiment.margins.controller_jacobian import LinearController, linear_controller
+from mambo_sil.experiment.margins.drone_jacobians import (
+    LEVEL_AXES,
+    DroneJacobians,
+    Signals,
+    drone_jacobians,
+    hover_thrust_n,
+)
+from mambo_sil.flight.loop import Flight
 
 ComplexArray = NDArray[np.complex128]
 
@@ -71,6 +80,32 @@ class PeriodicLoop:
             state = self.transition[tick] @ state + self.inputs[tick] * turn
             turn = turn * z
         return np.asarray(answer, np.complex128)
+
+
+Loops = tuple[PeriodicLoop, ...]
+"""The loops of roll and pitch and, with a height, of the height."""
+
+
+def hover_loops(settings: Settings, flight: Flight) -> Iterator[Loops]:
+    """Yield the loops of a controller, whose law is linear, on each drone of a flight.
+
+    With a height the controller has learnt the thrust of hover of that drone.
+    Raises BuildError, CacheError.
+    """
+    commands_thrust, drone = settings.height is not None, flight.vehicle.drone
+    found = drone_jacobians(flight, LEVEL_AXES + commands_thrust)
+    loads = hover_thrust_n(flight.vehicle) / drone.weight_n if commands_thrust else 1.0
+    delays, loads = np.broadcast_arrays(flight.link.delay_ticks, loads, np.zeros(flight.flights))[:2]
+    controller = None if commands_thrust else linear_controller(settings)
+    for number, (delay_ticks, load) in enumerate(zip(delays.tolist(), loads.tolist(), strict=True)):
+        whole = close_loop(
+            controller or linear_controller(settings, load),
+            found.drone(number),
+            delay_ticks,
+            flight.ticks_per_update,
+            drone.step_s,
+        )
+        yield tuple(axis_loop(whole, found.signals, axis) for axis in range(found.signals.axes))
 
 
 def close_loop(

@@ -13,9 +13,9 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
-from mambo_sil.experiment.margins.axis_margins import HeightMargins, Margins, PlaceName
+from mambo_sil.experiment.margins.axis_margins import HeightMargins, Margins, PlaceName, measure_loops
 from mambo_sil.experiment.margins.corners import at_ends, corners, in_words, uncertain
-from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.experiment.margins.margins_record import ManyDrones, MarginSpread
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import SensorsName

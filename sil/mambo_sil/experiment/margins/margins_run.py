@@ -4,13 +4,14 @@ import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.experiment.margins.axis_margins import Margins
+from mambo_sil.experiment.margins.axis_margins import Margins, measure_loops
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law
-from mambo_sil.experiment.margins.hover_margins import NOT_SMOOTH, hover_loops, measure_loops
+from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.experiment.margins.many_drones import (
     MeasuredDrone,
     hovering_flight,
@@ -21,6 +22,13 @@ from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPON
 from mambo_sil.experiment.margins.response_file import responses, write_responses
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.results.folders import new_results
+
+NOT_SMOOTH: Final = (
+    "the law of a 1-norm follows the signs of slopes: its command is no smooth function of the state. "
+    "No linear margin describes it, and a describing function would hold for one amplitude and one kind of "
+    "motion only, so none is given"
+)
+"""Why a controller without a linear law has no margins."""
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from mambo_sil.experiment.margins.hover_loop import (
     SENT,
     TURNING,
     ComplexArray,
+    Loops,
     choose,
 )
-from mambo_sil.experiment.margins.hover_margins import Loops
 from mambo_sil.experiment.margins.loop_margins import sensitivity
 
 _FIRST_RAD_S: Final = 0.1
