@@ -15,7 +15,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.model.derive.chosen_tilt import chosen_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 
 ROOT: Final = Path(__file__).parents[2]
 

@@ -25,7 +25,7 @@ from mambo_sil.flight.metrics import height_error_m, measure
 from mambo_sil.flight.names import CurveName, TargetAcceleration
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
-from mambo_sil.model.derive.chosen_tilt import chosen_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 

@@ -13,7 +13,7 @@ from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import TargetAcceleration
-from mambo_sil.model.derive.chosen_tilt import chosen_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 
 
 @dataclass(frozen=True, eq=False)

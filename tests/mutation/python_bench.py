@@ -108,16 +108,19 @@ ROOMS: Final = {
         source=("sil/mambo_sil/model/derive/*.py",),
         tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "settings")),
         without=("derived_margins.py", "derived_flight.py", "chosen_tilt.py"),
+        without=("derived_margins.py", "derived_flight.py"),
     ),
     "design": Room(
         source=("sil/mambo_sil/model/derive/derived_margins.py",),
-        tests=("tests/model/derive/test_derived_margins.py",),
+        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("derived_margins", "missing_height")),
         longest_s=4.0,
     ),
     "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),
     "axes": Room(
         source=(f"{_MARGINS}/axis_margins.py",),
-        tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("axis_margins", "margin_figures")),
+        tests=tuple(
+            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("axis_margins", "height", "margin_figures")
+        ),
     ),
     "figures": Room(
         source=tuple(f"{_MARGINS}/{name}.py" for name in ("margin_figures", "margins_record")),
@@ -130,7 +133,8 @@ ROOMS: Final = {
     "hover": Room(
         source=(f"{_MARGINS}/hover_loop.py",),
         tests=tuple(
-            f"{_MARGIN_TESTS}/test_{name}.py" for name in ("hover_loop", "close_loop", "axis_margins")
+            f"{_MARGIN_TESTS}/test_{name}.py"
+            for name in ("hover_loop", "close_loop", "axis_margins", "height")
         ),
     ),
     "linear drones": Room(
@@ -142,14 +146,14 @@ ROOMS: Final = {
         tests=tuple(f"{_MARGIN_TESTS}/test_{name}.py" for name in ("linear", "height", "hover_loop")),
     ),
     "measured": Room(
-        source=tuple(f"{_MARGINS}/{name}.py" for name in ("hover_margins", "margins_run", "response_file")),
+        source=tuple(f"{_MARGINS}/{name}.py" for name in ("margins_run", "response_file")),
         tests=tuple(
             f"{_MARGIN_TESTS}/test_{name}.py"
             for name in ("response_file", "axis_margins", "height", "command")
         ),
     ),
     "derived flight": Room(
-        source=tuple(f"sil/mambo_sil/model/derive/{name}.py" for name in ("derived_flight", "chosen_tilt")),
+        source=("sil/mambo_sil/model/derive/derived_flight.py",),
         tests=("tests/model/derive/test_derived_flight.py",),
         longest_s=4.0,
     ),

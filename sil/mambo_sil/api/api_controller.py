@@ -39,7 +39,7 @@ from mambo_sil.flight.names import (
     SensorsKind,
     TargetAcceleration,
 )
-from mambo_sil.model.derive.chosen_tilt import chosen_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 
 LARGEST_N: Final = 1_000_000
 

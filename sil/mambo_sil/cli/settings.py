@@ -203,8 +203,8 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
-    from mambo_sil.model.derive.chosen_tilt import chosen_text
-    from mambo_sil.model.derive.missing_height import missing_height
+    from mambo_sil.model.derive.derived_flight import chosen_text
+    from mambo_sil.model.derive.derived_margins import missing_height
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
@@ -351,6 +351,8 @@ def diff(
     from mambo_codegen.settings import presets
     from mambo_sil.experiment.compare.compare import compare
     from mambo_sil.experiment.compare.diff_record import PICTURES
+    from mambo_sil.experiment.compare.diff_report import PICTURES
+    from mambo_sil.results.folders import SUMMARY
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:

@@ -16,9 +16,9 @@ from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.model.derive.chosen_tilt import chosen_text
 from mambo_sil.model.derive.derived_flight import (
     _fault,
+    chosen_text,
     flies_quick_circle,
     fly_derived,
     quick_rate_rad_s,

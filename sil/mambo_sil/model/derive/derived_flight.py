@@ -1,4 +1,4 @@
-"""A flight of derived settings on their drone: whether it takes its place and stays there calmly."""
+"""Flights of derived settings on their drone: whether it keeps its place calmly, and survives exact tilts."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from mambo_codegen.errors import BuildError
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -16,10 +18,11 @@ from mambo_sil.flight.crashes import first_crash
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.metrics import height_error_m
-from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.flight.names import SENSORS_OF, SensorsName, TargetAcceleration
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.flight.trajectories import Circle, Hover, Trajectory
+from mambo_sil.model.derive.derived_settings import controller_text, wants_exact
 
 DURATION_S: Final = 10.0
 JUDGED_S: Final = 5.0
@@ -130,3 +133,24 @@ def _fault(trace: Trace, drone: VehicleFile, axes: int) -> str | None:
 def _target_m(trace: Trace) -> FloatArray:
     """Return the targets (k, n, 3) in the world frame."""
     return np.concatenate([trace.target[..., :2], -trace.target_height_m[..., np.newaxis]], axis=-1)
+
+
+def chosen_text(
+    drone: VehicleFile,
+    source: str,
+    vehicle: str | None = None,
+    acceleration: TargetAcceleration = "tracked",
+) -> str:
+    """Return the controller.toml that `design` writes: see `controller_text`.
+
+    With the exact thrust vector if it is of use, and the drone survives a circle that is too quick for it.
+    Small angles stay without a compiler.
+    """
+    if wants_exact(drone, acceleration):
+        exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration)
+        try:
+            if flies_quick_circle(controller_toml.parse(exact, source), drone):
+                return exact
+        except BuildError:
+            pass
+    return controller_text(drone, source, vehicle, acceleration=acceleration)

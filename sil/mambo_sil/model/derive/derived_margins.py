@@ -1,4 +1,4 @@
-"""The margins of derived settings on their drone, and which of its properties is in the way of more."""
+"""The margins of derived settings on their drone, what is in the way of more, and why a height is missing."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,6 +23,9 @@ LEAST_DELAY_S: Final = 0.03
 """The same for the delay at the command."""
 
 Axes = Sequence[Margins]
+MORE_MASS, LESS_THRUST = 0.2, 0.05
+"""Shares by which a mass or a thrust differs from that in the file."""
+FIX: Final = "write [thrust] with lag_s and gain into its file"
 
 
 @dataclass(frozen=True)
@@ -119,3 +122,21 @@ def _without(drone: VehicleFile, *, height: bool) -> Iterator[tuple[str, Vehicle
     if drone.sensors.kind != "true":
         other = VehicleFile.model_validate(document | {"sensors": {"kind": "true"}})
         yield f"sensors.kind = {spell(drone.sensors.kind)}", other
+
+
+def missing_height(drone: VehicleFile) -> str:
+    """Return why the settings for a drone without `[height]` have none, and how far it then sinks.
+
+    Its altitude loop has no integral: a thrust that is missing is `altitude.p_n_m` times the sinking.
+    """
+    if drone.rotors is not None or drone.thrust is not None:
+        most_m_s2 = drone.largest_thrust_n / drone.body.mass_kg
+        return f"height: not in the settings, since the largest thrust, {most_m_s2:.3g} m/s^2, hardly climbs"
+    cost = ""
+    if gain_n_m := drone.altitude.p_n_m:
+        heavy_mm, weak_mm = (1e3 * share * drone.weight_n / gain_n_m for share in (MORE_MASS, LESS_THRUST))
+        cost = (
+            f"; by its altitude loop the drone sinks by {heavy_mm:.0f} mm under {100.0 * MORE_MASS:g} % more "
+            f"mass, by {weak_mm:.0f} mm with {100.0 * LESS_THRUST:g} % less thrust"
+        )
+    return f"height: not in the settings, since the thrust is not known{cost}: {FIX}"
