@@ -25,8 +25,7 @@ from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn
 from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_sil.experiment.campaign.store import FlightStore
 from mambo_sil.experiment.compare.compared_flights import EightAnswer, StepAnswer
-from mambo_sil.experiment.compare.diff_record import ControllerFigures, SettingDifference
-from mambo_sil.experiment.compare.diff_report import DiffSummary
+from mambo_sil.experiment.compare.diff_report import ControllerFigures, DiffSummary, SettingDifference
 from mambo_sil.experiment.faults.fault_flights import End, Verdict
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
 from mambo_sil.experiment.margins.axis_margins import AXES, AxisMargins, AxisName, NoiseGain, Poles

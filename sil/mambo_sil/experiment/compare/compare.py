@@ -10,8 +10,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.compare.compared_flights import Answers, answers
 from mambo_sil.experiment.compare.diff_plots import draw_steps
-from mambo_sil.experiment.compare.diff_record import PICTURES, differences, figures
-from mambo_sil.experiment.compare.diff_report import DiffSummary
+from mambo_sil.experiment.compare.diff_report import PICTURES, DiffSummary, differences, figures
 from mambo_sil.results.folders import new_results
 
 Side = tuple[str, Settings]
