@@ -11,7 +11,7 @@ import numpy as np
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.faults.fault import Fault
-from mambo_sil.experiment.faults.faults_in_c import native_faulty
+from mambo_sil.experiment.faults.injection import native_faulty
 from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, ffi, load, pointer
 from mambo_sil.flight.engine.native import Native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
