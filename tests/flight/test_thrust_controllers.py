@@ -12,7 +12,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.thrust_controller import ThrustController
+from mambo_sil.flight.controllers.thrust_controller import ThrustController, ThrustDelivery
 from mambo_sil.flight.engine.adjusted import Adjustment
 from mambo_sil.flight.engine.engine_library import load
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
@@ -20,7 +20,6 @@ from mambo_sil.flight.fences import with_limits
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
-from mambo_sil.flight.thrust_delivery import ThrustDelivery
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Hover
 from tests.support.engines import lanes_here

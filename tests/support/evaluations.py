@@ -8,7 +8,7 @@ import numpy as np
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
 from mambo_sil.flight.crashes import least_level
-from mambo_sil.flight.evaluation import Evaluation
+from mambo_sil.flight.engine.evaluate import Evaluation
 from mambo_sil.flight.loop import allocate_trace
 from mambo_sil.flight.metrics import Metrics
 from mambo_sil.flight.traces import Trace

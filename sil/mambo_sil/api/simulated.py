@@ -11,8 +11,8 @@ from mambo_sil.drone.plant.rigid_body import EULER, POSITION
 from mambo_sil.drone.plant.vehicle import Vehicle, truth
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
+from mambo_sil.flight.controllers.thrust_controller import ThrustDelivery
 from mambo_sil.flight.crashes import least_level
-from mambo_sil.flight.thrust_delivery import ThrustDelivery
 
 LOST_M = 100.0
 """A drone this far from the origin along any axis is lost."""

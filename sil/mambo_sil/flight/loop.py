@@ -35,6 +35,7 @@ from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.controllers.thrust_controller import (
+    ThrustDelivery,
     adapted,
     commands_thrust,
     has_preview,
@@ -42,7 +43,6 @@ from mambo_sil.flight.controllers.thrust_controller import (
 )
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
-from mambo_sil.flight.thrust_delivery import ThrustDelivery
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace
 from mambo_sil.flight.trajectories import Trajectory, is_spatial, vertical_of
 

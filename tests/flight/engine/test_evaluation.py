@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_toml import load as load_drone
-from mambo_sil.flight import evaluation
 from mambo_sil.flight.engine.engine_library import load
-from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled
+from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled, evaluate_numpy
 from mambo_sil.flight.traces import Trace
 from tests.support.engines import lanes_here
 from tests.support.evaluations import LIMIT_RAD, any_trace, bits, edges, edges_in_space, traces
@@ -20,7 +19,7 @@ from tests.support.tools import toolchain
 
 def expected(trace: Trace) -> str:
     """Evaluate in NumPy."""
-    return bits(evaluation.evaluate(trace, LIMIT_RAD, NOMINAL))
+    return bits(evaluate_numpy(trace, LIMIT_RAD, NOMINAL))
 
 
 @settings(max_examples=60)
@@ -64,7 +63,7 @@ def test_the_drone_and_the_limit_count() -> None:
     for name in ("mambo", "crazyflie"):
         drone = load_drone(name)
         found = evaluate(trace, 0.1, drone)
-        assert bits(found) == bits(evaluation.evaluate(trace, 0.1, drone))
+        assert bits(found) == bits(evaluate_numpy(trace, 0.1, drone))
         assert (found.saturated_share > evaluate(trace, LIMIT_RAD, drone).saturated_share).all()
 
 

@@ -9,7 +9,7 @@ The thrust is NaN where it is what the controller had commanded.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ from numpy.typing import NDArray
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+
+CAPPED_SHARE: Final = 1e-6
+"""A difference of this share of the weight is no rounding error: the thrust is another one than commanded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +105,30 @@ def hover_command(controller: Any) -> tuple[float, ...]:
         if commands_thrust(controller)
         else (0.0, 0.0)
     )
+
+
+class ThrustDelivery:
+    """The thrusts over the nominal mass that n drones get in an update period: a mixer may cap them."""
+
+    def __init__(self, drone: VehicleFile, flights: int) -> None:
+        self._mass_kg, self._least_n = drone.body.mass_kg, CAPPED_SHARE * drone.weight_n
+        self._flights = flights
+        self._begin()
+
+    def _begin(self) -> None:
+        self._ticks, self._sum_n = 0, np.zeros(self._flights)
+        self._capped = np.zeros(self._flights, np.bool_)
+
+    def note(self, wanted_n: FloatArray, given_n: FloatArray) -> None:
+        """Note the thrusts (n,) that arrived at a tick, and those that the motors were commanded."""
+        self._ticks += 1
+        self._sum_n = self._sum_n + given_n
+        self._capped |= np.abs(given_n - wanted_n) > self._least_n
+
+    def report(self) -> FloatArray:
+        """Return the mean since the last call (n,), NaN where the motors were commanded what arrived."""
+        reported = np.full(self._flights, np.nan)
+        if self._ticks:
+            reported = np.where(self._capped, self._sum_n / self._ticks / self._mass_kg, np.nan)
+        self._begin()
+        return reported

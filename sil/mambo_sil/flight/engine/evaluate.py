@@ -1,23 +1,41 @@
-"""Evaluate flights in the engine where there is a compiler, else in NumPy, with the same bits."""
+"""What campaigns, searches and suites want to know of each flight of a trace.
 
-from dataclasses import fields, replace
+The engine evaluates flights where there is a compiler, else NumPy, with the same bits.
+"""
+
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.flight import evaluation
-from mambo_sil.flight.crashes import LOW_TARGET_M, least_level
+from mambo_sil.flight.crashes import LOW_TARGET_M, detect_crashes, least_level
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.simulate import trace_record
-from mambo_sil.flight.evaluation import Evaluation
-from mambo_sil.flight.metrics import Metrics
+from mambo_sil.flight.metrics import Metrics, measure, saturated_share
 from mambo_sil.flight.traces import SensedTrace, Trace
 
 _METRICS: Final = tuple(field.name for field in fields(Metrics))
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The results of n flights."""
+
+    crashed: np.ndarray[Any, np.dtype[np.bool_]]
+    """Whether a drone crashed or was lost (n,)."""
+    refused: IntArray
+    """Updates whose inputs the controller refused (n,)."""
+    saturated_share: FloatArray
+    """Share of the commands with roll or pitch at the tilt limit (n,)."""
+    metrics: Metrics
+    """Metrics of the true flight."""
+    seen: Metrics | None
+    """Metrics of the flight as the estimates tell it; None without sensors."""
 
 
 def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
@@ -33,7 +51,7 @@ def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
             )
         except BuildError:  # the simulation has warned of it
             pass
-    return evaluation.evaluate(trace, limit_rad, drone)
+    return evaluate_numpy(trace, limit_rad, drone)
 
 
 def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
@@ -79,4 +97,15 @@ def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: Vehicl
         saturated_share=counts["saturated"] / updates,
         metrics=Metrics(*metrics.T),
         seen=None if seen is None else Metrics(*seen.T),
+    )
+
+
+def evaluate_numpy(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
+    """Evaluate flights in NumPy; arguments as of `evaluate`."""
+    return Evaluation(
+        crashed=detect_crashes(trace, drone),
+        refused=np.sum((trace.status != 0) & (trace.status != NOT_CALLED), axis=0),
+        saturated_share=saturated_share(trace.command_rad, limit_rad),
+        metrics=measure(trace),
+        seen=measure(trace.as_seen()) if isinstance(trace, SensedTrace) else None,
     )

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * What is computed of traces: sil/mambo_sil/flight/evaluation.py for a group of flights, in one pass over their samples.
+ * What is computed of traces: sil/mambo_sil/flight/engine/evaluate.py for a group of flights, in one pass
+ * over their samples.
  */
 #include "elementary.h"
 

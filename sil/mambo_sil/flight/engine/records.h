@@ -206,7 +206,7 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
                 const double *times_s, const double *targets, const engine_draws_t *draws,
                 engine_controller_t controller, void *self, int64_t stride, const engine_trace_t *trace);
 
-/* How a trace is evaluated: see sil/mambo_sil/flight/evaluation.py. */
+/* How a trace is evaluated: see sil/mambo_sil/flight/engine/evaluate.py. */
 typedef struct {
     int64_t flights;
     int64_t updates;

@@ -25,10 +25,10 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MixerName,
 )
 from mambo_sil.flight import altitude_loops
+from mambo_sil.flight.controllers.thrust_controller import CAPPED_SHARE
 from mambo_sil.flight.engine.engine_library import record_type
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, open_loop_updates, start_state
 from mambo_sil.flight.names import AltitudeName
-from mambo_sil.flight.thrust_delivery import CAPPED_SHARE
 
 Record = NDArray[Any]
 

@@ -15,9 +15,8 @@ from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.thrust_controller import adapted
-from mambo_sil.flight.engine.callback import called_back
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
-from mambo_sil.flight.engine.native import Native, is_native, native
+from mambo_sil.flight.engine.native import Native, called_back, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
 from mambo_sil.flight.loop import Flight, PositionController, allocate_trace
 from mambo_sil.flight.traces import Trace
