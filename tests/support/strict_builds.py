@@ -46,7 +46,7 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     opened = ffi.dlopen(str(folder / "bundle.so"))
     absent = {"_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"}
     if method_of(settings).limiting is None:
-        absent |= {"_host_set_limits", "_host_limits_active"}
+        absent |= {"_host_set_limits"}
     if settings.guard is None:
         absent |= {"_host_set_position_measured"}
     if settings.height is None:

@@ -175,7 +175,8 @@ class CompiledController:
 
         Raises ValueError without limits in the settings.
         """
-        self._demand_limits()
+        if self._method.limiting is None:
+            raise ValueError("the settings have no limits")
         quantities = setter_quantities(self._method, "set_limits")
         return self._set_each(self._library.nmpc_host_set_limits, limits, quantities)
 
@@ -190,14 +191,6 @@ class CompiledController:
         function = self._library.nmpc_host_set_position_measured
         function(self._controllers, self.n, _address(measured), ffi.cast("int *", _address(status)))
         return status.astype(np.int64)
-
-    @property
-    def limits_active(self) -> NDArray[np.int64]:
-        """What `nmpc_limits_active` returns (n,), an `ActiveLimit` each; raises ValueError without limits."""
-        self._demand_limits()
-        active = np.empty(self.n, np.intc)
-        self._library.nmpc_host_limits_active(self._controllers, self.n, ffi.cast("int *", _address(active)))
-        return active.astype(np.int64)
 
     def step(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
@@ -233,10 +226,6 @@ class CompiledController:
     def _demand_height(self) -> None:
         if not self._method.has_height:
             raise ValueError("the settings have no height")
-
-    def _demand_limits(self) -> None:
-        if self._method.limiting is None:
-            raise ValueError("the settings have no limits")
 
     def _native_set(
         self, name: str, values: ArrayLike, quantities: Sequence[str]

@@ -30,7 +30,6 @@ DECLARATIONS: Final = """
     void nmpc_host_set_thrust(void *controllers, int n, const void *thrust, int *status);
     void nmpc_host_last_thrust(const void *controllers, int n, void *thrust);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
-    void nmpc_host_limits_active(const void *controllers, int n, int *active);
     void nmpc_host_set_position_measured(void *controllers, int n, const void *is_measured, int *status);
     void nmpc_host_slew_heading(int n, const void *previous, const void *wanted, const void *most_change,
                                 void *next);
@@ -41,9 +40,8 @@ DECLARATIONS: Final = """
 """The functions that Python calls in a library: the glue, and one step of the self-test.
 
 nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost,
-nmpc_host_set_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits and
-nmpc_host_limits_active with limits, nmpc_host_set_position_measured with a guard.
-`ffi` is made from them.
+nmpc_host_set_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits with limits,
+nmpc_host_set_position_measured with a guard. `ffi` is made from them.
 """
 
 ffi: Final[Any] = controller_interface.ffi
