@@ -32,25 +32,23 @@ FREQUENCIES: Final = 120
 RESULTS: Final = ("crashed", "iae_m_s", "seen_iae_m_s", "seen_rms_error_m", "command_variation_rad")
 
 
-def _changed(**values: float) -> Settings:
+def settings_of(change: dict[str, float]) -> Settings:
+    """Return preset mambo with some other values."""
     settings = preset("mambo")
-    for key, value in values.items():
-        settings = with_option(settings, key.replace("__", "."), value)
+    for key, value in change.items():
+        settings = with_option(settings, key, value)
     return settings
 
 
 CONTROLLERS: Final[dict[str, Settings]] = {
     "mambo": preset("mambo"),
-    "no-feedback": _changed(damping__roll_rate_feedback_s=0.0),
-    "textbook": _changed(cost__velocity_weight_s=0.4, damping__roll_rate_feedback_s=0.03),
+    "no-feedback": settings_of({"damping.roll_rate_feedback_s": 0.0}),
+    "textbook": settings_of({"cost.velocity_weight_s": 0.4, "damping.roll_rate_feedback_s": 0.03}),
     "crazyflie": preset("crazyflie"),
 }
 """`textbook` has the margins at the command that textbooks ask for; `crazyflie` is made for another drone."""
-SIZES: Final = {
-    "default": {"mambo": 1000, "no-feedback": 300, "textbook": 300, "crazyflie": 300},
-    "slow": 300,
-}
-"""Drones of each campaign, by controller."""
+DRONES, MOST_DRONES = 300, 1000
+"""Drones of a campaign with a controller; the most are those of the default campaign with `mambo`."""
 
 
 def campaigns() -> dict[str, Campaign]:
@@ -60,8 +58,7 @@ def campaigns() -> dict[str, Campaign]:
 
 def size(campaign: str, controller: str) -> int:
     """Return how many drones of a campaign a controller flies."""
-    found = SIZES[campaign]
-    return found[controller] if isinstance(found, dict) else found
+    return MOST_DRONES if (campaign, controller) == ("default", "mambo") else DRONES
 
 
 def measure() -> None:

@@ -8,6 +8,7 @@ Seeds are of no other campaign. It continues where it was stopped.
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,14 +16,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from benchmarks.evidence.item import PAGES
-from benchmarks.margins.flights import BATCH, FOLDER, FREQUENCIES, SLOW_MOTORS
+from benchmarks.evidence.item import PICTURES
+from benchmarks.margins.flights import BATCH, FOLDER, FREQUENCIES, campaigns, settings_of
 from benchmarks.margins.report import RINGING_RAD
 from benchmarks.markdown import table
-from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_codegen.settings.presets import preset
-from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
 from mambo_sil.experiment.inputs import Entrant
@@ -42,7 +40,6 @@ MEASURED: Final = {"default": 30, "slow": 30}
 RESPONSE, WEIGHT = "cost.response_time_s", "cost.velocity_weight_s"
 ROLL, PITCH = "damping.roll_rate_feedback_s", "damping.pitch_rate_feedback_s"
 ACCELERATION, VELOCITY = "observer.acceleration_noise", "observer.velocity_noise"
-RAMP: Final = "horizon.ramp_s"
 CHANGES: Final[tuple[dict[str, float], ...]] = (
     {},
     {VELOCITY: 0.08, ROLL: 0.06},
@@ -61,20 +58,11 @@ CHANGES: Final[tuple[dict[str, float], ...]] = (
 """Settings that differ from those of preset mambo."""
 
 
-def settings_of(change: dict[str, float]) -> Settings:
-    """Return preset mambo with some other values."""
-    settings = preset("mambo")
-    for key, value in change.items():
-        settings = with_option(settings, key, value)
-    return settings
-
-
-def campaigns() -> dict[str, Campaign]:
+def own_campaigns() -> dict[str, Campaign]:
     """Return the default campaign and that of slow motors, with seeds of their own."""
-    found = {"default": campaign_file.default(), "slow": campaign_file.read(SLOW_MOTORS)}
     return {
-        name: Campaign(one.file.model_copy(update={"seed": SEEDS[name]}), one.entrants, one.drone)
-        for name, one in found.items()
+        name: replace(one, file=one.file.model_copy(update={"seed": SEEDS[name]}))
+        for name, one in campaigns().items()
     }
 
 
@@ -82,7 +70,7 @@ def measure() -> None:
     """Fly and measure the settings that are not in the file yet."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     done = [row["change"] for row in read()]
-    drawn = campaigns()
+    drawn = own_campaigns()
     for change in (one for one in CHANGES if one not in done):
         row = {"change": change} | {
             name: _judge(settings_of(change), one, FLIGHTS[name], MEASURED[name])
@@ -203,7 +191,7 @@ def write() -> None:
     """Print the table of docs/evidence/margins.md, and draw its picture."""
     rows = read()
     print(front_table(rows))
-    draw(rows, PAGES / "margin-front.png")
+    draw(rows, PICTURES / "margin-front.png")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from scipy.stats import spearmanr
 
-from benchmarks.evidence.item import PAGES
+from benchmarks.evidence.item import PICTURES
 from benchmarks.markdown import table
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.results.pictures import save
@@ -245,4 +245,4 @@ def write(folder: Path) -> None:
     found = {case: read(folder, *case) for case in CASES}
     for name, rows in (("outcomes", outcomes), ("ranks", ranks), ("tenths", tenths)):
         print(f"\n{name}\n\n{table(list(rows(found)))}")
-    draw(found, PAGES / "margins.png")
+    draw(found, PICTURES / "margins.png")
