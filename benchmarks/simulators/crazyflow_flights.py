@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-import jax.numpy as jnp
 import numpy as np
 from crazyflow.control.core import load_fn_params
 from crazyflow.control.mellinger import state2attitude
@@ -18,12 +17,11 @@ from scipy.spatial.transform import Rotation
 from benchmarks.simulators.crazyflow_worlds import (
     CRAZYFLIE,
     FITTED,
-    FREQ_HZ,
     SimulatedCrazyflie,
+    hold,
     noise,
     place,
     sight,
-    through,
 )
 from benchmarks.simulators.identified import LogRow, identified, manoeuvre
 from benchmarks.simulators.missions import (
@@ -36,7 +34,7 @@ from benchmarks.simulators.missions import (
     Score,
     cost_of,
 )
-from benchmarks.simulators.pilots import Challenger, Designed, Preset, Sight, SimulatorPilot
+from benchmarks.simulators.pilots import Challenger, Designed, Preset, Sight, SimulatorPilot, through
 from benchmarks.simulators.raptor_flights import MOTOR_N, fly_raptor
 from mambo_sil.api.frames import command_in_frame
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -121,7 +119,7 @@ def fly(
             rows = each * number, each * (number + 1)
             commands[step, slice(*rows)] = pilot.command(seen.rows(*rows), targets[step])
         force_n = world.mass_kg * mission.force_m_s2(float(time_s))
-        advance(simulation, commands[step], np.broadcast_to(force_n, (worlds, 3)))
+        hold(simulation.attitude_control, simulation, commands[step], np.broadcast_to(force_n, (worlds, 3)))
     return Flight3d(position_m, level), commands
 
 
@@ -156,15 +154,6 @@ def fly_rows(
     return fly(world, [Rows()], mission, [SEARCH_SEED] * CANDIDATES)
 
 
-def advance(simulation: Any, commands: FloatArray, force_n: FloatArray) -> None:
-    """Hold commands (w, 4) and forces (w, 3) for one step of the controllers."""
-    kind = simulation.data.states.pos.dtype
-    states = simulation.data.states.replace(force=jnp.asarray(force_n[:, np.newaxis], kind))
-    simulation.data = simulation.data.replace(states=states)
-    simulation.attitude_control(jnp.asarray(commands[:, np.newaxis], kind))
-    simulation.step(round(FREQ_HZ * STEP_S))
-
-
 def fly_log(world: SimulatedCrazyflie) -> list[LogRow]:
     """Return the log of the manoeuvre of `identify`, flown through noise with preset `crazyflie`."""
     simulation, targets = world.simulation(1), manoeuvre(HEIGHT_M)
@@ -176,7 +165,7 @@ def fly_log(world: SimulatedCrazyflie) -> list[LogRow]:
     for step, target in enumerate(targets):
         seen = through(suite, sight(simulation))
         command = pilot.command(seen, target)
-        advance(simulation, command, np.zeros((1, 3)))
+        hold(simulation.attitude_control, simulation, command, np.zeros((1, 3)))
         angles_rad, velocity_m_s = ned * seen.angles_rad[0], ned * seen.velocity_m_s[0]
         asked_rad, thrust_m_s2 = command_in_frame("NWU", command[0, :2]), command[0, 3] / world.mass_kg
         end = -seen.position_m[0, 2], thrust_m_s2
@@ -208,6 +197,16 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
         yield world.title, *measure(world, folder)
 
 
+def scored(
+    world: SimulatedCrazyflie, challengers: Mapping[str, Challenger], name: str, mission: Mission
+) -> tuple[dict[str, list[Score]], Flight3d]:
+    """Fly a mission; return the scores with each seed by challenger, and the flights."""
+    flown, _ = fly(world, list(challengers.values()), mission, SEEDS)
+    scores, each = mission.scores(flown), len(SEEDS)
+    print(f"{world.title}: {name}", flush=True)
+    return {title: scores[each * k : each * (k + 1)] for k, title in enumerate(challengers)}, flown
+
+
 def measure(world: SimulatedCrazyflie, folder: Path) -> tuple[dict[str, Any], Mapping[str, Any]]:
     """Return the scores by challenger and mission, and the paths of the first seed on the eight (k, 3)."""
     challengers = challengers_of(world, folder)
@@ -215,15 +214,13 @@ def measure(world: SimulatedCrazyflie, folder: Path) -> tuple[dict[str, Any], Ma
     figures: dict[str, dict[str, list[Score]]] = {title: {} for title in challengers}
     figures |= {RAPTOR: {}} if by_network else {}
     paths: dict[str, Any] = {}
-    each = len(SEEDS)
     for name, mission in MISSIONS.items():
-        flown, _ = fly(world, list(challengers.values()), mission, SEEDS)
-        scores = mission.scores(flown)
-        for number, title in enumerate(challengers):
-            figures[title][name] = scores[each * number : each * (number + 1)]
-            if name == "eight":
-                paths[title] = flown.position_m[:, each * number]
+        found, flown = scored(world, challengers, name, mission)
         if by_network:
-            figures[RAPTOR][name] = mission.scores(fly_raptor(world, mission, SEEDS))
-        print(f"{world.title}: {name}", flush=True)
+            found[RAPTOR] = mission.scores(fly_raptor(world, mission, SEEDS))
+        for title, scores in found.items():
+            figures[title][name] = scores
+        if name == "eight":
+            places = flown.position_m[:, :: len(SEEDS)].swapaxes(0, 1)
+            paths = dict(zip(challengers, places, strict=True))
     return figures, paths

@@ -1,6 +1,6 @@
 """Drones of crazyflow: their simulation, what they see through noise, and their start in hover."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Final
@@ -11,10 +11,9 @@ from crazyflow.control import Control
 from crazyflow.sim import Sim
 
 from benchmarks.simulators.missions import STEP_S
-from benchmarks.simulators.pilots import Sight
+from benchmarks.simulators.pilots import Sight, as_seen
 from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
@@ -89,14 +88,13 @@ def noise(true: Sight, seeds: Sequence[int]) -> MocapSuite:
     """Return the motion capture of vehicle `crazyflie` for drones with these seeds."""
     sensors = CRAZYFLIE.sensors
     assert isinstance(sensors, MocapSensors)
-    return MocapSuite(MotionCapture(sensors), seeds, _as_seen(true), STEP_S)
+    return MocapSuite(MotionCapture(sensors), seeds, as_seen(true), STEP_S)
 
 
-def through(suite: MocapSuite, true: Sight) -> Sight:
-    """Return what the drones see."""
-    found = suite.estimate(_as_seen(true))
-    return Sight(found.position_m.T, found.velocity_m_s.T, found.euler_rad.T)
-
-
-def _as_seen(true: Sight) -> Seen:
-    return Seen(true.position_m.T, true.velocity_m_s.T, true.angles_rad.T, np.zeros_like(true.angles_rad.T))
+def hold(control: Callable[[Any], None], simulation: Any, commands: FloatArray, force_n: FloatArray) -> None:
+    """Hold commands (w, 4) of a kind of control, and forces (w, 3), for one step of the controllers."""
+    kind = simulation.data.states.pos.dtype
+    states = simulation.data.states.replace(force=jnp.asarray(force_n[:, np.newaxis], kind))
+    simulation.data = simulation.data.replace(states=states)
+    control(jnp.asarray(commands[:, np.newaxis], kind))
+    simulation.step(round(FREQ_HZ * STEP_S))

@@ -11,6 +11,8 @@ from mambo_sil.api.options import with_options
 from mambo_sil.api.set_points import HeightHold
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Seen
+from mambo_sil.drone.sensors.mocap import MocapSuite
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.derived_flight import chosen_text
@@ -28,6 +30,17 @@ class Sight:
         """Return what some of the drones see."""
         part = slice(first, last)
         return Sight(self.position_m[part], self.velocity_m_s[part], self.angles_rad[part])
+
+
+def as_seen(true: Sight) -> Seen:
+    """Return true states as sensors take them; they do not look at body rates."""
+    return Seen(true.position_m.T, true.velocity_m_s.T, true.angles_rad.T, np.zeros_like(true.angles_rad.T))
+
+
+def through(suite: MocapSuite, true: Sight) -> Sight:
+    """Return what the drones see."""
+    found = suite.estimate(as_seen(true))
+    return Sight(found.position_m.T, found.velocity_m_s.T, found.euler_rad.T)
 
 
 class SimulatorPilot(Protocol):

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.simulators import rotorpy_flights
-from benchmarks.simulators.crazyflow_flights import SEEDS, Mellinger, fly, tuned
+from benchmarks.simulators.crazyflow_flights import Mellinger, scored, tuned
 from benchmarks.simulators.crazyflow_worlds import FITTED, SimulatedCrazyflie
 from benchmarks.simulators.missions import Mission, Score, rms_mm
 from benchmarks.simulators.pilots import Challenger, Designed
@@ -39,15 +39,13 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
         world = SimulatedCrazyflie(drone, model, vehicle)
         best, factors = tuned(world, TUNED_ON)
         (folder / f"{drone}-{model}-found.txt").write_text(f"{factors}\n", "utf-8")
-        challengers = {"Mellinger": Mellinger(drone), "Mellinger, tuned": best}
+        challengers: dict[str, Challenger] = {"Mellinger": Mellinger(drone), "Mellinger, tuned": best}
         challengers |= _ours(vehicle_toml.preset(vehicle))
         figures: dict[str, dict[str, list[Score]]] = {title: {} for title in challengers}
         for name, mission in QUICK.items():
-            flown, _ = fly(world, list(challengers.values()), mission, SEEDS)
-            scores = mission.scores(flown)
-            for number, title in enumerate(challengers):
-                figures[title][name] = scores[len(SEEDS) * number : len(SEEDS) * (number + 1)]
-            print(f"{world.title}: {name}", flush=True)
+            found, _ = scored(world, challengers, name, mission)
+            for title, scores in found.items():
+                figures[title][name] = scores
         yield world.title, figures, {}
     yield from _hummingbird(folder)
 

@@ -4,9 +4,8 @@ It gets what every controller here gets, and the true body rates besides; nobody
 """
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
-import jax.numpy as jnp
 import numpy as np
 from crazyflow.control import Control
 from crazyflow.sim import Sim
@@ -16,14 +15,14 @@ from scipy.spatial.transform import Rotation
 from benchmarks.simulators.crazyflow_worlds import (
     FREQ_HZ,
     SimulatedCrazyflie,
+    hold,
     noise,
     place,
     rotor_speed,
     sight,
-    through,
 )
-from benchmarks.simulators.missions import STEP_S, Flight3d, Mission
-from mambo_sil.drone.plant.arrays import FloatArray
+from benchmarks.simulators.missions import Flight3d, Mission
+from benchmarks.simulators.pilots import through
 
 MOTOR_N: Final = {"cf2x_L250": 0.12}
 """The largest thrust of a motor, which scales what the network commands."""
@@ -55,14 +54,6 @@ def fly_raptor(world: SimulatedCrazyflie, mission: Mission, seeds: Sequence[int]
         observed = np.concatenate([off, seen.velocity_m_s - targets[step, 3:6], rates, action], axis=1)
         action = np.clip(policy.evaluate_step(np.nan_to_num(observed)), -1.0, 1.0)
         force_n = world.mass_kg * mission.force_m_s2(float(time_s))
-        _advance(simulation, (action + 1.0) / 2.0 * fastest, np.broadcast_to(force_n, (worlds, 3)))
+        speeds = (action + 1.0) / 2.0 * fastest
+        hold(simulation.rotor_vel_control, simulation, speeds, np.broadcast_to(force_n, (worlds, 3)))
     return Flight3d(position_m, level)
-
-
-def _advance(simulation: Any, speeds: FloatArray, force_n: FloatArray) -> None:
-    """Hold motor speeds (w, 4) and forces (w, 3) for one step of the network."""
-    kind = simulation.data.states.pos.dtype
-    states = simulation.data.states.replace(force=jnp.asarray(force_n[:, np.newaxis], kind))
-    simulation.data = simulation.data.replace(states=states)
-    simulation.rotor_vel_control(jnp.asarray(speeds[:, np.newaxis], kind))
-    simulation.step(round(FREQ_HZ * STEP_S))

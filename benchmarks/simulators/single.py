@@ -15,9 +15,8 @@ from benchmarks.simulators.missions import (
     Score,
     cost_of,
 )
-from benchmarks.simulators.pilots import Sight
+from benchmarks.simulators.pilots import Sight, as_seen, through
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
@@ -51,26 +50,16 @@ def fly_alone(one: Contestant, mission: Mission, seed: int | None, noise: MocapS
     one.begin(targets[0, :3], seed)
     suite = None
     if noise is not None and seed is not None:
-        suite = MocapSuite(MotionCapture(noise), (seed,), _as_seen(one.sight()), STEP_S)
+        suite = MocapSuite(MotionCapture(noise), (seed,), as_seen(one.sight()), STEP_S)
     for step, target in enumerate(targets):
         true = one.sight()
         position_m[step] = true.position_m
         level[step] = np.cos(true.angles_rad[:, 0]) * np.cos(true.angles_rad[:, 1])
         if not (true.position_m[0, 2] > LEAST_HEIGHT_M and np.abs(true.position_m).max() < 40.0):
             break
-        one.advance(_through(suite, true), target, mission.force_m_s2(float(times_s[step])))
+        seen = true if suite is None else through(suite, true)
+        one.advance(seen, target, mission.force_m_s2(float(times_s[step])))
     return Flight3d(position_m, level)
-
-
-def _as_seen(seen: Sight) -> Seen:
-    return Seen(seen.position_m.T, seen.velocity_m_s.T, seen.angles_rad.T, np.zeros((3, 1)))
-
-
-def _through(suite: MocapSuite | None, true: Sight) -> Sight:
-    if suite is None:
-        return true
-    found = suite.estimate(_as_seen(true))
-    return Sight(found.position_m.T, found.velocity_m_s.T, found.euler_rad.T)
 
 
 def search(
