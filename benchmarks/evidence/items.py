@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from pathlib import PurePath
 from typing import Final
 
-from benchmarks.evidence.adapter_pictures import FLOWN, draw_adapters, read_adapters
 from benchmarks.evidence.board_tables import (
     compilers,
     faults,
@@ -33,18 +32,15 @@ from benchmarks.evidence.campaign_tables import (
     read_quantiles,
 )
 from benchmarks.evidence.item import RESULTS, Figures, Item
-from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause, link_wires, read_link
+from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause, link_wires
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
-from benchmarks.evidence.simulator_pictures import DRAWN, draw_simulators
+from benchmarks.evidence.simulator_pictures import DRAWN, FLOWN, draw_adapters, draw_simulators, read_adapters
 from benchmarks.evidence.simulator_tables import (
     SIMULATORS,
     every_controller,
     quick,
-    read_pyflyt,
-    read_quick,
-    read_simulators,
     summary,
 )
 from benchmarks.evidence.tables import (
@@ -53,6 +49,7 @@ from benchmarks.evidence.tables import (
     envelope,
     printed,
     read_envelope,
+    read_figures,
     read_printed,
     read_sensors,
     read_suite,
@@ -304,7 +301,7 @@ ITEMS: Final = (
             *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/link", "sil/mambo_sil/model/derive"),
             *("benchmarks/flights/link.py", "benchmarks/flights/wire.py", f"{_HERE}/link-drone.toml"),
         ),
-        read=read_link,
+        read=read_figures("link"),
         tables={
             "link-curves": link_curves,
             "link-wires": link_wires,
@@ -318,7 +315,7 @@ ITEMS: Final = (
         controllers=("design crazyflie --sensors true", "design crazyflie-l250 --sensors true"),
         paths=(
             *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
-            *("benchmarks/simulators/adapters.py", f"{_HERE}/adapter_pictures.py", _STYLE),
+            *("benchmarks/simulators/adapters.py", f"{_HERE}/simulator_pictures.py", _STYLE),
         ),
         read=read_adapters,
         tables={},
@@ -341,7 +338,7 @@ ITEMS: Final = (
             *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
             *("benchmarks/simulators", f"{_HERE}/simulator_pictures.py", _STYLE),
         ),
-        read=read_simulators,
+        read=read_figures(*SIMULATORS),
         tables={"simulators-summary": summary, "simulators-all": every_controller},
         pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in DRAWN},
         draw=draw_simulators,
@@ -356,7 +353,7 @@ ITEMS: Final = (
             for words in ("", " --acceleration given")
         ),
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
-        read=read_quick,
+        read=read_figures("quick"),
         tables={"quick": quick},
         variable="SIMULATORS",
     ),
@@ -365,7 +362,7 @@ ITEMS: Final = (
         commands=(f"python -m benchmarks.simulators pyflyt {RESULTS}/pyflyt/pyflyt",),
         controllers=("design cf2x-pyflyt --sensors true",),
         paths=("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "benchmarks/simulators"),
-        read=read_pyflyt,
+        read=read_figures("pyflyt"),
         tables={"pyflyt-summary": summary, "pyflyt-all": every_controller},
         variable="PYFLYT",
     ),

@@ -1,18 +1,9 @@
 """The tables of the flights over MAVLink."""
 
-import json
-from pathlib import Path
-
 from benchmarks.evidence.item import Figures
 from benchmarks.markdown import table
 from mambo_sil.link.records import STACKS
 from mambo_sil.results.number_format import three_digits
-
-
-def read_link(results: Path) -> Figures:
-    """Return the figures of `benchmarks.flights.link`."""
-    figures: Figures = json.loads((results / "link" / "figures.json").read_text("utf-8"))
-    return figures
 
 
 def link_curves(figures: Figures) -> str:

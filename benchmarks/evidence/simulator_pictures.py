@@ -1,20 +1,24 @@
-"""Pictures of flights in simulators of others: the eight, through noise."""
+"""Pictures of flights in simulators of others: the eight through noise, and one flight by each adapter."""
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.evidence.item import Figures
+from benchmarks.evidence.simulator_tables import PAGE
 from benchmarks.simulators.missions import MISSIONS
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.results.pictures import PlainLogFormatter, save
-from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, PURPLE, TARGET, VERMILION, style
+from mambo_sil.results.style import BLUE, BROAD, GREEN, PAGE_INCHES, PURPLE, TARGET, VERMILION, style
 
 DRAWN: Final = {"crazyflow": "hb_x500, fitted", "pybullet": "gym-pybullet-drones, cf2x"}
 """The drone of each picture, by simulator."""
 STYLES: Final = ((VERMILION, "dotted"), (PURPLE, "dashed"))
 """Colour and dashes of their controller as shipped, and tuned."""
-OURS: Final = "ours, by the page"
+FLOWN: Final = {"crazyflow": "crazyflow", "rotorpy": "RotorPy", "gymnasium": "Gymnasium"}
+"""Name of each simulator, by its file."""
 
 
 def draw_simulators(results: Path) -> None:
@@ -23,7 +27,7 @@ def draw_simulators(results: Path) -> None:
     times_s, target = mission.times_s(), mission.targets()
     for simulator, drone in DRAWN.items():
         paths = np.load(results / simulator / f"{drone}.npz")
-        shown = [*zip(list(paths)[:2], STYLES, strict=True), (OURS, (BLUE, "solid"))]
+        shown = [*zip(list(paths)[:2], STYLES, strict=True), (PAGE, (BLUE, "solid"))]
         with style():
             figure = Figure(figsize=(PAGE_INCHES, 2.5), layout="constrained")
             plan, distance = figure.subplots(1, 2, width_ratios=(1, 1.5))
@@ -40,3 +44,34 @@ def draw_simulators(results: Path) -> None:
             distance.yaxis.set_major_formatter(PlainLogFormatter())
             distance.legend(loc="upper right", ncols=2)
             save(figure, results / f"simulators-{simulator}")
+
+
+def read_adapters(results: Path) -> Figures:
+    """Return the mean distance from the target in the last two seconds of each flight, in mm."""
+    flights = {name: np.load(results / "flights" / f"{name}.npz") for name in FLOWN}
+    return {name: float(1e3 * _distance_m(flight)[-200:].mean()) for name, flight in flights.items()}
+
+
+def draw_adapters(results: Path) -> None:
+    """Draw each flight; write adapters-NAME.png and .svg."""
+    for name, title in FLOWN.items():
+        flight = np.load(results / "flights" / f"{name}.npz")
+        times_s = flight["time_s"]
+        with style():
+            figure = Figure(figsize=(PAGE_INCHES, 2.0), layout="constrained")
+            plan, distance = figure.subplots(1, 2, width_ratios=(1, 1.6))
+            plan.plot(*flight["target_m"][:, :2].T, color=TARGET, linewidth=BROAD)
+            plan.plot(*flight["position_m"][:, :2].T, color=BLUE)
+            plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{title}: target (grey) and drone")
+            distance.plot(times_s, 100.0 * _distance_m(flight), color=BLUE, label="along the ground")
+            height_m = np.abs(flight["position_m"][:, 2] - flight["target_m"][:, 2])
+            distance.plot(times_s, 100.0 * height_m, color=GREEN, linestyle="dashed", label="in height")
+            distance.set(xlabel="time, s", ylabel="distance, cm", yscale="log", ylim=(0.01, 300.0))
+            distance.yaxis.set_major_formatter(PlainLogFormatter())
+            distance.legend(loc="upper right", ncols=2)
+            save(figure, results / f"adapters-{name}")
+
+
+def _distance_m(flight: Any) -> FloatArray:
+    offset_m = flight["position_m"][:, :2] - flight["target_m"][:, :2]
+    return np.asarray(np.linalg.norm(offset_m, axis=1), np.float64)

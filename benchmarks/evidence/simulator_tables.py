@@ -1,9 +1,7 @@
 """Tables of the flights in simulators of others."""
 
-import json
 import statistics
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final
 
 from benchmarks.evidence.item import Figures
@@ -15,23 +13,7 @@ from mambo_sil.results.number_format import three_digits
 SIMULATORS: Final = ("crazyflow", "rotorpy", "pybullet")
 """Those that one Python can hold; PyFlyt wants NumPy 1."""
 PAGE: Final = "ours, by the page"
-PRESET: Final = "ours, preset `crazyflie`"
-FOUND: Final = "ours, `identify`, then `design`"
 TITLES: Final = {name: mission.title for name, mission in MISSIONS.items()} | {"wind": "eight in wind, mm"}
-
-
-def read_simulators(results: Path) -> Figures:
-    """Return the scores with each seed by simulated drone, controller and mission."""
-    found: Figures = {}
-    for name in SIMULATORS:
-        found |= json.loads((results / name / "figures.json").read_text("utf-8"))
-    return found
-
-
-def read_pyflyt(results: Path) -> Figures:
-    """Return the same of PyFlyt."""
-    found: Figures = json.loads((results / "pyflyt" / "figures.json").read_text("utf-8"))
-    return found
 
 
 def median(scores: Sequence[Score]) -> Score:
@@ -56,12 +38,6 @@ def summary(figures: Figures) -> str:
                 row[head] = "-"
         rows.append(row)
     return table(rows)
-
-
-def read_quick(results: Path) -> Figures:
-    """Return the scores on quick curves by simulated drone, controller and mission."""
-    found: Figures = json.loads((results / "quick" / "figures.json").read_text("utf-8"))
-    return found
 
 
 def quick(figures: Figures) -> str:

@@ -34,6 +34,15 @@ def summary(folder: Path) -> Figures:
     return found
 
 
+def read_figures(*folders: str) -> Callable[[Path], Figures]:
+    """Return what reads the figures.json that a measurement wrote in each of `folders`, as one."""
+    return lambda results: {
+        name: found
+        for folder in folders
+        for name, found in json.loads((results / folder / "figures.json").read_text("utf-8")).items()
+    }
+
+
 def three(value: Number | None, lost: str = "crashed") -> str:
     """Format a value with three digits; null is what a lost flight has."""
     return lost if value is None else three_digits(value)
