@@ -15,9 +15,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from benchmarks.flights.without_height import without_height
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.guard_section import Guard
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
@@ -104,7 +104,16 @@ class AppTakeOff:
 def settings_of(*, height: bool) -> Settings:
     """Return the settings that `design` derives, or the same without a height."""
     settings = controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived")
-    return settings if height else without_height(settings)
+    return settings if height else _without_height(settings)
+
+
+def _without_height(settings: Settings) -> Settings:
+    """Return settings without [height], and without what a guard has for the thrust."""
+    guard = settings.guard
+    if guard is not None:
+        thrust = {name: Guard.model_fields[name].default for name in ("thrust_m_s2", "thrust_m_s3")}
+        guard = guard.model_copy(update=thrust)
+    return Settings.model_validate(settings.model_copy(update={"height": None, "guard": guard}).model_dump())
 
 
 def flown(

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.markdown import table
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -228,11 +229,7 @@ def draw_fence(stem: Path) -> None:
 
 def main(arguments: list[str]) -> None:
     """Print the table, and draw the pictures into the folder that `arguments` name."""
-    made: list[dict[str, Any]] = rows()
-    print("| " + " | ".join(made[0]) + " |")
-    print("| --- " * len(made[0]) + "|")
-    for row in made:
-        print("| " + " | ".join(row.values()) + " |", flush=True)
+    print(table(rows()), flush=True)
     folder = Path(arguments[0])
     folder.mkdir(parents=True, exist_ok=True)
     draw_step(folder / "limits-step")

@@ -70,7 +70,6 @@ class WiredFlight:
     """A flight: its steps, the end of it, and what has happened to the drone since it hovers."""
 
     updates: list[Update] = field(default_factory=list)
-    away_m: list[float] = field(default_factory=list)
     end: str = ""
 
     def rms_cm(self) -> float:

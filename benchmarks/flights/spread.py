@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.markdown import table
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -59,15 +60,16 @@ def iae(case: dict[str, Any], preset: str, scalar: str) -> FloatArray:
 
 def main() -> None:
     """Print a table in Markdown: median, least and largest IAE by case and controller."""
-    names = [" ".join(filter(None, controller)) for controller in CONTROLLERS]
-    print("| IAE, m s | " + " | ".join(names) + " |")
-    print("| --- |" + " --- |" * len(names))
+    rows = []
     for name, case in CASES.items():
-        cells = []
+        row = {"IAE, m s": name}
         for preset, scalar in CONTROLLERS:
             found = iae(case, preset, scalar)
-            cells.append(f"{np.median(found):.3g} ({found.min():.3g}..{found.max():.3g})")
-        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+            row[f"{preset} {scalar}".strip()] = (
+                f"{np.median(found):.3g} ({found.min():.3g}..{found.max():.3g})"
+            )
+        rows.append(row)
+    print(table(rows))
 
 
 if __name__ == "__main__":
