@@ -19,9 +19,6 @@ from mambo_sil.experiment.campaign.campaign_flights import (
     _evaluate,
     columns,
     fly_batch,
-    fly_packed,
-    pack_rows,
-    unpack_rows,
 )
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
 from mambo_sil.experiment.inputs import Entrant
@@ -113,18 +110,14 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
         assert set(row) == titles
 
 
-def test_packed_rows_are_those_of_a_batch() -> None:
-    """In every bit, NaN included, and in the types; more flights than one simulation takes."""
+def test_more_flights_than_one_simulation_takes_have_the_rows_of_several() -> None:
+    """In every bit, NaN included, and in the types."""
     flight = default().flight | {"duration_s": 1.0}
     drawn = [draw(3, number, PARAMETERS) for number in range(MOST_TOGETHER + 1)]
-    arguments = __version__, [Entrant("pd", "pd", Settings()).document()], flight, drawn
-    keys = columns(["pd"], sensed=True)
-    rows = unpack_rows(fly_packed(*arguments, keys), keys)
-    expected = [{key: row[key] for key in keys} for row in fly_batch(*arguments)]
-    assert repr(rows) == repr(expected)
-    rows[1]["pd_iae_m_s"] = math.nan
-    assert repr(unpack_rows(pack_rows(rows, keys), keys)) == repr(rows)
-    assert unpack_rows(pack_rows([], keys), keys) == []
+    shared = __version__, [Entrant("pd", "pd", Settings()).document()], flight
+    assert repr(fly_batch(*shared, drawn)) == repr(
+        fly_batch(*shared, drawn[:1]) + fly_batch(*shared, drawn[1:])
+    )
 
 
 def test_the_table_has_crashes_and_counts_before_metrics_and_digest() -> None:

@@ -9,8 +9,6 @@ from dataclasses import fields
 from functools import partial
 from typing import Any, Final
 
-import numpy as np
-
 from mambo_codegen import __version__
 from mambo_codegen.methods import method_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -43,8 +41,6 @@ SATURATED: Final = "saturated_share"
 OF_LIMITS: Final = (*LIMIT_METRICS, *(SEEN + name for name in LIMIT_METRICS))
 """How flights keep within the limits, truly and as the estimates tell; no columns of a campaign."""
 
-_DIGEST_BYTES: Final = 32
-
 MOST_TOGETHER: Final = 20
 """Flights that one simulation flies: more are hardly faster, and take more memory for their targets."""
 
@@ -70,13 +66,9 @@ def columns(names: Sequence[str], *, sensed: bool, spatial: bool = False) -> tup
 
 
 def fly_batch(
-    version: str,
-    entrants: Sequence[dict[str, Any]],
-    flight: dict[str, Any],
-    drawn: Sequence[Draw],
-    report: Report = report_share,
+    version: str, entrants: Sequence[dict[str, Any]], flight: dict[str, Any], drawn: Sequence[Draw]
 ) -> list[Row]:
-    """Fly the flights `drawn` with every controller; return one row per flight, in order.
+    """Fly the flights `drawn` with every controller, `MOST_TOGETHER` at a time; return their rows, in order.
 
     `flight` is the campaign's, `version` the calling program's. Raises WorkerError if the worker
     has another version, BuildError if it has no compiler.
@@ -85,55 +77,13 @@ def fly_batch(
         raise WorkerError(
             f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
-    scenarios = [scenario(flight, one) for one in drawn]
-    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios, report)
-
-
-def fly_packed(
-    version: str,
-    entrants: Sequence[dict[str, Any]],
-    flight: dict[str, Any],
-    drawn: Sequence[Draw],
-    keys: Sequence[str],
-) -> bytes:
-    """Fly as `fly_batch`, `MOST_TOGETHER` flights at a time; return the rows as `pack_rows` packs them."""
+    flying = [Entrant.from_document(document) for document in entrants]
     rows: list[Row] = []
     for first in range(0, len(drawn), MOST_TOGETHER):
-        part = drawn[first : first + MOST_TOGETHER]
-        report = partial(_report_part, report_share, first, len(part), len(drawn))
-        rows += fly_batch(version, entrants, flight, part, report)
+        scenarios = [scenario(flight, one) for one in drawn[first : first + MOST_TOGETHER]]
+        report = partial(_report_part, report_share, first, len(scenarios), len(drawn))
+        rows += fly_scenarios(flying, scenarios, report)
     report_share(0.0)
-    return pack_rows(rows, keys)
-
-
-def pack_rows(rows: Sequence[Row], keys: Sequence[str]) -> bytes:
-    """Return the values that rows have for `keys`: numbers as float64, then digests as 32 bytes each."""
-    numbers = [key for key in keys if not key.endswith(DIGEST)]
-    digests = [key for key in keys if key.endswith(DIGEST)]
-    return b"".join(
-        (
-            np.array([[row[key] for key in numbers] for row in rows], "<f8").tobytes(),
-            *(bytes.fromhex(str(row[key])) for row in rows for key in digests),
-        )
-    )
-
-
-def unpack_rows(content: bytes, keys: Sequence[str]) -> list[Row]:
-    """Return the rows that `pack_rows` packed for the same `keys`."""
-    numbers = [key for key in keys if not key.endswith(DIGEST)]
-    digests = [key for key in keys if key.endswith(DIGEST)]
-    count = len(content) // (8 * len(numbers) + _DIGEST_BYTES * len(digests))
-    values = np.frombuffer(content, "<f8", count * len(numbers)).reshape(count, len(numbers)).tolist()
-    texts = content[8 * count * len(numbers) :].hex()
-    rows: list[Row] = []
-    for number, cells in enumerate(values):
-        row: Row = {
-            key: int(cell) if key.endswith((CRASHED, REFUSED)) else cell
-            for key, cell in zip(numbers, cells, strict=True)
-        }
-        for place, key in enumerate(digests, number * len(digests)):
-            row[key] = texts[2 * _DIGEST_BYTES * place : 2 * _DIGEST_BYTES * (place + 1)]
-        rows.append(row)
     return rows
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 from mambo_codegen import __version__
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_file import Campaign
-from mambo_sil.experiment.campaign.campaign_flights import columns, fly_packed, unpack_rows
+from mambo_sil.experiment.campaign.campaign_flights import columns, fly_batch
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import FlightStore, open_store
@@ -26,13 +26,8 @@ _TASKS_PER_SIZE: Final = 4
 
 def table_columns(campaign: Campaign) -> tuple[str, ...]:
     """Return the columns of the table after the flight's number: seed, draws, results."""
-    return ("seed", *PARAMETERS, *result_columns(campaign))
-
-
-def result_columns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the columns of the results."""
-    names = [entrant.name for entrant in campaign.entrants]
-    return columns(names, sensed=campaign.file.flight.sensors != "true", spatial=campaign.spatial)
+    names, sensed = [entrant.name for entrant in campaign.entrants], campaign.file.flight.sensors != "true"
+    return ("seed", *PARAMETERS, *columns(names, sensed=sensed, spatial=campaign.spatial))
 
 
 def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
@@ -83,7 +78,6 @@ def fly_missing(
     left = missing_flights(store, flights)
     sizes = list(batch_sizes(len(left), pool.workers, batch))
     batches = iter(left)
-    keys = result_columns(campaign)
     entrants = [entrant.document() for entrant in campaign.entrants]
     section = campaign.flight
     drawn: dict[int, dict[int, Draw]] = {}
@@ -91,14 +85,14 @@ def fly_missing(
     def tasks() -> Iterator[tuple[Any, ...]]:
         for number, size in enumerate(sizes):
             drawn[number] = {flight: campaign.draw(flight) for flight in islice(batches, size)}
-            yield __version__, entrants, section, list(drawn[number].values()), keys
+            yield __version__, entrants, section, list(drawn[number].values())
 
     def report(shares: float) -> None:
         if drawn:
             running(shares * sum(map(len, drawn.values())) / len(drawn))
 
     progress(len(store.finished))
-    for number, content in pool.run(fly_packed, tasks(), report):
-        flown = zip(drawn.pop(number).items(), unpack_rows(content, keys), strict=True)
+    for number, rows in pool.run(fly_batch, tasks(), report):
+        flown = zip(drawn.pop(number).items(), rows, strict=True)
         store.add({flight: draws | row for (flight, draws), row in flown})
         progress(len(store.finished))
