@@ -43,9 +43,9 @@ def read_figures(*folders: str) -> Callable[[Path], Figures]:
     }
 
 
-def three(value: Number | None, lost: str = "crashed") -> str:
+def three(value: Number | None) -> str:
     """Format a value with three digits; null is what a lost flight has."""
-    return lost if value is None else three_digits(value)
+    return "crashed" if value is None else three_digits(value)
 
 
 def slashed(values: Iterable[Number]) -> str:
