@@ -6,7 +6,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final
 
 from pydantic import (
     BeforeValidator,
@@ -202,22 +202,23 @@ def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, plac
         raise InvalidSettingsError((f"{place}: horizon.{error}",)) from None
 
 
-Flown = TypeVar("Flown", bound=FlightSection)
-
-
 def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -> tuple[File, VehicleFile]:
     """Load the drone that `vehicle` or else the file names; return the file completed for it, and the drone.
 
     The file has the sections flight and draws.
     """
     content: Any = file
-    drone = choose_drone(content.flight, folder, source, vehicle)
-    update = {
-        "flight": with_drone(content.flight, drone, source, replaced=vehicle is not None),
-        "draws": with_defaults(content.draws, drone),
-    }
-    _demand_mass(update["draws"], source)
-    return file.model_copy(update=update), drone
+    drone = (
+        load_drone(content.flight.vehicle, folder, f"{source}: flight.vehicle")
+        if vehicle is None
+        else vehicle_toml.load(vehicle)
+    )
+    flight = _with_drone(content.flight, drone, source, replaced=vehicle is not None)
+    given = content.draws.model_fields_set
+    own = {name: found for name, found in defaults_of(drone).items() if name not in given}
+    draws = content.draws.model_copy(update=own)
+    _demand_mass(draws, source)
+    return file.model_copy(update={"flight": flight, "draws": draws}), drone
 
 
 def _demand_mass(draws: Any, source: str) -> None:
@@ -232,7 +233,7 @@ def _demand_mass(draws: Any, source: str) -> None:
         )
 
 
-def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool) -> Flown:
+def _with_drone(flight: FlightSection, drone: VehicleFile, source: str, *, replaced: bool) -> FlightSection:
     """Return the section [flight] with the drone's name and with sensors that it has.
 
     If the drone is `replaced`, its own sensors replace those that it has not. Raises InvalidSettingsError.
@@ -246,16 +247,3 @@ def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool
     except FlightError as error:
         raise InvalidSettingsError((f"{source}: flight.{error}",)) from None
     return flight.model_copy(update={"vehicle": drone.name, "sensors": sensors})
-
-
-def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
-    """Return the section [draws] with the drone's default for each parameter that the file does not name."""
-    own = {name: found for name, found in defaults_of(drone).items() if name not in draws.model_fields_set}
-    return draws.model_copy(update=own)
-
-
-def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
-    """Return the drone that `vehicle` names, or else the one of [flight] in a file in `folder`."""
-    if vehicle is not None:
-        return vehicle_toml.load(vehicle)
-    return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
