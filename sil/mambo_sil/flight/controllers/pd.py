@@ -88,6 +88,13 @@ TILT_LIMIT_RAD: Final = 0.35
 """The tilt limit of the presets."""
 
 
+def _limited(tilt_x: FloatArray, tilt_y: FloatArray, sine: FloatArray, cosine: FloatArray) -> PdOutcome:
+    """Return tilts (n,) along x and y of the world as commands in body axes, clamped."""
+    command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
+    limited_rad = np.clip(command_rad, -TILT_LIMIT_RAD, TILT_LIMIT_RAD)
+    return PdOutcome(limited_rad, np.zeros(len(limited_rad), dtype=np.int64))
+
+
 class PdFeedForwardController:
     """Tilt = P x position error + D x velocity error + A x target acceleration, in body axes, clamped.
 
@@ -112,10 +119,7 @@ class PdFeedForwardController:
             + gains.acceleration_rad_s2_m * target[:, 4 + axis]
             for axis in (0, 1)
         )
-        command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
-        return PdOutcome(
-            np.clip(command_rad, -TILT_LIMIT_RAD, TILT_LIMIT_RAD), np.zeros(len(state), dtype=np.int64)
-        )
+        return _limited(tilt_x, tilt_y, sine, cosine)
 
 
 @dataclass(frozen=True)
@@ -192,10 +196,7 @@ class PidFeedForwardController:
         self._tilt_rad = np.where(known[:, np.newaxis], passed_rad, self._tilt_rad)
         self._acceleration_m_s2 = np.where(known[:, np.newaxis], acceleration_m_s2, self._acceleration_m_s2)
         tilt_x, tilt_y = self._tilt_rad.T
-        command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
-        return PdOutcome(
-            np.clip(command_rad, -TILT_LIMIT_RAD, TILT_LIMIT_RAD), np.zeros(len(state), dtype=np.int64)
-        )
+        return _limited(tilt_x, tilt_y, sine, cosine)
 
     def _sum(
         self,
