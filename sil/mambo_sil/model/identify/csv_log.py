@@ -3,9 +3,12 @@
 A row with fewer cells than the header is left out, because a lost cell moves the others into wrong columns.
 """
 
+import contextlib
 import csv
 import io
 import math
+import shlex
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -176,6 +179,27 @@ def _unwrapped(ticks: FloatArray) -> FloatArray:
         wraps = (before > end - near) & (before < end) & (after < near)
         passed[timed] += np.cumsum(np.append(0.0, end * wraps))
     return ticks + passed
+
+
+@contextlib.contextmanager
+def reading(path: Path, kind: str, package: str) -> Iterator[None]:
+    """Make what the reader of a binary log raises a LogError, and keep it from printing."""
+    name = echo(str(path))
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            yield
+    except ImportError:
+        install = shlex.join([sys.executable, "-m", "pip", "install", package])
+        needs = f"reading {kind.removesuffix(' log')} needs {package}"
+        raise LogError((f"{name}: {needs}; install it: {install}",)) from None
+    except OSError as error:
+        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+    except LogError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the parser
+        raise LogError((f"{name}: is no {kind}: {echo(str(error))}",)) from error
 
 
 def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:

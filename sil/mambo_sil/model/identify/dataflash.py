@@ -7,9 +7,6 @@ ArduCopter learns is not that of such a flight.
 """
 
 import contextlib
-import io
-import shlex
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,8 +15,8 @@ import numpy as np
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import DEGREE, THRUST_COMMAND, FlightLog, Signal
+from mambo_sil.model.identify.csv_log import demand_one_clock, reading
+from mambo_sil.model.identify.signals import DEGREE, THRUST_COMMAND, FlightLog, Signal, stamped
 
 ATTITUDES: Final = ("ANG", "ATT")
 """Angles, at the rate of the loop if that is there; those of ATT come 10 times a second where ANG exists."""
@@ -53,44 +50,30 @@ def read_dataflash(path: Path) -> FlightLog:
         raise LogError((f"{name}: {_NO_SET_POINTS}",))
     attitude, signals = messages[kind], {}
     for signal, field in _COMMANDS.items():
-        signals[signal] = _signal(set_points, DEGREE * set_points[field], f"deg*{SET_POINTS}.{field}")
+        signals[signal] = stamped(set_points[_CLOCK], DEGREE * set_points[field], f"deg*{SET_POINTS}.{field}")
     for signal, field in _ANGLES.items():
         values = DEGREE * attitude[field]
         values = np.unwrap(values) if signal == "yaw_rad" else values
-        signals[signal] = _signal(attitude, values, f"deg*{kind}.{field}")
+        signals[signal] = stamped(attitude[_CLOCK], values, f"deg*{kind}.{field}")
     if (motion := messages.get(MOTION)) is not None:
         for signal, field in _MOTION.items():
-            signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
-    signals[THRUST_COMMAND] = _signal(set_points, set_points["Thrust"], f"{SET_POINTS}.Thrust")
+            signals[signal] = stamped(motion[_CLOCK], motion[field], f"{MOTION}.{field}")
+    signals[THRUST_COMMAND] = stamped(set_points[_CLOCK], set_points["Thrust"], f"{SET_POINTS}.Thrust")
     signals = _between(signals, *(1e-6 * set_points[_CLOCK][[0, -1]]).tolist())
     return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
 
 
 def _messages(path: Path) -> dict[str, Columns]:
     """Return the columns of each kind of message; of the motion those of the first estimator."""
-    name = echo(str(path))
-    try:
+    with reading(path, "DataFlash log", "pymavlink"):
         from pymavlink.DFReader import DFReader_binary  # noqa: PLC0415 - an optional extra
-    except ImportError:
-        install = shlex.join([sys.executable, "-m", "pip", "install", "pymavlink"])
-        raise LogError((f"{name}: reading DataFlash needs pymavlink; install it: {install}",)) from None
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
+
         with path.open("rb") as file:
-            begins = file.read(len(_BEGINS))
-        if begins != _BEGINS:
-            raise LogError((f"{name}: is no DataFlash log: it begins otherwise",))
-        with _quiet():
-            reader: Any = DFReader_binary(str(path))
-    except OSError as error:
-        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
-    except LogError:
-        raise
-    except Exception as error:  # whatever a damaged file makes of the parser
-        raise LogError((f"{name}: is no DataFlash log: {echo(str(error))}",)) from error
-    with contextlib.closing(reader.filehandle), contextlib.closing(reader.data_map), _quiet():
-        return _columns(reader)
+            if file.read(len(_BEGINS)) != _BEGINS:
+                raise LogError((f"{echo(str(path))}: is no DataFlash log: it begins otherwise",))
+        reader: Any = DFReader_binary(str(path))
+        with contextlib.closing(reader.filehandle), contextlib.closing(reader.data_map):
+            return _columns(reader)
 
 
 def _columns(reader: Any) -> dict[str, Columns]:
@@ -108,13 +91,6 @@ def _columns(reader: Any) -> dict[str, Columns]:
     return {kind: dict(zip(wanted[kind], np.array(rows).T, strict=True)) for kind, rows in found.items()}
 
 
-@contextlib.contextmanager
-def _quiet() -> Any:
-    """Keep the reader from printing what it thinks of a file."""
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        yield
-
-
 def _between(signals: dict[str, Signal], first_s: float, last_s: float) -> dict[str, Signal]:
     """Return what lies between two times."""
     cut = {}
@@ -122,9 +98,3 @@ def _between(signals: dict[str, Signal], first_s: float, last_s: float) -> dict[
         inside = (signal.time_s >= first_s) & (signal.time_s <= last_s)
         cut[name] = Signal(signal.time_s[inside], signal.value[inside], signal.column)
     return cut
-
-
-def _signal(message: Columns, values: FloatArray, column: str) -> Signal:
-    """Return the finite values of a field over the time stamps, in microseconds."""
-    there = np.isfinite(values)
-    return Signal(1e-6 * message[_CLOCK][there], values[there], column)

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
+
 from mambo_sil.drone.plant.arrays import FloatArray
 
 DEGREE: Final = math.pi / 180.0
@@ -72,6 +74,12 @@ class Signal:
     time_s: FloatArray
     value: FloatArray
     column: str
+
+
+def stamped(time_us: FloatArray, values: FloatArray, column: str) -> Signal:
+    """Return the finite values of a field over its time stamps."""
+    there = np.isfinite(values)
+    return Signal(1e-6 * time_us[there], values[there], column)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,5 @@
 """Read a flight log of PX4 in the format ULog, with the optional package pyulog."""
 
-import contextlib
-import io
-import shlex
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +11,7 @@ from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
+from mambo_sil.model.identify.csv_log import demand_one_clock, reading
 from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
@@ -30,6 +26,7 @@ from mambo_sil.model.identify.signals import (
     UPDATE,
     FlightLog,
     Signal,
+    stamped,
 )
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
@@ -119,21 +116,21 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
     command, attitude = topics[SETPOINT], topics[ATTITUDE]
     signals = {}
     for angle, values in _commands(command).items():
-        signals[f"{angle}_command_rad"] = _signal(command, values, f"{SETPOINT}.{angle}")
+        signals[f"{angle}_command_rad"] = stamped(command[_CLOCK], values, f"{SETPOINT}.{angle}")
     for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
         values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
-        signals[f"{angle}_rad"] = _signal(attitude, values, f"{ATTITUDE}.q")
+        signals[f"{angle}_rad"] = stamped(attitude[_CLOCK], values, f"{ATTITUDE}.q")
     signals |= _thrust(command, topics.get(HOVER, {}))
     motion = topics.get(MOTION, {})
     for signal, field in _MOTION.items():
         if field in motion:
-            signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
+            signals[signal] = stamped(motion[_CLOCK], motion[field], f"{MOTION}.{field}")
     signals |= _seen(topics.get(VISION, {}))
     target = topics.get(TRAJECTORY, {})
     for signal, fields in _TARGET.items():
         for field in fields:
             if field in target and np.isfinite(target[field]).any():
-                signals[signal] = _signal(target, target[field], f"{TRAJECTORY}.{field}")
+                signals[signal] = stamped(target[_CLOCK], target[field], f"{TRAJECTORY}.{field}")
     empty = [signal for signal, each in signals.items() if not len(each.time_s)]
     if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
         raise LogError(tuple(faults))
@@ -146,28 +143,17 @@ def _seen(vision: Mapping[str, FloatArray]) -> dict[str, Signal]:
         return {}
     fields = [f"position[{axis}]" for axis in range(2)]
     return {
-        signal: _signal(vision, vision[field], f"{VISION}.{field}")
+        signal: stamped(vision[_CLOCK], vision[field], f"{VISION}.{field}")
         for signal, field in zip(SEEN, fields, strict=True)
     }
 
 
 def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
     """Return the fields of the first instance of each topic."""
-    name = echo(str(path))
-    try:
+    with reading(path, "ULog", "pyulog"), path.open("rb") as file:
         from pyulog import ULog  # noqa: PLC0415 - an optional extra
-    except ImportError:
-        install = shlex.join([sys.executable, "-m", "pip", "install", "pyulog"])
-        raise LogError((f"{name}: reading ULog needs pyulog; install it: {install}",)) from None
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
-            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, VISION, STEPS])
-    except OSError as error:
-        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
-    except Exception as error:  # whatever a damaged file makes of the parser
-        raise LogError((f"{name}: is no ULog: {echo(str(error))}",)) from error
+
+        log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, VISION, STEPS])
     return {
         each.name: {field: np.asarray(values, np.float64) for field, values in each.data.items()}
         for each in log.data_list
@@ -203,10 +189,10 @@ def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray])
         return {}
     valid = hover.get("valid", np.zeros(0)) > 0.0
     if not valid.any():
-        return {THRUST_COMMAND: _signal(setpoint, -values, f"-{SETPOINT}.{_THRUST}")}
+        return {THRUST_COMMAND: stamped(setpoint[_CLOCK], -values, f"-{SETPOINT}.{_THRUST}")}
     share = float(np.median(hover["hover_thrust"][valid]))
     column = f"-g*{SETPOINT}.{_THRUST}/{HOVER}"
-    return {THRUST: _signal(setpoint, -GRAVITY_M_S2 / share * values, column)}
+    return {THRUST: stamped(setpoint[_CLOCK], -GRAVITY_M_S2 / share * values, column)}
 
 
 def _euler_rad(q: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -217,9 +203,3 @@ def _euler_rad(q: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]
         np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
         np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
-
-
-def _signal(topic: Mapping[str, FloatArray], values: FloatArray, column: str) -> Signal:
-    """Return the finite values of a field over the topic's time stamps, in microseconds."""
-    there = np.isfinite(values)
-    return Signal(1e-6 * topic[_CLOCK][there], values[there], column)
