@@ -6,7 +6,6 @@ Arguments and results are plain values, which can be sent to other processes and
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import fields
-from functools import partial
 from typing import Any, Final
 
 from mambo_codegen import __version__
@@ -20,7 +19,7 @@ from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
-from mambo_sil.flight.engine.simulate import fly_groups
+from mambo_sil.flight.engine.simulate import fly_groups, part_of
 from mambo_sil.flight.fences import LIMIT_METRICS, fenced, measure_limits
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
@@ -81,7 +80,7 @@ def fly_batch(
     rows: list[Row] = []
     for first in range(0, len(drawn), MOST_TOGETHER):
         scenarios = [scenario(flight, one) for one in drawn[first : first + MOST_TOGETHER]]
-        report = partial(_report_part, report_share, first, len(scenarios), len(drawn))
+        report = part_of(report_share, first, len(drawn), len(scenarios))
         rows += fly_scenarios(flying, scenarios, report)
     report_share(0.0)
     return rows
@@ -101,7 +100,7 @@ def fly_scenarios(
     for period_s in periods:
         flight = flight_of(scenarios, period_s)
         these = [one for one in entrants if one.settings.horizon.update_period_s == period_s]
-        share = partial(_report_part, report, flown, len(these), len(entrants))
+        share = part_of(report, flown, len(entrants), len(these))
         for group in fly_groups(flight, [_controller(one, scenarios, flight) for one in these], share):
             entrant, last = these[group.controller], group.first + group.trace.flights
             results = _evaluate(group.trace, method_of(entrant.settings).tilt_limit_rad, scenarios[0].vehicle)
@@ -112,11 +111,6 @@ def fly_scenarios(
         flown += len(these)
     report(0.0)
     return rows
-
-
-def _report_part(report: Report, before: int, parts: int, total: int, share: float) -> None:
-    """Report the share of the next `parts` of `total` equal parts, `before` of which are done."""
-    report((before + parts * share) / total)
 
 
 def _controller(entrant: Entrant, scenarios: Sequence[Scenario], flight: Flight) -> PositionController:

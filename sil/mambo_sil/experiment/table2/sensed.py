@@ -18,11 +18,10 @@ from mambo_sil.experiment.table2.table2 import (
     PRINTED_PD,
     Four,
     four,
-    report_part,
 )
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.engine.simulate import fly, part_of
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
@@ -105,7 +104,7 @@ def fly_sensed(
         controller: PositionController = (
             pd_controller(pds[name], flight) if name in pds else CompiledController(settings[name], n)
         )
-        trace = fly(flight, controller, report_part(progress, index, len(jobs)))
+        trace = fly(flight, controller, part_of(progress, index, len(jobs)))
         rows.append(_judge(name, view, trace))
     return rows
 

@@ -11,7 +11,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.engine.simulate import fly, part_of
 from mambo_sil.flight.flight_report import flight_pictures
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
@@ -131,11 +131,6 @@ def _case_table(case: str, rows: Sequence[Table2Row]) -> ResultTable:
     return ResultTable(heads, cells, (0,), (6, 7, 8))
 
 
-def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:
-    """Return a function that turns the share done of one of `parts` parts into the share of the whole."""
-    return lambda share: progress((part + share) / parts)
-
-
 def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None]) -> dict[str, Trace]:
     """Fly every case with the laws without a model and with the compiled C of `settings` by name, 100 s each.
 
@@ -147,7 +142,7 @@ def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], Non
     }
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
     return {
-        name: fly(flight, controller, report_part(progress, index, len(controllers)))
+        name: fly(flight, controller, part_of(progress, index, len(controllers)))
         for index, (name, controller) in enumerate(controllers.items())
     }
 

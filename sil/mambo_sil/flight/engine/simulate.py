@@ -74,8 +74,13 @@ def fly_groups(
         yield from _fly_groups(engine, flight, controllers, progress)
         return
     for number, controller in enumerate(controllers):
-        report = None if progress is None else partial(_report_part, progress, number, len(controllers))
+        report = None if progress is None else part_of(progress, number, len(controllers))
         yield GroupTrace(number, 0, loop.fly(flight, controller, report))
+
+
+def part_of(progress: Progress, done: int, total: int, parts: int = 1) -> Progress:
+    """Return what reports the share of the next `parts` of `total` equal parts as one of the whole."""
+    return lambda share: progress((done + parts * share) / total)
 
 
 def fly_compiled(
@@ -137,11 +142,6 @@ def _engine(flight: Flight, controllers: Sequence[PositionController]) -> Any:
     except BuildError as error:
         warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=3)
         return None
-
-
-def _report_part(progress: Progress, number: int, parts: int, share: float) -> None:
-    """Report the share of one of several equal parts."""
-    progress((number + share) / parts)
 
 
 class _Simulation:
