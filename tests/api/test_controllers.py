@@ -23,10 +23,8 @@ from mambo_sil.api import set_points
 from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
-from mambo_sil.model.derive.chosen_tilt import chosen_text
-from tests.support.derived import settings_for
 from mambo_sil.model.derive.derived_flight import chosen_text
-from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.derived import settings_for
 from tests.support.one_norm import ONE_NORM
 
 DERIVED = settings_for(vehicle_toml.preset("crazyflie"))

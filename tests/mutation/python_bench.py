@@ -107,12 +107,11 @@ ROOMS: Final = {
     "derive": Room(
         source=("sil/mambo_sil/model/derive/*.py",),
         tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "settings")),
-        without=("derived_margins.py", "derived_flight.py", "chosen_tilt.py"),
         without=("derived_margins.py", "derived_flight.py"),
     ),
     "design": Room(
         source=("sil/mambo_sil/model/derive/derived_margins.py",),
-        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("derived_margins", "missing_height")),
+        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("derived_margins", "settings")),
         longest_s=4.0,
     ),
     "loops": Room((f"{_MARGINS}/loop_margins.py",), (f"{_MARGIN_TESTS}/test_loop_margins.py",)),

@@ -350,9 +350,7 @@ def diff(
     """
     from mambo_codegen.settings import presets
     from mambo_sil.experiment.compare.compare import compare
-    from mambo_sil.experiment.compare.diff_record import PICTURES
     from mambo_sil.experiment.compare.diff_report import PICTURES
-    from mambo_sil.results.folders import SUMMARY
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:

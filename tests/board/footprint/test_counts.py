@@ -28,9 +28,8 @@ from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
-from mambo_sil.model.derive.chosen_tilt import chosen_text
-from tests.support.linking import link_step
 from mambo_sil.model.derive.derived_flight import chosen_text
+from tests.support.linking import link_step
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 

@@ -12,8 +12,9 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
+from mambo_sil.experiment.margins.axis_margins import measure_loops
 from mambo_sil.experiment.margins.corners import at_ends, corners, in_words, intervals, uncertain
-from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.experiment.margins.many_drones import hovering_flight
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes

@@ -17,8 +17,8 @@ from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import SENSORS_OF, CurveName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
+from mambo_sil.model.derive.derived_margins import missing_height
 from mambo_sil.model.derive.derived_settings import controller_text, derive
-from mambo_sil.model.derive.missing_height import missing_height
 from mambo_sil.model.derive.step_response import fit_steps
 from tests.support.derived import settings_for
 from tests.support.scenarios import CRAZYFLIE, FLOWN, changed
