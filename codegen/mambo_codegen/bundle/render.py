@@ -210,6 +210,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "instance_bytes": method.instance_bytes,
             "tracker": method.tracker,
             "limiting": method.limiting,
+            "tilt_limit": "self->bounds.tilt_rad" if method.has_limits else "NMPC_TILT_LIMIT_RAD",
             **limits_context(method),
             "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
             "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),

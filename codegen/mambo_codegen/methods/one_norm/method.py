@@ -116,6 +116,7 @@ class OneNorm(OneNormConstants, Method):
         tracking_limit, effort_limit = self.weight_limits
         return {
             "quadratic": False,
+            "command_member": "sent_rad" if self.feedback_steps else "command_rad",
             "backtracking": settings.optimizer.variant == "rprop+",
             "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
             "tables": self.tables,

@@ -143,6 +143,7 @@ class Quadratic(QuadraticConstants, Method):
         found = self.numbers.formats
         return {
             "quadratic": True,
+            "command_member": "command_rad",
             "attitude": self.attitude,
             "move_limits": AttitudeModel(self, QuadraticArithmetic(self)).command_limit.tolist(),
             "observer": self.observer,

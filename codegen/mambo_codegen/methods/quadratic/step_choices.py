@@ -34,7 +34,7 @@ class StepChoices:
     goal, follows: the variable for the target, and the condition that a step may follow it.
     most_right, most_forward: the largest moves.
     tilt:       the tilt from which the optimizer starts.
-    limiter, tilt_limit: the function that clamps a command, and the limit.
+    limiter:    the function that clamps a command.
     fed:        the angles with rate feedback.
     limited:    the angles that a step without limits clamps.
     held:       the statement of a step with limits that holds the last command.
@@ -57,7 +57,6 @@ class StepChoices:
     most_forward: str
     tilt: str
     limiter: str
-    tilt_limit: str
     angles: tuple[Angle, Angle]
     fed: tuple[Angle, ...]
     limited: tuple[Angle, ...]
@@ -101,7 +100,6 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         most_forward="bounds->command_m_step2[NMPC_FORWARD]" if has_limits else "NMPC_FORWARD_LIMIT_M_STEP2",
         tilt="attitude->tilt_m_step2" if constants.settings.model.attitude == "predicted" else "tilt_m_step2",
         limiter="shared_clamp" if has_height else "clamp",
-        tilt_limit="self->bounds.tilt_rad" if has_limits else "NMPC_TILT_LIMIT_RAD",
         angles=angles,
         fed=fed,
         limited=angles if has_height or constants.learns_tilt_gain else fed,
