@@ -22,73 +22,54 @@ def _without_minus_zero(value: float) -> float:
     return value + 0.0
 
 
-def _none_or_lag(value: float) -> float:
-    """Return an attitude lag in seconds; refuse one between 0 and SHORTEST_LAG_S."""
-    if 0 < value < SHORTEST_LAG_S:
-        raise PydanticCustomError("lag", f"must be 0 or lie in {SHORTEST_LAG_S}..2; 0 means no lag")
-    return value
+def _none_or(least: float, most: float) -> Any:
+    """Return the bounds of a number that is 0 or lies in `least`..`most`, for the JSON schema."""
+    absent = {"exclusiveMinimum": 0, "exclusiveMaximum": least}
+    return Field(ge=0, le=most, json_schema_extra={"not": absent})
 
 
-def _none_or_delay(value: float) -> float:
-    """Return a dead time in seconds; refuse one between 0 and SHORTEST_LAG_S."""
-    if 0 < value < SHORTEST_LAG_S:
-        raise PydanticCustomError("delay", f"must be 0 or lie in {SHORTEST_LAG_S}..0.1; 0 means no dead time")
-    return value
+def _refuse_between(least: float, kind: str, rule: str) -> AfterValidator:
+    """Return a validator that refuses a number between 0 and `least`; `rule` is the message."""
+
+    def check(value: float) -> float:
+        if 0 < value < least:
+            raise PydanticCustomError(kind, rule)
+        return value
+
+    return AfterValidator(check)
 
 
-def _none_or_ramp(value: float) -> float:
-    """Return a ramp in seconds; refuse one between 0 and SHORTEST_RAMP_S."""
-    if 0 < value < SHORTEST_RAMP_S:
-        raise PydanticCustomError("ramp", f"must be 0 or lie in {SHORTEST_RAMP_S}..2; 0 means one free move")
-    return value
+_REFUSE_LIMIT: Final = _refuse_between(
+    SMALLEST_LIMIT, "limit", f"must be 0 or at least {SMALLEST_LIMIT}; 0 means no limit"
+)
 
+_NO_MINUS_ZERO: Final = AfterValidator(_without_minus_zero)
 
-def _none_or_limit(value: float) -> float:
-    """Return a limit of speed or braking; refuse one between 0 and SMALLEST_LIMIT."""
-    if 0 < value < SMALLEST_LIMIT:
-        raise PydanticCustomError("limit", f"must be 0 or at least {SMALLEST_LIMIT}; 0 means no limit")
-    return value
-
-
-Number = Annotated[float, AfterValidator(_without_minus_zero)]
+Number = Annotated[float, _NO_MINUS_ZERO]
 Lag = Annotated[
     float,
-    Field(ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}),
-    AfterValidator(_none_or_lag),
-    AfterValidator(_without_minus_zero),
+    _none_or(SHORTEST_LAG_S, 2),
+    _refuse_between(SHORTEST_LAG_S, "lag", f"must be 0 or lie in {SHORTEST_LAG_S}..2; 0 means no lag"),
+    _NO_MINUS_ZERO,
 ]
 Delay = Annotated[
     float,
-    Field(
-        ge=0, le=0.1, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}
+    _none_or(SHORTEST_LAG_S, 0.1),
+    _refuse_between(
+        SHORTEST_LAG_S, "delay", f"must be 0 or lie in {SHORTEST_LAG_S}..0.1; 0 means no dead time"
     ),
-    AfterValidator(_none_or_delay),
-    AfterValidator(_without_minus_zero),
+    _NO_MINUS_ZERO,
 ]
 Ramp = Annotated[
     float,
-    Field(
-        ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_RAMP_S}}
+    _none_or(SHORTEST_RAMP_S, 2),
+    _refuse_between(
+        SHORTEST_RAMP_S, "ramp", f"must be 0 or lie in {SHORTEST_RAMP_S}..2; 0 means one free move"
     ),
-    AfterValidator(_none_or_ramp),
-    AfterValidator(_without_minus_zero),
+    _NO_MINUS_ZERO,
 ]
-SpeedLimit = Annotated[
-    float,
-    Field(
-        ge=0, le=1000, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SMALLEST_LIMIT}}
-    ),
-    AfterValidator(_none_or_limit),
-    AfterValidator(_without_minus_zero),
-]
-BrakingLimit = Annotated[
-    float,
-    Field(
-        ge=0, le=10, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SMALLEST_LIMIT}}
-    ),
-    AfterValidator(_none_or_limit),
-    AfterValidator(_without_minus_zero),
-]
+SpeedLimit = Annotated[float, _none_or(SMALLEST_LIMIT, 1000), _REFUSE_LIMIT, _NO_MINUS_ZERO]
+BrakingLimit = Annotated[float, _none_or(SMALLEST_LIMIT, 10), _REFUSE_LIMIT, _NO_MINUS_ZERO]
 
 
 @dataclass(frozen=True)
