@@ -11,10 +11,9 @@ from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
-from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST, YAW_LIMIT_RAD
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension

@@ -7,8 +7,8 @@ from typing import Final, Literal
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
 HEADING_RATE_RAD_S: Final = 4.0

@@ -19,7 +19,6 @@ from mambo_codegen.methods.shared.limits_constants import (
     SPELLING,
     TURN_SHARE,
 )
-from mambo_codegen.methods.shared.members import bounds_members
 from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
@@ -63,7 +62,7 @@ def limits_context(method: Method) -> dict[str, object]:
 
 def _bounds(method: Method, stored: list[str]) -> list[dict[str, str]]:
     """Return name and initial value of each member of nmpc_bounds_t, whose numbers are `stored`."""
-    left, members = iter(stored), bounds_members(method).items()
+    left, members = iter(stored), method.bounds_members.items()
     values = {name: [next(left) for _ in range(count)] for name, count in members}
     return [
         {"name": name, "value": f"{{ {', '.join(value)} }}" if len(value) > 1 else value[0]}

@@ -33,22 +33,22 @@ from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
-from mambo_codegen.methods.shared.members import limits_members, state_members, target_members
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import (
+    ATTITUDE_LIMIT_RAD,
     PREVIEW_PERIOD_S,
     PREVIEW_TIMES,
     STATE,
     TARGET,
     THRUST,
     WEIGHTS,
+    YAW_LIMIT_RAD,
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import to_toml
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
 FLOW_NOISE_M: Final = 0.02
@@ -214,8 +214,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             **limits_context(method),
             "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
             "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
-            "state_members": state_members(method),
-            "limits_members": limits_members(method),
+            "state_members": method.state_members,
+            "limits_members": method.limits_members,
             "fuzz_target": _target_inputs(method, len(method.state)),
             "proof_target": _target_inputs(method, len(method.state) - method.has_height),
             "level_columns": len(method.level_target),
@@ -225,7 +225,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "given": settings.target.gives_acceleration,
             "preview": PREVIEW_TIMES if method.has_preview else 0,
             "preview_period_s": PREVIEW_PERIOD_S,
-            "previewed": [name for name in target_members(method) if name.startswith("preview")],
+            "previewed": [name for name in method.target_members if name.startswith("preview")],
             "trigonometry": method.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
@@ -267,7 +267,7 @@ def _target_inputs(method: Method, first: int) -> list[tuple[str, int]]:
     Without a height the thrust stands between velocity and acceleration.
     """
     thrust = len(TARGET) if not method.has_height else math.inf
-    return [(name, first + k + (k >= thrust)) for k, name in enumerate(target_members(method))]
+    return [(name, first + k + (k >= thrust)) for k, name in enumerate(method.target_members)]
 
 
 def _settings_id(settings: Settings) -> str:

@@ -24,8 +24,7 @@ def _without_minus_zero(value: float) -> float:
 
 def _none_or(least: float, most: float) -> Any:
     """Return the bounds of a number that is 0 or lies in `least`..`most`, for the JSON schema."""
-    absent = {"exclusiveMinimum": 0, "exclusiveMaximum": least}
-    return Field(ge=0, le=most, json_schema_extra={"not": absent})
+    return Field(ge=0, le=most, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": least}})
 
 
 def _refuse_between(least: float, kind: str, rule: str) -> AfterValidator:

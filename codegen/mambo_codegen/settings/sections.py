@@ -25,10 +25,9 @@ from mambo_codegen.settings.fields import (
     SettingsSection,
     type_of,
 )
-from mambo_codegen.settings.guard_section import Guard
-from mambo_codegen.settings.height_section import Height
 from mambo_codegen.settings.limits_section import Limits
 from mambo_codegen.settings.optimizer_section import Optimizer
+from mambo_codegen.settings.optional_sections import Guard, Height
 
 
 class Horizon(SettingsSection):

@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.literals import SCALARS, Scalar
-from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_codegen.numbers.representation import (
+    ATTITUDE_LIMIT_RAD,
+    STATE,
+    THRUST,
+    WEIGHT_LIMIT,
+    WEIGHTS,
+    YAW_LIMIT_RAD,
+)
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.calls import ApiFunction, Outcomes, Tape, answers, api_of, calls
 from mambo_sil.verify.step_inputs import POSITION, TILT, VELOCITY, YAW, StepInputs, StepRows, random_steps

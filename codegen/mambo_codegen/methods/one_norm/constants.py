@@ -16,7 +16,7 @@ from mambo_codegen.methods.shared.limits_constants import (
     limits_constants,
     stored_quantities,
 )
-from mambo_codegen.settings.limits import WEIGHT_LIMIT
+from mambo_codegen.numbers.representation import WEIGHT_LIMIT
 
 
 class OneNormConstants(Constants):

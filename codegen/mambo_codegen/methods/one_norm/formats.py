@@ -30,8 +30,8 @@ from mambo_codegen.methods.shared.limits_constants import (
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import MARGIN, PRODUCT_BITS, fractional_bits, integer_bits, raw
+from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_codegen.settings.key import Refusal
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_codegen.settings.sections import Sections
 
 UPPER_BITS: Final = 32

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,6 @@ from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, THRUST
-
-REST_M_S: Final = 0.02
-"""After an outage the model brakes to this speed along both axes; then the command is level."""
 
 
 @dataclass(frozen=True)

@@ -39,8 +39,8 @@ from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import tracker_constants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
+from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.key import Refusal
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.sections import Sections
 
 _TURN: Final = 2.01
@@ -93,32 +93,9 @@ class _Bounds:
     learnt_m_s2: float
 
 
+@lru_cache(maxsize=64)
 def formats(settings: Sections) -> QuadraticFormats:
     """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
-    return _formats(
-        settings.horizon,
-        settings.model,
-        settings.target,
-        settings.cost,
-        settings.observer,
-        settings.damping,
-        settings.limits,
-        settings.height,
-        settings.guard,
-        settings.ranges,
-    )
-
-
-_SECTIONS: Final = (
-    *("horizon", "model", "target", "cost", "observer", "damping"),
-    *("limits", "height", "guard", "ranges"),
-)
-"""The sections that formats depend on."""
-
-
-@lru_cache(maxsize=64)
-def _formats(*sections: Any) -> QuadraticFormats:
-    settings = Sections.model_construct(**dict(zip(_SECTIONS, sections, strict=True)))
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, height = law_constants(settings), height_constants(settings)
     vector = thrust_vector_constants(settings, attitude.gain_m_step2_rad)

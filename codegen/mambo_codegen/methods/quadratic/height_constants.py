@@ -20,8 +20,8 @@ from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_sma
 from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, has_thrust_vector
 from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.settings.height_section import Height
 from mambo_codegen.settings.key import Refusal
+from mambo_codegen.settings.optional_sections import Height
 from mambo_codegen.settings.sections import Sections
 
 LEAST_WEIGHT: Final = 0.3

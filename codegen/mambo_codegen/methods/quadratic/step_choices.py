@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.shared.members import target_members
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         limited=angles if has_height or constants.learns_tilt_gain else fed,
         held=f"hold(self, attitude{inverse});" if constants.feedback_steps else "/* The command holds. */",
         cleared=_cleared(has_height=has_height) if tracker else (),
-        rested=target_members(constants),
+        rested=constants.target_members,
         target_motion="acceleration_m_s2" if is_given else "velocity_m_s",
         closing=(
             *(("height_predict(height, on_ground)",) if has_height else ()),

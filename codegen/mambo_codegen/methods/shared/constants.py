@@ -13,19 +13,21 @@ from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tra
 from mambo_codegen.numbers.fixed_point import Formats
 from mambo_codegen.numbers.representation import (
     ACCELERATION,
+    ATTITUDE_LIMIT_RAD,
     COMMAND,
     CONTACT,
     HEIGHT,
     PREVIEW_NUMBERS,
+    PREVIEW_TIMES,
     STATE,
     TARGET,
     THRUST,
     WEIGHTS,
+    YAW_LIMIT_RAD,
     InputLimits,
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
-from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.sections import Sections
 
 
@@ -129,6 +131,43 @@ class Constants(ABC):
         axes = 3 if self.has_height else 2
         return (*["position"] * axes, *["velocity"] * axes, "yaw")
 
+    @property
+    def state_members(self) -> tuple[str, ...]:
+        """The members of nmpc_state_t, arrays by element, in the order of their numbers; likewise below."""
+        level = (*_pairs("position_m", "velocity_m_s"), "roll_rad", "pitch_rad", "yaw_rad")
+        return (*level, "height_m", "climb_m_s", "grounded") if self.has_height else level
+
+    @property
+    def target_members(self) -> tuple[str, ...]:
+        """The members of nmpc_target_t."""
+        is_given = self.settings.target.gives_acceleration
+        level = _pairs("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
+        upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
+        times = range(PREVIEW_TIMES * self.has_preview)
+        ahead = (f"preview_m_s2[{time}][{axis}]" for time in times for axis in range(3))
+        return (*level, *upward, *ahead) if self.has_height else level
+
+    @property
+    def limits_members(self) -> tuple[str, ...]:
+        """The members of nmpc_limits_t."""
+        level = ("speed_m_s", "braking_m_s2", *_pairs("fence_min_m", "fence_max_m"), "tilt_rad")
+        return (*level, "floor_m", "ceiling_m", "climb_m_s", "descent_m_s") if self.has_height else level
+
+    @property
+    def bounds_members(self) -> dict[str, int]:
+        """The members of nmpc_bounds_t, and how many numbers each holds."""
+        is_given = self.settings.target.gives_acceleration
+        is_turning = self.limiting is not None and self.limiting.turn_m_s_rad is not None
+        return {
+            "centre_m": 2,
+            "clear_m": 2,
+            **dict.fromkeys(("margin_m", "knee_m", "near_m", "speed_m_s", "braking_m_s2", "tilt_rad"), 1),
+            **({"command_m_step2": 2} if self.settings.cost.norm == "quadratic" else {}),
+            **({"velocity_m_s": 2} if is_given else {}),
+            **({"target_m_s": 2, "turn_m2_s2": 1} if is_turning else {}),
+            **(dict.fromkeys(("floor_m", "ceiling_m", "up_m", "down_m"), 1) if self.has_height else {}),
+        }
+
     @cached_property
     def numbers(self) -> Representation:
         """The scalar type of the C, and in fixed point the format of each quantity."""
@@ -160,3 +199,7 @@ class Constants(ABC):
         """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` in fixed point."""
         bits = self.numbers.bits
         return trigonometry(self.settings.code.scalar) if bits is None else fixed_trigonometry(bits["yaw"])
+
+
+def _pairs(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}[{axis}]" for name in names for axis in range(2))
