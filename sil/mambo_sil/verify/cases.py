@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, given_limit_m_s2
 from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
@@ -64,7 +64,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *(_zero_errors(settings) if method.iterates else []),
         *(_outages(settings, rng, method.outage_steps) if method.outage_steps is not None else []),
         *_largest_inputs(settings, rng),
-        *_target_motion(settings),
+        *(_target_motion(settings, method.tracker) if method.tracker else []),
     )
     return tapes, tuple(answers(settings, tapes))
 
@@ -383,43 +383,51 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
     yield from np.stack(columns, axis=1)
 
 
-def _target_motion(settings: Settings) -> Iterator[Tape]:
-    """For a tracker change the target's velocity by its limit and the numbers next to it, either way.
+def _target_motion(settings: Settings, tracker: TrackerConstants) -> Iterator[Tape]:
+    """Change the target's velocity by the tracker's limit and the numbers next to it, either way.
 
-    If the acceleration is given, set it to its limit and the numbers next to that. Then accelerate the target
-    to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way, and
-    with a turn of the frame.
+    If the acceleration is given, set it to these. Then accelerate the target to and fro along both axes, so
+    that acceleration and jerk reach their limits, with a reset on the way, and with turns of the frame.
     """
-    tracker, ranges = method_of(settings).tracker, settings.ranges
-    if tracker is None:
-        return
-    rows = StepRows(method_of(settings))
-    aimed = slice(rows.target.start + VELOCITY.start, rows.target.start + VELOCITY.stop)
-
-    def steps(motion: Array) -> Tape:
-        made = rows.hovering(len(motion))
-        if tracker.is_given:
-            made[:, rows.acceleration] = motion
-        else:
-            made[:, VELOCITY] = made[:, aimed] = np.clip(motion, -ranges.velocity_m_s, ranges.velocity_m_s)
-        made[:, 0] = 1e-3
-        return calls(settings, ApiFunction.STEP, made)
-
     limit = tracker.input_limit
     for value in _around(settings, tracker.input_quantity, -limit, limit):
         if np.isfinite(value):
             for columns in ([1, 0], [0, 1]):
-                yield steps(np.outer([0.0, value, value, 0.0], columns))
+                yield _target_steps(settings, np.outer([0.0, value, value, 0.0], columns))
     motion = limit * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
     if not tracker.is_given:
         motion = np.cumsum(motion)
+        yield from _jumps_at_the_ends(settings, 0.25 * limit)
     both = motion[:, None] * [1.0, -0.7]
     again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
-    yield np.concatenate([steps(both), again, steps(both[::-1])])
+    yield np.concatenate([_target_steps(settings, both), again, _target_steps(settings, both[::-1])])
+    before, after = _target_steps(settings, both[:32]), _target_steps(settings, both[32:])
     turned = np.zeros((1, len(method_of(settings).shift)))
-    turned[:, -1] = 0.3
-    turn = calls(settings, ApiFunction.SHIFT, turned)
-    yield np.concatenate([steps(both[:32]), turn, steps(both[32:])])
+    for turn_rad in _around(settings, "yaw", 0.0, 0.3):
+        turned[:, -1] = turn_rad
+        yield np.concatenate([before, calls(settings, ApiFunction.SHIFT, turned), after])
+
+
+def _target_steps(settings: Settings, motion: Array) -> Tape:
+    """Return steps of targets with accelerations (n, 2), if these are given, or the drone's velocities."""
+    rows, most_m_s = StepRows(method_of(settings)), settings.ranges.velocity_m_s
+    made, first = rows.hovering(len(motion)), rows.target.start
+    if settings.target.gives_acceleration:
+        made[:, rows.acceleration] = motion
+    else:
+        made[:, VELOCITY] = made[:, first + 2 : first + 4] = np.clip(motion, -most_m_s, most_m_s)
+    made[:, 0] = 1e-3
+    return calls(settings, ApiFunction.STEP, made)
+
+
+def _jumps_at_the_ends(settings: Settings, change_m_s: float) -> Iterator[Tape]:
+    """Let the frame jump by twice a change of velocity, beyond the end of the range, where the target is."""
+    jump, axes = np.zeros((1, len(method_of(settings).shift))), len(method_of(settings).shift) // 2
+    speed_m_s = settings.ranges.velocity_m_s - change_m_s * np.array([3.0, 2.0, 1.0, 0.0, 0.0])
+    for way in (-1.0, 1.0):
+        steps = _target_steps(settings, np.outer(speed_m_s, [way, way]))
+        jump[:, axes : axes + 2] = 2.0 * way * change_m_s
+        yield np.concatenate([steps[:3], calls(settings, ApiFunction.SHIFT, jump), steps[3:]])
 
 
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:

@@ -359,21 +359,27 @@ static int tells_alike(const nmpc_t *self, const nmpc_t *other)
 }
 #endif
 
-/* A jump of the frame in floats is that in numbers. */
-static int shifts_alike(nmpc_t *self, nmpc_t *other)
+/* A jump of the frame in floats, with a turn of sixteenths of a radian, is that in numbers. */
+static int shifts_alike(nmpc_t *self, nmpc_t *other, int sixteenths)
 {
     const float position_m[3] = { 0.5f, -0.25f, 0.125f };
     const float velocity_m_s[3] = { 0.0078125f, -0.015625f, 0.25f };
-    const float far[3] = { 0.0f, 1e9f, 0.0f };
+    const float heading_rad = 0.0625f * (float)sixteenths;
     const nmpc_real_t position[3] = { NMPC_POSITION(0.5), NMPC_POSITION(-0.25), NMPC_POSITION(0.125) };
     const nmpc_real_t velocity[3] = { NMPC_VELOCITY(0.0078125), NMPC_VELOCITY(-0.015625), NMPC_VELOCITY(0.25) };
+    int is_good = (nmpc_float_shift(self, NULL, velocity_m_s, heading_rad) == NMPC_NULL_POINTER)
+                  && (nmpc_float_shift(self, position_m, NULL, heading_rad) == NMPC_NULL_POINTER);
+    int axis;
 
-    return (nmpc_float_shift(self, NULL, velocity_m_s, 0.0625f) == NMPC_NULL_POINTER)
-           && (nmpc_float_shift(self, position_m, NULL, 0.0625f) == NMPC_NULL_POINTER)
-           && (nmpc_float_shift(self, far, velocity_m_s, 0.0625f) == NMPC_BAD_SHIFT)
-           && (nmpc_float_shift(self, position_m, far, 0.0625f) == NMPC_BAD_SHIFT)
-           && (nmpc_float_shift(self, position_m, velocity_m_s, 0.0625f) == NMPC_OK)
-           && (nmpc_shift(other, position, velocity, NMPC_YAW(0.0625)) == NMPC_OK);
+    for (axis = 0; axis < 2; axis++) {
+        float far[3] = { 0.0f, 0.0f, 0.0f };
+
+        far[axis] = 1e9f;
+        is_good = is_good && (nmpc_float_shift(self, far, velocity_m_s, heading_rad) == NMPC_BAD_SHIFT)
+                  && (nmpc_float_shift(self, position_m, far, heading_rad) == NMPC_BAD_SHIFT);
+    }
+    return is_good && (nmpc_float_shift(self, position_m, velocity_m_s, heading_rad) == NMPC_OK)
+           && (nmpc_shift(other, position, velocity, NMPC_YAW(0.0625) * sixteenths) == NMPC_OK);
 }
 
 /* A heading in floats is that in numbers. */
@@ -466,13 +472,15 @@ static int passes_floats(nmpc_t *self)
               && is_alike(nmpc_float_step(self, NULL, &target, NMPC_REPLAY_THRUST(9.75f) & found), NMPC_NULL_POINTER,
                           &found, &command)
               && is_alike(nmpc_float_step(self, &state, NULL, NMPC_REPLAY_THRUST(9.75f) & found), NMPC_NULL_POINTER,
-                          &found, &command)
-              && shifts_alike(self, &other);
-    expected = nmpc_step(&other, &state_numbers, &target_numbers, NMPC_REPLAY_THRUST(gravity_m_s2) & command);
-    is_good = is_good
-              && is_alike(nmpc_float_step(self, &state, &target, NMPC_REPLAY_THRUST(9.75f) & found), expected, &found,
-                          &command)
-              && tells_alike(self, &other);
+                          &found, &command);
+    for (i = 0; i < 2; i++) {
+        is_good = is_good && shifts_alike(self, &other, i);
+        expected = nmpc_step(&other, &state_numbers, &target_numbers, NMPC_REPLAY_THRUST(gravity_m_s2) & command);
+        is_good = is_good
+                  && is_alike(nmpc_float_step(self, &state, &target, NMPC_REPLAY_THRUST(9.75f) & found), expected, &found,
+                              &command)
+                  && tells_alike(self, &other);
+    }
     for (i = 0; i < 4; i++) {
 #ifdef NMPC_FUZZ_SET_THRUST
         is_good = is_good && (nmpc_float_set_thrust(self, unheld[i]) == NMPC_BAD_THRUST);
