@@ -790,18 +790,16 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
     }
 }
 
-/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one. */
+/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one:
+ * there the jerk begins at 0. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
     int axis;
 
     turn_vector(tracker->acceleration_m_step2, sine, cosine);
-    turn_vector(tracker->jerk_m_step2_update, sine, cosine);
     for (axis = 0; axis < 2; axis++) {
         tracker->acceleration_m_step2[axis] = clamp(tracker->acceleration_m_step2[axis], NMPC_TARGET_BOUND_M_STEP2);
-        tracker->jerk_m_step2_update[axis] =
-            clamp(tracker->jerk_m_step2_update[axis], NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
     }
     self->has_target = 0U;
 }

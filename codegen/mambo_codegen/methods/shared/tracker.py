@@ -155,14 +155,18 @@ class Tracker:
         return replace(motion, velocity_m_s=clamp(motion.velocity_m_s + change, self._velocity_range))
 
     def turn(self, motion: TargetMotion, sine: Real, cosine: Real) -> TargetMotion:
-        """Turn the targets' accelerations (n, 2) by the angles of sine and cosine (n,)."""
+        """Turn the targets' accelerations (n, 2) by the angles of sine and cosine (n,).
+
+        And their jerks if the accelerations are given; else the next velocities are the first ones, where the
+        jerk begins at 0.
+        """
         turn = self._arithmetic.turn
-        turned = replace(
-            motion,
-            acceleration_m_step2=clamp(turn(motion.acceleration_m_step2, sine, cosine), self._bound),
-            jerk_m_step2_update=clamp(turn(motion.jerk_m_step2_update, sine, cosine), self._jerk_limit),
-        )
-        return self.begin_again(turned)
+        acceleration = clamp(turn(motion.acceleration_m_step2, sine, cosine), self._bound)
+        turned = replace(motion, acceleration_m_step2=acceleration)
+        if not self.is_given:
+            return self.begin_again(turned)
+        jerk = clamp(turn(motion.jerk_m_step2_update, sine, cosine), self._jerk_limit)
+        return replace(turned, jerk_m_step2_update=jerk)
 
     def begin_again(self, motion: TargetMotion) -> TargetMotion:
         """Take the next velocities for the first ones; accelerations that are given go on."""
