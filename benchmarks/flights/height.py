@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.guard_section import Guard
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.optional_sections import Guard
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.settings.limits import YAW_LIMIT_RAD
+from mambo_codegen.numbers.representation import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 from mambo_sil.api.frames import wrapped
 from mambo_sil.api.states import DroneState, TargetState
