@@ -102,19 +102,6 @@ def test_a_bad_record_names_file_key_and_rule(
     assert message in str(caught.value)
 
 
-def test_a_record_of_version_0_1_is_refused_in_one_line(tmp_path: Path) -> None:
-    """Whatever keys it has: none is read."""
-    path = tmp_path / "old.json"
-    write_record(Record(scenario=HARD, settings=MAMBO), path)
-    document = json.loads(path.read_text())
-    document["scenario"] |= {"wind_m_s2": [0.5, 0.0]}
-    path.write_text(json.dumps(document | {"format": 1}))
-    with pytest.raises(
-        ScenarioError, match=r"old\.json: is a record of another version .*; repeat it with that version$"
-    ):
-        read_record(path)
-
-
 def test_file_that_holds_no_record_is_refused(tmp_path: Path) -> None:
     """A file that is missing, not JSON or larger than 1 MB raises `ScenarioError`."""
     (tmp_path / "text").write_text("hello")
