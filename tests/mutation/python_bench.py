@@ -62,7 +62,7 @@ _MARGIN_TESTS: Final = "tests/experiment/margins"
 ROOMS: Final = {
     "fences": Room(
         source=("sil/mambo_sil/flight/fences.py",),
-        tests=("tests/flight/test_fences.py", "tests/flight/test_fence_metrics.py"),
+        tests=("tests/flight/test_fences.py",),
     ),
     "tracker": Room(
         source=(f"{_METHODS}/tracker_constants.py",),
