@@ -47,7 +47,7 @@ CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/r
 LOWEST = build/lowest
 LOWEST_TESTED = $(filter-out tests/test_house.py tests/drone/plant,$(CHECKED)) tests/templates/test_generated.py tests/templates/test_parity.py \
     tests/cli/test_design.py tests/cli/test_fly.py tests/cli/test_identify.py \
-    tests/experiment/margins/test_command.py tests/verify/test_bits.py tests/board/footprint/test_counts.py
+    tests/experiment/margins/test_command.py tests/verify/test_replay.py tests/board/footprint/test_counts.py
 
 .PHONY: fly check test lowest thorough proofs tools generated docs evidence bench bench-peers clean
 

@@ -1,19 +1,12 @@
-"""A controller with a quadratic cost: every check passes it, and fails it with a fault in its C."""
+"""A controller with a quadratic cost: no alarm whatever the settings, an alarm for every fault."""
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pytest
 
-from mambo_codegen.methods.shared.inputs import Status
-from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
-from mambo_sil.verify.cases import cases
-from mambo_sil.verify.check import CheckOutcome, Result, Subject
+from mambo_sil.verify.check import CheckOutcome
 from tests.support import proven
 from tests.support.alarms import (
     INFINITY_PASSES,
@@ -27,12 +20,11 @@ from tests.support.alarms import (
     harmed,
     runs,
 )
-from tests.support.quadratic import quadratic_settings
+from tests.support.quadratic import quadratic_settings, without_limits
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
 CONTROLLER, DRIVER = "nmpc.c", "proof/nmpc_proof.c"
-FEW_RUNS = 20_000
 
 UNPROVEN = {
     "NaN passes a range check": Fault(
@@ -135,97 +127,6 @@ WITH_LIMITS = {
 }
 """Faults of lines that a controller without limits lacks or has otherwise."""
 
-FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
-    "a warning": (dialects.check, Harm(CONTROLLER, r"    int axis;\n", r"    int unused;\n\g<0>")),
-    "a rule": (
-        rules.check,
-        Harm(CONTROLLER, r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
-    ),
-    "another bit": (
-        bits.check,
-        Harm(CONTROLLER, r"\(NMPC_VELOCITY_BY_POSITION", "(NMPC_VELOCITY_BY_VELOCITY"),
-    ),
-    "another state": (bits.check, Harm(CONTROLLER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
-    "a flag that stays": (bits.check, Harm(CONTROLLER, r"    self->has_target = 0U;\n", "")),
-    "an outage a step too long": (
-        bits.check,
-        Harm(CONTROLLER, r"\(NMPC_OUTAGE_STEPS \+ 1U\)", "(NMPC_OUTAGE_STEPS + 2U)"),
-    ),
-    "a state past its end": (sanitizers.check, Harm(CONTROLLER, r"k < NMPC_STATES", "k <= NMPC_STATES")),
-    "memory read before it is written": (
-        sanitizers.check,
-        Harm(CONTROLLER, r"    attitude->cosine = NMPC_ONE;\n", ""),
-    ),
-    "a refused state leaves a trace": (
-        lambda its: fuzzing.check(its, runs=FEW_RUNS),
-        Harm(CONTROLLER, r"            good_state = NULL;\n", ""),
-    ),
-    "a refused command is set": (
-        lambda its: fuzzing.check(its, runs=FEW_RUNS),
-        Harm(
-            CONTROLLER,
-            r"(?s)(nmpc_set_command\(.*?)    if \(!is_good_command\(command\)\) \{\n",
-            r"\1    if (0) {\n",
-        ),
-    ),
-}
-
-
-def without_limits(settings: Settings) -> Settings:
-    """Return `settings` without limits of speed and braking."""
-    return with_option(with_option(settings, "limits.speed_m_s", 0.0), "limits.braking_m_s2", 0.0)
-
-
-@pytest.mark.long
-def test_the_cases_have_outcomes_of_every_status() -> None:
-    """All statuses but that of weights, a command at its limit, and an outage longer than the estimate."""
-    outcomes = np.concatenate(cases(without_limits(quadratic_settings()))[1])
-    assert set(outcomes["status"]) == {int(status) for status in Status} - {
-        Status.BAD_WEIGHT,
-        Status.BAD_LIMITS,
-    }
-    assert set(outcomes["saturated"]) == {0, 1}
-    assert set(outcomes["missed"]) == set(range(52))
-
-
-@pytest.mark.long
-def test_the_cases_have_limits_of_every_kind() -> None:
-    """Limits that are set and refused, each limit acting, and commands after an outage."""
-    outcomes = np.concatenate(cases(with_option(quadratic_settings(), "limits.speed_m_s", 2.0))[1])
-    assert set(outcomes["status"]) == {int(status) for status in Status} - {Status.BAD_WEIGHT}
-    assert set(outcomes["active"]) >= {0, 1, 2, 5, 6}
-    assert set(outcomes["missed"]) >= set(range(52))
-
-
-@pytest.mark.first_is_quick
-@pytest.mark.parametrize(
-    ("scalar", "check", "tool", "package"),
-    [
-        pytest.param("float32", dialects.check, "clang", "clang", id="float32-warnings"),
-        pytest.param("float32", bits.check, "clang", "clang", id="float32-bits"),
-        pytest.param(
-            "fixed", sanitizers.check, "clang", "clang", id="fixed-sanitizers", marks=pytest.mark.long
-        ),
-        *(
-            pytest.param("float64", check, tool, tool, id=f"float64-{name}", marks=pytest.mark.long)
-            for name, check, tool in (
-                ("warnings", dialects.check, "clang"),
-                ("rules", rules.check, "cppcheck"),
-                ("bits", bits.check, "clang"),
-                ("sanitizers", sanitizers.check, "clang"),
-                ("fuzzing", partial(fuzzing.check, runs=fuzzing.RUNS // 5), "clang"),
-            )
-        ),
-    ],
-)
-def test_a_check_passes(
-    scalar: str, check: Callable[[Subject], Result], tool: str, package: str, tmp_path: Path
-) -> None:
-    """Nothing is found; the other checks of float32, and the proofs, are in the tests of all presets."""
-    require(tool, package)
-    result = check(subject(quadratic_settings(scalar), tmp_path))
-    assert result.outcome is CheckOutcome.PASSED, result.evidence
-
 
 @pytest.mark.long
 @pytest.mark.parametrize("chosen", OTHERS, ids=lambda chosen: " ".join(map(str, chosen)))
@@ -260,15 +161,3 @@ def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None
     if WITH_LIMITS.isdisjoint(names):
         settings = without_limits(settings)
     assert proven.unnoticed(harmed(settings, tmp_path, faults), faults) == []
-
-
-@pytest.mark.sampled(2)
-@pytest.mark.long
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_check_finds_a_fault(fault: str, tmp_path: Path) -> None:
-    """The check that is there for it fails."""
-    require("clang", "clang")
-    require("cppcheck", "cppcheck")
-    check, harm = FAULTS[fault]
-    result = check(subject(quadratic_settings(), tmp_path, harm))
-    assert result.outcome is CheckOutcome.FAILED, result.evidence

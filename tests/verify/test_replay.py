@@ -8,6 +8,7 @@ import pytest
 from mambo_codegen.errors import BuildError
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import tape_replay
 from mambo_sil.verify.calls import (
     NULL_COMMAND,
@@ -21,19 +22,39 @@ from mambo_sil.verify.calls import (
 from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import Subject
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import quadratic_settings, without_limits
 from tests.support.subjects import played_fault, subject
 
 MAMBO = ONE_NORM
+LIMITED = with_option(quadratic_settings(), "limits.speed_m_s", 2.0)
 GOOD = np.array([[0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9.81]])
 REFUSED = np.full((1, 12), np.nan)
 
 
 @pytest.mark.long
-def test_the_cases_have_outcomes_of_every_status() -> None:
-    """No status of the interface is left untried."""
-    limited = with_option(MAMBO, "limits.speed_m_s", 2.0)
-    statuses = np.concatenate([outcome["status"] for outcome in cases(limited)[1]])
-    assert set(statuses) == {int(status) for status in Status}
+@pytest.mark.parametrize(
+    ("settings", "untried"),
+    [
+        (with_option(MAMBO, "limits.speed_m_s", 2.0), set()),
+        (LIMITED, {Status.BAD_WEIGHT}),
+        (without_limits(LIMITED), {Status.BAD_WEIGHT, Status.BAD_LIMITS}),
+    ],
+    ids=["1-norm", "quadratic", "quadratic without limits"],
+)
+def test_the_cases_have_outcomes_of_every_status(settings: Settings, untried: set[Status]) -> None:
+    """No status of the interface is left untried, but those that the settings do not have."""
+    statuses = np.concatenate([outcome["status"] for outcome in cases(settings)[1]])
+    assert set(statuses) == {int(status) for status in Status} - untried
+
+
+@pytest.mark.long
+def test_the_cases_have_limits_of_every_kind_and_long_outages() -> None:
+    """Each limit acting, commands at their limit and within, and outages longer than the estimate."""
+    limited, without = (np.concatenate(cases(one)[1]) for one in (LIMITED, without_limits(LIMITED)))
+    assert set(limited["active"]) >= {0, 1, 2, 5, 6}
+    assert set(limited["missed"]) >= set(range(52))
+    assert set(without["saturated"]) == {0, 1}
+    assert set(without["missed"]) == set(range(52))
 
 
 @pytest.mark.first_is_quick

@@ -1,4 +1,4 @@
-"""Controllers of the height, with guard, thrust vector, preview: they pass checks, their faults do not."""
+"""Controllers with height, guard, thrust vector, preview, learnt gain: checks pass them, not their faults."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -7,20 +7,37 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify import fuzzing, rules, sanitizers
 from mambo_sil.verify.calls import NULL_SELF, ApiFunction, Outcomes, Tape, answers, calls
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.step_rows import StepRows
 from tests.support import proven
 from tests.support.alarms import Alarm, Fault, harmed
 from tests.support.height import height_case
+from tests.support.quadratic import quadratic_case
 from tests.support.subjects import Harm, played_fault, subject
 from tests.support.tools import require
 
-CORNERS = {"preview": 9, "height": 1, "thrust vector": 6, "guard": 5}
+CORNERS = {
+    name: height_case(index, "float32")
+    for name, index in (("preview", 9), ("height", 1), ("thrust vector", 6), ("guard", 5))
+}
 """Of `tests.support.height`; the samples leave out the guard, which the thrust vector has too."""
+LEARNING = {
+    name: with_option(settings, "observer.tilt_gain", "learnt")
+    for name, settings in (
+        ("learnt gain", CORNERS["guard"]),
+        ("learnt gain, thrust vector", CORNERS["thrust vector"]),
+        ("learnt gain, level", quadratic_case(0, "float32")),
+    )
+}
+"""With a height, limits and guard, with small angles and with the thrust vector; and without a height."""
+CORNERS |= {"learnt gain": LEARNING["learnt gain"]}
 FAULTS = {
     "height": {
         "the floor is not felt": Harm("nmpc.c", r"\(state->grounded != 0\)", "(state->grounded > 1)"),
@@ -102,6 +119,42 @@ FAULTS = {
             "limited->preview_m_s2[time][axis] = (nmpc_real_t)0;",
         ),
     },
+    "learnt gain": {
+        "the quick mean is slow": Harm(
+            "nmpc.c", r"tilt_gain_mean\(quick_row, learnt->quick", "tilt_gain_mean(slow_row, learnt->quick"
+        ),
+        "a mean forgets the other way": Harm(
+            "nmpc.c", r"\(row\[0\] \* mean\) \+ \(row\[1\] \* value\)", "(row[1] * mean) + (row[0] * value)"
+        ),
+        "an error has no sign": Harm(
+            "nmpc.c", r"\? -error_m_step2 : error_m_step2", "? error_m_step2 : error_m_step2"
+        ),
+        "an error has no limit": Harm(
+            "nmpc.c",
+            r"moved_m_step2, NMPC_TILT_GAIN_MOST_M_STEP2\)",
+            "moved_m_step2, NMPC_ATTITUDE_LIMIT_M_STEP2)",
+        ),
+        "hover is learnt from": Harm("nmpc.c", r"if \(is_moved && ", "if ("),
+        "a command at the limit is learnt from": Harm("nmpc.c", r" - NMPC_TILT_GAIN_FREE;", ";"),
+        "the gain has no limits": Harm("nmpc.c", r"(#define NMPC_TILT_GAIN_MIN) [^ \n]*", r"\1 0.1f"),
+        "the means start at rest": Harm(
+            "nmpc.c",
+            r"learnt->slow_m_step2\[angle\] = attitude->tilt_m_step2\[angle\];",
+            "learnt->slow_m_step2[angle] = (nmpc_real_t)0;",
+        ),
+        "the floor is learnt from": Harm(
+            "nmpc.c",
+            r" \|\| \(state->grounded != 0\)\) \{\n            tilt_gain",
+            ") {\n            tilt_gain",
+        ),
+        "a reset keeps the gain": Harm("nmpc.c", r"    tilt_gain_clear\(&self->tilt_gain\);\n", ""),
+        "a bounded command is the model's": Harm(
+            "nmpc.c", r"tilt_gain_meant\(&self->tilt_gain, 0, change_rad\[0\]\)", "change_rad[0]"
+        ),
+        "the largest move is that of the settings": Harm(
+            "nmpc.c", r"tilt_gain_share\(learnt, NMPC_RIGHT\)", "NMPC_TILT_GAIN_ONE"
+        ),
+    },
 }
 UNPROVEN = {
     "the thrust leaves its limits": Fault(
@@ -116,17 +169,34 @@ UNPROVEN = {
 }
 
 
+def in_scalar(settings: Settings, scalar: str) -> Settings:
+    """Return `settings` with another scalar type."""
+    return with_option(settings, "code.scalar", scalar)
+
+
+def unmoved(settings: Settings) -> Tape:
+    """Return a tape of a drone that never tilts towards a target that swings: its gain falls to its limit."""
+    rows, swing = StepRows(method_of(settings)), 0.03 * np.arange(200)
+    inputs = rows.hovering(len(swing))
+    inputs[:, rows.target][:, :2] = 0.1 * np.column_stack([np.sin(swing), np.cos(swing)])
+    return calls(settings, ApiFunction.STEP, inputs)
+
+
 @lru_cache(maxsize=1)
 def played(settings: Settings) -> tuple[Sequence[Tape], Sequence[Outcomes]]:
-    """Return few random tapes, and what the reference answers."""
+    """Return few random tapes, one more for the faults of a learnt gain, and what the reference answers."""
     nothing = np.zeros((1, 1))
     tapes = [*random_tapes(settings, 60), calls(settings, ApiFunction.STEP, nothing, NULL_SELF)]
-    return tapes, answers(settings, tapes)
+    expected = answers(settings, tapes)
+    if settings == CORNERS["learnt gain"]:
+        long = [unmoved(settings)]
+        tapes, expected = tapes + long, expected + answers(settings, long)
+    return tapes, expected
 
 
 def test_the_cases_have_outcomes_of_every_status() -> None:
     """Thrusts that are set and refused, contact with the floor, and the limit of the height acting."""
-    settings = height_case(CORNERS["height"], "float32")
+    settings = CORNERS["height"]
     tapes = random_tapes(settings, 200)
     outcomes = np.concatenate(answers(settings, tapes))
     assert set(outcomes["status"]) == {int(status) for status in Status} - {
@@ -140,30 +210,30 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
 @pytest.mark.parametrize(
     ("corner", "scalar"),
     [
-        pytest.param(corner, scalar, marks=pytest.mark.long if scalar == "fixed" else ())
-        for corner in CORNERS
+        pytest.param(corner, scalar, marks=[pytest.mark.long] * (scalar == "fixed" or corner in LEARNING))
+        for corner in CORNERS | LEARNING
         for scalar in ("float32", "fixed")
     ],
 )
 def test_random_calls_have_the_bits_of_the_reference(corner: str, scalar: str, tmp_path: Path) -> None:
     """Commands, what limits act, all that is stored, and in fixed point the interface in floats."""
-    settings = height_case(CORNERS[corner], scalar)
+    settings = in_scalar((CORNERS | LEARNING)[corner], scalar)
     assert played_fault(subject(settings, tmp_path), "-O0", played=played(settings)) is None
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("corner", "fault"),
     [
-        pytest.param(corner, fault, marks=pytest.mark.long if number else ())
+        pytest.param(corner, fault, marks=[pytest.mark.long] * (number > 0))
         for corner, faults in FAULTS.items()
         for number, fault in enumerate(faults)
     ],
 )
 def test_a_fault_is_found(corner: str, fault: str, tmp_path: Path) -> None:
     """By other bits than those of the reference."""
-    settings = height_case(CORNERS[corner], "float32")
-    its = subject(settings, tmp_path, FAULTS[corner][fault])
-    found = played_fault(its, "-O0", played=played(settings))
+    its = subject(CORNERS[corner], tmp_path, FAULTS[corner][fault])
+    found = played_fault(its, "-O0", played=played(CORNERS[corner]))
     assert found is not None
     assert found.startswith("tape ")
 
@@ -174,18 +244,25 @@ def test_a_fault_is_found(corner: str, fault: str, tmp_path: Path) -> None:
 def test_every_case_has_the_bits_of_the_reference(scalar: str, tmp_path: Path) -> None:
     """Under the sanitizers of addresses, memory and undefined behaviour."""
     require("clang", "clang")
-    result = sanitizers.check(subject(height_case(CORNERS["height"], scalar), tmp_path))
+    result = sanitizers.check(subject(in_scalar(CORNERS["height"], scalar), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("corner", "runs"), [("height", 20_000), ("thrust vector", 5_000), ("preview", 5_000)]
+    ("settings", "runs"),
+    [
+        (CORNERS["height"], 20_000),
+        (CORNERS["thrust vector"], 5_000),
+        (CORNERS["preview"], 5_000),
+        (LEARNING["learnt gain, thrust vector"], 1_000),
+    ],
+    ids=["height", "thrust vector", "preview", "learnt gain"],
 )
-def test_no_call_breaks_a_promise(corner: str, runs: int, tmp_path: Path) -> None:
+def test_no_call_breaks_a_promise(settings: Settings, runs: int, tmp_path: Path) -> None:
     """With contact with the floor and limits of the height, attitudes up to upside down, any preview."""
     require("clang", "clang")
-    result = fuzzing.check(subject(height_case(CORNERS[corner], "float32"), tmp_path), runs=runs)
+    result = fuzzing.check(subject(settings, tmp_path), runs=runs)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
@@ -196,7 +273,7 @@ def test_no_call_breaks_a_promise(corner: str, runs: int, tmp_path: Path) -> Non
 def test_no_rule_is_broken(corner: str, scalar: str, tmp_path: Path) -> None:
     """MISRA C, but for the deviations that the manual lists."""
     require("cppcheck", "cppcheck")
-    result = rules.check(subject(height_case(CORNERS[corner], scalar), tmp_path))
+    result = rules.check(subject(in_scalar(CORNERS[corner], scalar), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
@@ -206,7 +283,7 @@ def test_no_rule_is_broken(corner: str, scalar: str, tmp_path: Path) -> None:
 def test_it_is_proven(corner: str, scalar: str, tmp_path: Path) -> None:
     """No run-time error, all numbers finite, commands within limits, budgets from 0 to what they hold."""
     require("frama-c", "frama-c-base")
-    result = proven.check(subject(height_case(CORNERS[corner], scalar), tmp_path))
+    result = proven.check(subject(in_scalar(CORNERS[corner], scalar), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
@@ -216,5 +293,5 @@ def test_a_fault_raises_an_alarm(name: str, tmp_path: Path) -> None:
     """The proof says of the thrust what the header says."""
     require("frama-c", "frama-c-base")
     faults = {name: UNPROVEN[name]}
-    its = harmed(height_case(CORNERS["height"], "float32"), tmp_path, faults)
+    its = harmed(CORNERS["height"], tmp_path, faults)
     assert proven.unnoticed(its, faults) == []
