@@ -109,27 +109,13 @@ def test_the_compiler_confirms_core_and_fpu(name: str, tmp_path: Path) -> None:
     assert fpu_of(macros) == board.fpu.value
 
 
-def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A name is a named board even if a file has that name; ./name is the file."""
-    monkeypatch.chdir(tmp_path)
-    Path("mambo").write_text(change("168_000_000", "1_000_000"), encoding="utf-8")
-    Path("small.drone.toml").write_text(change("168_000_000", "2_000_000"), encoding="utf-8")
-    assert boards.load("mambo").title == "Parrot Mambo"
-    assert boards.load("./mambo").clock_hz.value == 1_000_000
-    assert boards.load("./mambo").name == "mambo"
-    assert boards.load("small.drone.toml").name == "small.drone"
-
-
-@pytest.mark.parametrize("name", ["teensy", "none/board.toml", "a\0b", "x" * 5000, "\x1b[31m"])
-def test_unknown_board_lists_those_there_are(name: str) -> None:
+def test_unknown_board_lists_those_there_are() -> None:
     """The message for an unknown board lists the named boards and mentions files."""
     with pytest.raises(SourceNotFoundError) as caught:
-        boards.load(name)
+        boards.load("teensy")
     message = str(caught.value)
     assert f"boards are {', '.join(NAMES)}, and a TOML file of the same shape describes another" in message
-    assert ("did you mean teensy41?" in message) == (name == "teensy")
-    assert message.isprintable()
-    assert len(message) < 300
+    assert "did you mean teensy41?" in message
 
 
 @pytest.mark.parametrize(
@@ -233,10 +219,12 @@ def test_a_board_s_flags_name_no_file_and_no_program(flag: str, tmp_path: Path) 
     ],
 )
 def test_a_board_s_compiler_may_be_any_of_the_usual(command: str, flags: list[str], tmp_path: Path) -> None:
-    """Usual names of cross compilers and their machine options are accepted."""
+    """Usual names of cross compilers and their machine options are accepted; the file names its board."""
     text = change('candidates = ["arm-none-eabi-gcc"]', f'candidates = ["{command}"]')
     text = text.replace('"-mthumb"', ", ".join(json.dumps(flag) for flag in flags))
-    assert set(flags) <= set(boards.load(write_board(tmp_path, text)).compiler.flags)
+    board = boards.load(write_board(tmp_path, text))
+    assert set(flags) <= set(board.compiler.flags)
+    assert board.name == "own"
 
 
 def test_section_without_keys_is_told_to_be_a_section(tmp_path: Path) -> None:
@@ -251,9 +239,3 @@ def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
     with pytest.raises(InvalidSettingsError) as caught:
         boards.load(write_board(tmp_path, 'title = ""\n'))
     assert len(caught.value.faults) == 1 + len(set(SECTIONS) - OPTIONAL)
-
-
-def test_folder_is_unreadable(tmp_path: Path) -> None:
-    """A file of a board is read as one of settings, and what is refused there is refused here."""
-    with pytest.raises(UnreadableFileError, match="is a folder"):
-        boards.load(str(tmp_path))

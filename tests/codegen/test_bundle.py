@@ -112,14 +112,6 @@ def test_force_overwrites_the_conflicts_and_nothing_else(folder: Path) -> None:
     assert content(folder) == {**expected(FILES), "src/other.c": b"int other;\n"}
 
 
-def test_dropped_file_edited_by_hand_stays(folder: Path) -> None:
-    """A file that the next bundle no longer has is removed only as we wrote it."""
-    (folder / "src" / "a.c").write_text("my work\n", encoding="utf-8")
-    changes = bundle.write(NEXT, folder)
-    assert changes.kept == ("src/a.c",)
-    assert (folder / "src" / "a.c").read_text(encoding="utf-8") == "my work\n"
-
-
 def test_folder_of_somebody_else_is_shared_unless_paths_collide(tmp_path: Path) -> None:
     """Without a manifest every file is foreign: other names stay, the same name is refused."""
     (tmp_path / "out").mkdir()
@@ -266,7 +258,7 @@ def test_files_that_a_bundle_no_longer_has_go_and_edited_ones_stay(folder: Path)
     new = {"README.md": "one", "nmpc.h": "one", "nmpc.c": "one"}
     changes = bundle.write(new, folder)
     assert changes.removed == ("include/nmpc.h", "src/nmpc.c")
-    assert changes.edited == ("src/a.c",)
+    assert changes.kept == changes.edited == ("src/a.c",)
     assert content(folder) == expected(new) | {"src/a.c": b"mine"}
     assert bundle.write(new, folder).edited == ()
 

@@ -11,11 +11,10 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw
 from mambo_codegen.methods.shared.limits_arithmetic import ROOT_ERROR, LimitsArithmetic
-from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, LIMITS, NEAR_SHARE
+from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, NEAR_SHARE
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.cases import random_limits
 from tests.support.cases import SCALARS
 
 FENCE = {"x_min_m": -2.0, "x_max_m": 2.0, "y_min_m": -1.5, "y_max_m": 1.5}
@@ -298,12 +297,6 @@ def test_limits_that_are_not_set_have_no_trace_in_the_digest(base: str) -> None:
     )
 
 
-def test_drawn_limits_are_of_the_quantities_of_the_struct() -> None:
-    """What tests draw has a number for each member of nmpc_limits_t."""
-    drawn = random_limits(limited(), 5, np.random.default_rng(0))
-    assert drawn.shape == (5, len(LIMITS))
-
-
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
 def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
@@ -318,13 +311,3 @@ def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
     assert np.max(np.abs(commands[60].command_rad)) > 0.05, "it brakes"
     assert np.all(commands[-1].command_rad == 0)
     assert np.all(controller.memory.missed == 52)
-
-
-def test_the_1norm_is_level_after_half_a_second_without_a_state() -> None:
-    """It has no model of the state to brake by."""
-    controller: Any = method_of(limited("mambo-1norm")).reference_controller(1)
-    for _ in range(20):
-        controller.step(np.zeros((1, 7)), [[5.0, 5.0, 0, 0]], [9.81])
-    commands = [controller.step(np.full((1, 7), np.nan), np.zeros((1, 4)), [9.81]) for _ in range(51)]
-    assert np.all(commands[48].command_rad != 0)
-    assert np.all(commands[49].command_rad == 0)
