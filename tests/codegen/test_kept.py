@@ -1,8 +1,9 @@
-"""Kept results: what is shipped is what the source computes, and no cache ever changes a result."""
+"""Kept results are what the source computes, no cache changes one, and methods derive theirs once."""
 
 import json
 import subprocess
 import sys
+from dataclasses import FrozenInstanceError
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ import pytest
 from benchmarks.generated import SCALARS, preset_results
 from mambo_codegen import kept
 from mambo_codegen.bundle.render import render
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
+from tests.support.one_norm import ONE_NORM
 
 ADVICE = "run `make generated`, and commit what changes"
 UNDETERMINING = {"mambo_codegen", "mambo_codegen.bundle", "mambo_codegen.errors", "mambo_codegen.kept"}
@@ -139,3 +142,22 @@ def test_a_bundle_is_the_same_with_and_without_a_cache(forgetful: Path) -> None:
     kept._remembered.clear()
     forgetful.chmod(0o777)
     assert render(settings) == first
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("preset", ["mambo", "mambo-1norm"])
+@pytest.mark.parametrize("name", ["numbers", "limits", "trigonometry"])
+def test_everything_is_derived_once(name: str, preset: str, scalar: str) -> None:
+    """Whoever is handed a method reads the same object."""
+    method = method_of(with_option(presets.preset(preset), "code.scalar", scalar))
+    assert getattr(method, name) is getattr(method, name)
+
+
+def test_a_method_is_a_value() -> None:
+    """Equal settings make equal methods, whatever has been derived already; nothing can be put in."""
+    one, other = method_of(ONE_NORM), method_of(ONE_NORM)
+    assert one.limits.tilt == other.limits.tilt
+    assert (one, hash(one)) == (method_of(ONE_NORM), hash(other))
+    assert one != method_of(with_option(ONE_NORM, "cost.effort_weight", 2.0))
+    with pytest.raises(FrozenInstanceError):
+        one.settings = ONE_NORM  # type: ignore[misc]

@@ -79,8 +79,8 @@ ROOMS: Final = {
     "inputs": Room(
         source=(f"{_METHODS}/constants.py",),
         tests=(
-            *(f"{_CONSTANTS}/test_{name}.py" for name in ("input_ranges", "one_norm_constants")),
-            *(f"{_CONSTANTS}/test_{name}.py" for name in ("stored_numbers", "tracker_constants")),
+            *(f"{_CONSTANTS}/test_{name}.py" for name in ("numbers", "tracker_constants")),
+            "tests/codegen/test_one_norm.py",
             "tests/codegen/test_limits.py",
             "tests/codegen/test_preview.py",
             "tests/codegen/test_tilt_gain.py",
