@@ -91,9 +91,8 @@ ROOMS: Final = {
         tests=(
             f"{_CONSTANTS}/test_attitude_constants.py",
             f"{_CONSTANTS}/test_limits_constants.py",
-            "tests/codegen/test_quadratic.py",
-            "tests/codegen/test_quadratic_settings.py",
-            "tests/codegen/test_preview.py",
+            *(f"tests/codegen/test_{name}.py" for name in ("guard", "quadratic", "quadratic_settings")),
+            *(f"tests/codegen/test_{name}.py" for name in ("preview", "thrust_vector")),
         ),
         without=(
             *("tracker_constants.py", "limits_constants.py", "height_constants.py"),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M, carry_on_ground, ground_effect
 from mambo_sil.drone.plant.gusts import (
@@ -157,30 +156,12 @@ def test_drag_is_proportional_to_the_velocity_relative_to_the_air() -> None:
     assert moving[5, 0] != pushed[5, 0]
 
 
-@pytest.mark.long
-def test_battery_sag_leaves_an_altitude_error() -> None:
-    """The altitude loop has no integral action: Kp times the altitude error makes up for the lost thrust."""
-    trace = hover(10.0, disturbances=Disturbances(battery_sag_1_s=0.004))
-    share = 1.0 - 0.004 * 10.0
-    assert trace.position_m[-1, 0, 2] + 1.1 == pytest.approx(
-        NOMINAL.weight_n * (1.0 / share - 1.0) / NOMINAL.altitude.p_n_m, rel=0.05
-    )
-
-
 def test_payload_is_added_at_its_time() -> None:
     """Before it nothing changes; after it Kp times the altitude error carries the payload's weight."""
     trace = hover(4.0, 2, disturbances=Disturbances(payload_kg=np.array([0.0, 0.005]), payload_time_s=0.5))
     np.testing.assert_allclose(trace.position_m[:51, 1, 2], -1.1, atol=1e-9)
     assert trace.position_m[-1, 1, 2] + 1.1 == pytest.approx(0.005 * 9.81 / 0.8, rel=0.02)
     np.testing.assert_allclose(trace.position_m[:, 0, 2], -1.1, atol=1e-9)
-
-
-def test_an_impulse_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
-    """The change is along the axes of the world for any heading, at that time and in that flight only."""
-    disturbances = Disturbances(impulse_n_s=(np.array([0.0063, 0.0]), -0.00063, 0.0), impulse_time_s=0.5)
-    trace = hover(1.0, 2, yaw_rad=0.8, disturbances=disturbances)
-    np.testing.assert_array_equal(trace.velocity_m_s[:50, :, :2], 0.0)
-    np.testing.assert_allclose(trace.velocity_m_s[50, :, :2], [[0.1, -0.01], [0.0, -0.01]], atol=1e-12)
 
 
 @pytest.mark.parametrize("part", [(0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01)])

@@ -1,4 +1,4 @@
-"""The drone: airframe, mixer and rotors, rigid body, integrator, stock loops."""
+"""The drone: airframe, rotors, rigid body, integrator, stock loops, and mixers, also at their limits."""
 
 from dataclasses import replace
 
@@ -8,12 +8,16 @@ from numpy.typing import NDArray
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant import loops
-from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL
+from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL, airframe_of
 from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
 from mambo_sil.drone.plant.rigid_body import RigidBody
-from mambo_sil.drone.plant.rotors import Rotors, mix
+from mambo_sil.drone.plant.rotors import LEAST_YAW, WRENCH_SIGNS, Rotors, distribute, mix
 from mambo_sil.drone.plant.vehicle import STEP_S, Vehicle, VehicleState, truth
-from mambo_sil.drone.vehicles.vehicle_sections import MamboAttitude
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MamboAttitude, MixerName
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
+from tests.support.scenarios import changed
 
 FloatArray = NDArray[np.float64]
 
@@ -104,15 +108,20 @@ def tumble_exactly(body: RigidBody, duration_s: float) -> FloatArray:
 
 
 def fly_attitude(
-    command_rad: FloatArray, ticks: int, *, z_m: float = -1.1, yaw_reference_rad: float = 0.0
+    command_rad: FloatArray,
+    ticks: int,
+    *,
+    drone: VehicleFile = NOMINAL,
+    z_m: float = -HOVER_HEIGHT_M,
+    yaw_reference_rad: float = 0.0,
 ) -> list[VehicleState]:
     """Return the states after each tick of held roll and pitch commands, from rest at `z_m`."""
-    vehicle = Vehicle()
-    state = vehicle.at_rest(np.array([[0.0], [0.0], [z_m]]), 0.0, MAMBO.hover_command)
+    vehicle = Vehicle.of(drone)
+    state = vehicle.at_rest(np.array([[0.0], [0.0], [z_m]]), 0.0, airframe_of(drone).hover_command)
     states = []
     for _ in range(ticks):
         seen = truth(state)
-        thrust_n = loops.altitude_thrust(NOMINAL, -1.1, seen.position_m[2], seen.velocity_m_s[2])
+        thrust_n = loops.altitude_thrust(drone, -HOVER_HEIGHT_M, seen.position_m[2], seen.velocity_m_s[2])
         state, _ = vehicle.advance(state, command_rad[:, np.newaxis], thrust_n, yaw_reference_rad, seen=seen)
         states.append(state)
     return states
@@ -255,24 +264,18 @@ def test_attitude_reaches_its_command_with_the_stock_lag(axis: int, lag_s: float
     assert reached_s == pytest.approx(lag_s, abs=0.0051)
 
 
-def test_stock_loops_have_the_stock_gains() -> None:
-    """Unit errors, rates and integrals return the stock gains, roll before pitch; the thrust is limited."""
-    none, one = np.zeros((2, 1)), np.ones((2, 1))
-    np.testing.assert_array_equal(LOOP.attitude_torque(one, none, none, none), [[0.010], [0.013]])
-    np.testing.assert_array_equal(LOOP.attitude_torque(none, one, none, none), [[-0.010], [-0.013]])
-    np.testing.assert_array_equal(LOOP.attitude_torque(none, none, one, none), [[-0.0028], [-0.0020]])
-    np.testing.assert_array_equal(LOOP.attitude_torque(none, none, none, one), [[0.010], [0.010]])
-    np.testing.assert_array_equal(LOOP.yaw_torque(1.0, none[0], none[0]), 0.004)
-    np.testing.assert_array_equal(LOOP.yaw_torque(0.0, none[0], one[0]), -0.0012)
+def test_the_altitude_loop_has_the_stock_gains() -> None:
+    """On height and climb; the thrust is limited. Those of attitude and yaw are in test_vehicle."""
+    none, climbing = np.zeros(1), np.full(1, 0.1)
     weight_n = 0.063 * 9.81
-    np.testing.assert_allclose(
-        loops.altitude_thrust(NOMINAL, -0.1, none[0], none[0]), weight_n + 0.08, rtol=1e-14
-    )
-    np.testing.assert_allclose(
-        loops.altitude_thrust(NOMINAL, 0.0, none[0], 0.1 * one[0]), weight_n + 0.03, rtol=1e-14
-    )
-    np.testing.assert_array_equal(loops.altitude_thrust(NOMINAL, 100.0, none[0], none[0]), -1.20204)
-    np.testing.assert_array_equal(loops.altitude_thrust(NOMINAL, -100.0, none[0], none[0]), 1.20204)
+    for reference_m, vz_m_s, thrust_n in (
+        (-0.1, none, weight_n + 0.08),
+        (0.0, climbing, weight_n + 0.03),
+        (100.0, none, -1.20204),
+        (-100.0, none, 1.20204),
+    ):
+        found = loops.altitude_thrust(NOMINAL, reference_m, none, vz_m_s)
+        np.testing.assert_allclose(found, thrust_n, rtol=1e-14)
 
 
 def test_altitude_and_heading_reach_their_references() -> None:
@@ -289,3 +292,60 @@ def test_attitude_integral_leaks_and_is_limited() -> None:
     np.testing.assert_allclose(LOOP.attitude_integral(none, none, held), held * (1.0 - 5e-6), rtol=1e-15)
     limited = LOOP.attitude_integral(3e3 * error, none, none)
     np.testing.assert_array_equal(limited, [[2.0], [-2.0]])
+
+
+CRAZYFLIE = vehicle_toml.preset("crazyflie")
+FRAME = replace(airframe_of(CRAZYFLIE), command_min=0.0, command_max=100.0)
+MIXERS: tuple[MixerName, ...] = ("clip", "lower", "yaw-last")
+
+
+def mixed(mixer: MixerName, *shares: float) -> FloatArray:
+    """Return the four commands of shares of thrust, roll, pitch and yaw."""
+    return distribute(replace(FRAME, mixer=mixer), np.array(shares)[:, np.newaxis])[:, 0]
+
+
+def components(commands: FloatArray) -> FloatArray:
+    """Return the shares of thrust, roll, pitch and yaw in four commands."""
+    return np.asarray(WRENCH_SIGNS @ commands / 4.0)
+
+
+@pytest.mark.parametrize("mixer", MIXERS)
+def test_within_the_limits_all_mixers_are_one(mixer: MixerName) -> None:
+    """The sums, bit for bit."""
+    shares = np.random.default_rng(1).uniform(-10.0, 10.0, (4, 50)) + np.array([[50.0], [0.0], [0.0], [0.0]])
+    found = distribute(replace(FRAME, mixer=mixer), shares)
+    assert found.tobytes() == distribute(FRAME, shares).tobytes()
+    np.testing.assert_allclose(WRENCH_SIGNS @ found / 4.0, shares, atol=1e-12)
+
+
+def test_beyond_the_largest_command_each_mixer_gives_up_something_else() -> None:
+    """Of thrust 70, roll 20, yaw 40: clipping loses all three, lowering mostly thrust, the last one yaw."""
+    assert mixed("clip", 70.0, 20.0, 0.0, 40.0).tolist() == [50.0, 90.0, 10.0, 100.0]
+    assert mixed("lower", 70.0, 20.0, 0.0, 40.0).tolist() == [20.0, 60.0, 0.0, 100.0]
+    assert mixed("yaw-last", 70.0, 20.0, 0.0, 40.0).tolist() == [80.0, 60.0, 40.0, 100.0]
+    assert components(mixed("yaw-last", 70.0, 20.0, 0.0, 40.0)).tolist() == [70.0, 20.0, 0.0, 10.0]
+    assert components(mixed("yaw-last", 70.0, 20.0, 0.0, -40.0)).tolist() == [70.0, 20.0, 0.0, -10.0]
+
+
+def test_yaw_keeps_a_share_and_the_smallest_command_limits_it_too() -> None:
+    """Two in a hundred where the others leave nothing; without yaw nothing is divided by 0."""
+    assert LEAST_YAW * FRAME.command_max == 2.0
+    assert components(mixed("yaw-last", 90.0, 20.0, 0.0, 40.0)).tolist() == [78.0, 20.0, 0.0, 2.0]
+    assert components(mixed("yaw-last", 20.0, 10.0, 0.0, 40.0)).tolist() == [20.0, 10.0, 0.0, 10.0]
+    assert mixed("yaw-last", 70.0, 40.0, 0.0, 0.0).tolist() == [100.0, 20.0, 20.0, 100.0]
+
+
+def lost_height_m(mixer: MixerName, step_rad: float) -> float:
+    """Return what a hovering Crazyflie loses in height when its heading reference jumps."""
+    drone = changed(CRAZYFLIE, rotors={"mixer": mixer})
+    states = fly_attitude(np.zeros(2), 1000, drone=drone, yaw_reference_rad=step_rad)
+    assert float(states[-1].body[8, 0]) == pytest.approx(step_rad, abs=0.25)
+    return max(float(state.body[2, 0]) + HOVER_HEIGHT_M for state in states)
+
+
+@pytest.mark.long
+def test_a_step_of_the_heading_costs_height() -> None:
+    """Of 2 rad: most where all motors are lowered, least where yaw gives way first."""
+    lowered_m, clipped_m, kept_m = (lost_height_m(mixer, 2.0) for mixer in ("lower", "clip", "yaw-last"))
+    found_m = [lowered_m, clipped_m, kept_m]
+    np.testing.assert_allclose(found_m, [0.137, 0.067, 0.049], atol=0.002)
