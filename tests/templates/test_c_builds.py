@@ -23,7 +23,7 @@ from mambo_sil.verify.dialects import DIALECTS
 from tests.support.bundles import place
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM
-from tests.support.quadratic import quadratic_settings
+from tests.support.quadratic import CORNER_SETTINGS, quadratic_case, quadratic_settings
 from tests.support.tools import require
 
 STRICT = [*WARNING_FLAGS, "-Werror"]
@@ -35,6 +35,10 @@ SETTINGS |= {f"fixed case {index}": settings_case(index, "fixed") for index in (
     f"{scalar} {name}": with_option(presets.load(name), "code.scalar", scalar, "test")
     for name in presets.names()
     for scalar in ("fixed", "float64")
+}
+SETTINGS |= {
+    f"quadratic case {index}": quadratic_case(index, ("float32", "float64")[index % 2])
+    for index in range(len(CORNER_SETTINGS))
 }
 SYSTEM_HEADERS = """
     assert complex ctype dirent dlfcn errno fcntl fenv float fmtmsg glob iconv inttypes limits locale
@@ -100,13 +104,16 @@ def dialects_by_turns() -> list[tuple[str, str]]:
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(("name", "dialect"), dialects_by_turns())
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
-    """All warnings on and fatal, library, self-test, example and proof."""
+    """All warnings on and fatal, library, self-test, example and proof; with clang what it fuzzes, too."""
     chosen = DIALECTS[dialect]
     require(chosen.compiler, chosen.package)
     sources = sorted(placed(SETTINGS[name], tmp_path).rglob("*.c"))
+    if not chosen.compiler.startswith("clang"):
+        sources = [path for path in sources if path.parent.name != "fuzz"]
     shell(*chosen.command(SETTINGS[name]), "-I.", "-c", *sources, folder=tmp_path)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", by_default("mambo", "fixed mambo"))
 def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> None:
     """Every undefined symbol is defined by another object of the bundle, or is a helper of the compiler."""

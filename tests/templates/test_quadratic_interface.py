@@ -1,86 +1,41 @@
 """What a caller of the C of a quadratic cost may rely on, whatever the compiler and the input."""
 
-import itertools
-import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_codegen.bundle.render import render
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library, ffi
-from tests.support.bundles import place
 from tests.support.extension import build_extension
 from tests.support.height_settings import height_settings
 from tests.support.quadratic import CORNER_SETTINGS, Array, quadratic_case
 from tests.support.strict_builds import built
-from tests.support.tools import require, toolchain
+from tests.support.tools import toolchain
 
-EVERYTHING, TWO = 2, 1
-"""Numbers of settings with all parts, and with two moves and few of them."""
+EVERYTHING = 2
+"""Number of settings with all parts."""
+PREFIXED = with_option(quadratic_case(EVERYTHING, "float32"), "code.prefix", "x_axis")
 CORNERS = range(len(CORNER_SETTINGS))
-DIALECTS = {
-    "C99": ("gcc", "-std=c99", "-pedantic"),
-    "C11": ("gcc", "-std=c11", "-pedantic"),
-    "gnu89": ("gcc", "-std=gnu89"),
-    "C++": ("g++", "-x", "c++", "-std=c++11"),
-}
 
 
-@pytest.mark.sampled(6)
-@pytest.mark.long
 @pytest.mark.parametrize(
-    ("dialect", "scalar"),
+    ("settings", "compiler"),
     [
-        pytest.param(*case, marks=[] if case == ("C++", "float32") else pytest.mark.long)
-        for case in itertools.product(DIALECTS, ("float32", "float64"))
+        (PREFIXED, "gcc"),
+        pytest.param(PREFIXED, "clang", marks=pytest.mark.long),
+        (height_settings("float32"), "gcc"),
+        (height_settings("fixed"), "gcc"),
     ],
+    ids=["two words, gcc", "two words, clang", "height", "height in fixed point"],
 )
-def test_every_dialect_compiles_without_a_word(dialect: str, scalar: str, tmp_path: Path) -> None:
-    """All corners of the settings, with all warnings as errors."""
-    compiler, *flags = DIALECTS[dialect]
-    require(compiler, compiler)
-    for index in CORNERS:
-        files = render(quadratic_case(index, scalar))
-        folder = place(files, tmp_path / str(index))
-        sources = sorted(path for path in files if re.fullmatch(r"(example/)?[^/]*\.c", path))
-        line = [compiler, *flags, "-Wall", "-Werror", "-ffp-contract=off", "-O2", "-I.", "-c"]
-        done = subprocess.run([*line, *sources], cwd=folder, capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.first_is_quick
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_another_prefix_passes_the_strictest_build_and_the_self_test(compiler: str, tmp_path: Path) -> None:
-    """Under a prefix of two words."""
-    settings = with_option(quadratic_case(EVERYTHING, "float32"), "code.prefix", "x_axis")
+def test_the_strictest_build_passes_the_self_test(settings: Settings, compiler: str, tmp_path: Path) -> None:
+    """Under a prefix of two words, and with the C that Python and the engine call."""
     library = built(settings, tmp_path, compiler)
     assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
-
-
-@pytest.mark.parametrize("scalar", ["float32", "fixed"])
-def test_a_height_passes_the_strictest_build_and_the_self_test(scalar: str, tmp_path: Path) -> None:
-    """With the C that Python and the engine call."""
-    library = built(height_settings(scalar), tmp_path, "gcc")
-    assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
-
-
-def test_two_controllers_with_different_prefixes_link_into_one_program(tmp_path: Path) -> None:
-    """No public name appears twice."""
-    objects = []
-    for prefix, index in (("roof", EVERYTHING), ("floor_", TWO)):
-        settings = with_option(quadratic_case(index, "float32"), "code.prefix", prefix.strip("_"))
-        files = render(settings, with_digest=False)
-        name = prefix.strip("_")
-        folder = place(files, tmp_path / name)
-        toolchain("gcc").run([*COMPILE_FLAGS, *WARNING_FLAGS, "-c", f"{name}.c", "-o", f"{name}.o"], folder)
-        objects.append(str(folder / f"{name}.o"))
-    toolchain("gcc").run(["-r", "-nostdlib", *objects, "-o", "both.o"], tmp_path)
 
 
 def test_the_estimate_is_in_si_units() -> None:
