@@ -14,7 +14,6 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.inner_steps import WatchedController
 from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
@@ -270,23 +269,6 @@ def test_scenarios_that_cannot_share_a_simulation_are_refused() -> None:
         flight_of([HARD, CALM.model_copy(update={"sensors": "true"})], 0.01)
     with pytest.raises(FlightError, match="flights = 0"):
         flight_of([], 0.01)
-
-
-def test_step_sizes_are_the_changes_of_the_plan() -> None:
-    """Each iteration moves the plan by its step size against the gradient sign, or undoes the last move."""
-    watched = WatchedController(MAMBO, 2)
-    brief = [scenario.model_copy(update={"duration_s": 0.5}) for scenario in (HARD, CALM)]
-    fly(flight_of(brief, 0.01), watched)
-    limit = np.float32(MAMBO.limits.tilt_rad)
-    undone = 0
-    for inner in watched.steps:
-        plan, size = inner.plan_rad, inner.step_sizes_rad(MAMBO)
-        forward = np.clip(plan - inner.decisions(MAMBO) * size, -limit, limit)
-        np.testing.assert_array_equal(plan[1], forward[0])
-        shrank = (np.diff(size, axis=0) < 0)[:-1]
-        np.testing.assert_array_equal(plan[2:], np.where(shrank, plan[:-2], forward[1:-1]))
-        undone += int(shrank.sum())
-    assert undone > 20
 
 
 @pytest.mark.long

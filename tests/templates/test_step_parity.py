@@ -1,20 +1,30 @@
 """Whole steps of the generated C have the bits of the reference, with both methods."""
 
+from collections.abc import Sequence
+from typing import Any, Final
+
 import numpy as np
 import pytest
 
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
+from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.quadratic.controller import QuadraticController
 from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.controller_library import build_library
-from tests.support.builds import libraries, share_of
+from mambo_sil.flight.controllers.controller_library import build_library, ffi, glue, with_default_prefix
+from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.height import HEIGHT_CORNERS, height_case
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
 from tests.support.tools import toolchain
 
+BUILDS: Final = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
+
+_WHOLE: Final = 10
+"""So many of the settings of a parity test, the corners among them, run with all cases in one scalar type."""
 METHODS = {"one_norm": settings_case, "quadratic": quadratic_case, "height": height_case}
 SIZES = {"one_norm": (250, 4), "quadratic": (100, 60), "height": (100, 60)}
 """Controllers and steps of a run; a flight with outages is longer than a search."""
@@ -70,6 +80,32 @@ def test_the_inputs_reach_what_is_to_be_compared() -> None:
     assert ((missed[:-1] == most) & (missed[1:] == 0)).any()
     share = np.mean([step.saturated for step in found.steps])
     assert 0.05 < share < 0.95
+
+
+def share_of(index: int, scalar: int, scalars: int) -> tuple[tuple[tuple[str, str], ...], int]:
+    """Return the builds in which settings run and the percentage of the cases, by the number of their scalar.
+
+    Each runs in two builds, which take turns: settings in three scalar types have all builds, and so have
+    five settings of one scalar type. Each of the first `_WHOLE` has all cases in one of its scalar types; all
+    others have a fifth.
+    """
+    turn = index + scalar
+    builds = (BUILDS[turn % len(BUILDS)], BUILDS[(turn + 2) % len(BUILDS)])
+    return builds, 100 if index < _WHOLE and turn % scalars == 0 else 20
+
+
+def libraries(settings: Settings, builds: Sequence[tuple[str, str]] = BUILDS) -> dict[str, Any]:
+    """Build the C of a controller in each of `builds`; returns the libraries by compiler and optimisation.
+
+    The self-test, which no step calls, is left out.
+    """
+    files = render(with_default_prefix(settings), with_digest=False)
+    unit = {"nmpc.h": files["nmpc.h"], "all.c": "\n".join([files["nmpc.c"], *glue().values()])}
+    source = LibrarySource("nmpc_all", unit, lambda: unit, COMPILE_FLAGS, ffi)
+    return {
+        f"{compiler} {level}": load_shared_library(source, toolchain(compiler, level))
+        for compiler, level in builds
+    }
 
 
 @pytest.mark.sampled(8)
