@@ -203,12 +203,12 @@ def test_a_tracked_target_is_followed_closer() -> None:
         settings = settings_of(ONE_MOVE | {"target.acceleration": kind, "code.scalar": "float64"})
         drone, controller = LinearDrone(settings), QuadraticController(Quadratic(settings))
         largest = 0.0
-        for step in range(3000):
+        for step in range(1500):
             angle = 0.01 * step
             target = [np.cos(angle), np.sin(angle), -np.sin(angle), np.cos(angle)]
             state = drone.measured()
             drone.step(controller.step([state], [target], [HOVER]).command_rad[0])
-            if step > 1500:
+            if step > 800:
                 largest = max(largest, float(np.hypot(*(state[:2] - target[:2]))))
         errors[kind] = largest
     assert errors["tracked"] < 0.1 * errors["none"]

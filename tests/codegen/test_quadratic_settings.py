@@ -4,13 +4,21 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as profile
 
-from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
-from mambo_codegen.settings.key import Key, spell
+from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
-from tests.support.strategies import LAGS, QUADRATIC, Values, choices_of, nested, quadratic_settings, toml
+from tests.support.strategies import (
+    LAGS,
+    QUADRATIC,
+    Values,
+    faults_of,
+    nested,
+    other_value,
+    quadratic_settings,
+    toml,
+)
 
 USED = {
     norm: [key for key in KEYS.values() if Settings.model_validate(nested(values)).uses(key.path)]
@@ -24,21 +32,6 @@ HEIGHT = {path for path in KEYS if path.startswith("height.")} | {
 """The keys that only a controller with a height uses."""
 GUARD = {path for path in KEYS if path.startswith("guard.")}
 """The keys that only a controller with a guard uses; two of them need a height too."""
-
-
-def faults_of(values: Values) -> list[str]:
-    """Return the lines that `values`, by their dotted paths, get as the file slow.toml."""
-    with pytest.raises(InvalidSettingsError) as caught:
-        controller_toml.parse(toml(values), "slow.toml")
-    return list(caught.value.faults)
-
-
-def other_value(key: Key) -> str | float:
-    """Return a value of a key that is not its default."""
-    default = Settings().value(key.path)
-    if key.kind == "one of":
-        return next(choice for choice in choices_of(key) if choice != default)
-    return 3 if key.kind == "whole number" else default * 0.9 or 0.1
 
 
 def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
@@ -67,7 +60,7 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
         value = other_value(key)
         spelling = spell(value) if key.low is None else value
         fault = f'{key.path} = {spelling} has no effect with cost.norm = "{norm}"; leave it out'
-        assert faults_of({**base, key.path: value}) == [f"slow.toml: {fault}"]
+        assert faults_of(toml({**base, key.path: value})) == [f"slow.toml: {fault}"]
         default = Settings().value(key.path)
         settings = controller_toml.parse(toml({**base, key.path: default}), "with the default")
         assert settings == controller_toml.parse(toml(base), "without it")
@@ -129,12 +122,12 @@ def test_the_presence_of_a_section_gives_the_height() -> None:
 def test_heights_at_odds_with_other_keys_are_refused(values: Values, fault: str) -> None:
     """Another norm, walls without or across, speeds that cannot be braked, a thrust out of range."""
     base = QUADRATIC | ({} if values.get("cost.norm") else {"horizon.ramp_s": 0.4})
-    assert faults_of(base | values) == [f"slow.toml: {fault}"]
+    assert faults_of(toml(base | values)) == [f"slow.toml: {fault}"]
 
 
 def test_keys_without_effect_are_all_named() -> None:
     """One line for each of them."""
-    lines = faults_of({**QUADRATIC, "horizon.prediction": 5, "optimizer.iterations": 7})
+    lines = faults_of(toml({**QUADRATIC, "horizon.prediction": 5, "optimizer.iterations": 7}))
     assert [line.split()[1] for line in lines] == ["horizon.prediction", "optimizer.iterations"]
 
 
@@ -179,7 +172,7 @@ def test_keys_without_effect_are_all_named() -> None:
 )
 def test_values_at_odds_are_refused_with_both_keys(values: Values, fault: str) -> None:
     """The lag exceeds the rate feedback, the trim lies within the limit, outage and ramp suit the period."""
-    lines = faults_of({**QUADRATIC, **values})
+    lines = faults_of(toml({**QUADRATIC, **values}))
     assert f"slow.toml: {fault}" in lines
     assert len(lines) == 1
 

@@ -1,15 +1,14 @@
-"""Settings drawn by hypothesis: any valid ones, and any valid ones but for one broken rule."""
+"""Settings drawn by hypothesis: any valid ones."""
 
 import math
-import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.controller_toml import with_value
 from mambo_codegen.settings.key import Key, spell
@@ -274,156 +273,24 @@ def _bounds(key: Key) -> tuple[float, float]:
     return key.low, key.high
 
 
-@dataclass(frozen=True)
-class Broken:
-    """TOML text that breaks one rule, and what the message about it says: key, value, words of the rule."""
-
-    text: str
-    key: str
-    value: str
-    rule: str
-
-
-@st.composite
-def broken_settings(draw: st.DrawFn) -> Broken:
-    """Draw settings that are valid but for one rule."""
-    values = draw(valid_values())
-    breakers: list[Callable[[st.DrawFn, Values], Broken]] = [
-        *(_beyond, _no_number, _of_another_type, _misspelt, _unknown),
-        *(_steps_at_odds, _lag_at_odds, _others_at_odds),
-    ]
-    return draw(st.sampled_from(breakers))(draw, values)
+def other_value(key: Key) -> str | float:
+    """Return a value of a key that is not its default."""
+    default = Settings().value(key.path)
+    match key.kind:
+        case "one of":
+            return next(choice for choice in choices_of(key) if choice != default)
+        case "text":
+            return "roll"
+        case "whole number":
+            return 3
+        case _:
+            return default * 0.9 or 0.1
 
 
-def _with(values: Values, path: str, value: Any, rule: str, spelling: str | None = None) -> Broken:
-    """Return `values` with `value` at `path`, which breaks `rule`."""
-    told = spelling or (f'"{value}"' if isinstance(value, str) else str(value))
-    text = toml({key: other for key, other in values.items() if key != path})
-    return Broken(f"{text}{path} = {spelling or spell(value)}\n", path, f" = {told} ", rule)
-
-
-def _beyond(draw: st.DrawFn, values: Values) -> Broken:
-    """Put a number just or far outside its bounds."""
-    key = draw(st.sampled_from(NUMBERS))
-    low, high = _bounds(key)
-    if key.kind == "whole number":
-        beyond: float = draw(st.integers(-(10**9), int(low) - 1) | st.integers(int(high) + 1, 10**9))
-    else:
-        beyond = draw(
-            st.sampled_from([math.nextafter(low, -math.inf), math.nextafter(high, math.inf)])
-            | st.floats(max_value=low, exclude_max=True, allow_infinity=False)
-            | st.floats(min_value=high, exclude_min=True, allow_infinity=False)
-        )
-    return _with(values, key.path, beyond, f"must {key.rule}")
-
-
-def _no_number(draw: st.DrawFn, values: Values) -> Broken:
-    """Put what is no finite number, or a fraction where a whole number belongs."""
-    key = draw(st.sampled_from(NUMBERS))
-    if key.kind == "whole number":
-        fraction = draw(st.floats(1, 50))
-        return _with(values, key.path, fraction, f"must be a whole number and {key.rule}")
-    word = draw(st.sampled_from(["nan", "inf", "-inf"]))
-    return _with(values, key.path, None, f"must be a finite number; it must {key.rule}", word)
-
-
-def _of_another_type(draw: st.DrawFn, values: Values) -> Broken:
-    """Put a value of a type that the key does not have."""
-    key = draw(st.sampled_from(list(KEYS.values())))
-    told, spelling = draw(
-        st.sampled_from(
-            [
-                ("true", "true"),
-                ("a list", "[1, 2]"),
-                ("a list", "[]"),
-                ("a table", "{a = 1}"),
-                ("1979-05-27", "1979-05-27"),
-                ('"10"', '"10"') if key.low is not None else ("10", "10"),
-            ]
-        )
-    )
-    rule = key.rule if key.low is None else f"be a {key.kind} and {key.rule}"
-    broken = _with(values, key.path, None, f"must {rule}", spelling)
-    return replace(broken, value=f" = {told} ")
-
-
-def _misspelt(draw: st.DrawFn, values: Values) -> Broken:
-    """Put a word that is none of the choices, or a prefix that is no C name."""
-    letters = st.text(
-        st.characters(min_codepoint=32, max_codepoint=126, exclude_characters='"\\'), max_size=40
-    )
-    if draw(st.booleans()):
-        key = draw(st.sampled_from(CHOICES))
-        word = draw(letters.filter(lambda word: word not in choices_of(key)))
-        return _with(values, key.path, word, f"must {key.rule}")
-    key = KEYS["code.prefix"]
-    if draw(st.booleans()):
-        return _with(values, key.path, draw(st.sampled_from(sorted(RESERVED))), "must not be a ")
-    no_name = letters.filter(lambda word: not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", word))
-    return _with(values, key.path, draw(no_name), f"must {key.rule}")
-
-
-def _unknown(draw: st.DrawFn, values: Values) -> Broken:
-    """Add a key or a section that does not exist, or a value where a section belongs."""
-    section, _, name = draw(st.sampled_from(list(KEYS))).rpartition(".")
-    what = draw(st.sampled_from(["key", "section", "no section"]))
-    text = toml(values)
-    if what == "no section":
-        others = {path: value for path, value in values.items() if not path.startswith(f"{section}.")}
-        return Broken(
-            f"{toml(others)}{section} = 3\n", section, " = 3 ", f"must be a section; write [{section}]"
-        )
-    word = name if what == "key" else section.partition(".")[0]
-    place = draw(st.integers(0, len(word) - 1))
-    word = word[:place] + draw(st.sampled_from("_xyz")) + word[place:]
-    if what == "key":
-        return Broken(f"{text}{section}.{word} = 1\n", f"{section}.{word}", "", "is not a setting; ")
-    return Broken(f"{text}{word}.{name} = 1\n", word, "", "is not a section; ")
-
-
-def _steps_at_odds(draw: st.DrawFn, values: Values) -> Broken:
-    """Put the first step size above the largest, or below the smallest."""
-    path = draw(st.sampled_from(["optimizer.step_max_rad", "optimizer.step_min_rad"]))
-    initial = draw(st.floats(1e-6, 1, exclude_min=True, exclude_max=True))
-    rest = values | {
-        "optimizer.initial_step_rad": initial,
-        "optimizer.step_max_rad": 1.0,
-        "optimizer.step_min_rad": 1e-9,
-    }
-    if path == "optimizer.step_max_rad":
-        step = draw(st.floats(1e-6, initial, exclude_max=True))
-        return _with(rest, path, step, f"must lie in {initial!r}..1 (at least optimizer.initial_step_rad)")
-    step = draw(st.floats(initial, 1, exclude_min=True))
-    return _with(rest, path, step, f"must lie in 1e-9..{initial!r} (at most optimizer.initial_step_rad)")
-
-
-def _lag_at_odds(draw: st.DrawFn, values: Values) -> Broken:
-    """Put a lag where the printed model has none, or one too short to compute with."""
-    path = draw(st.sampled_from(["model.roll_lag_s", "model.pitch_lag_s"]))
-    rest = values | {"model.roll_lag_s": 0.0, "model.pitch_lag_s": 0.0}
-    if draw(st.booleans()):
-        rest["model.position_update"] = "printed"
-        lag = draw(st.floats(0.001, 2))
-        return _with(rest, path, lag, 'must be 0 with model.position_update = "printed"')
-    lag = draw(st.floats(0, 0.001, exclude_min=True, exclude_max=True))
-    return _with(rest, path, lag, "must be 0 or lie in 0.001..2; 0 means no lag")
-
-
-def _others_at_odds(draw: st.DrawFn, values: Values) -> Broken:
-    """Put more moves than predictions, a largest thrust not above the smallest, or a key twice."""
-    path = draw(
-        st.sampled_from(["horizon.control", "ranges.thrust_acceleration_max_m_s2", *list(values)[::5]])
-    )
-    if path == "horizon.control":
-        prediction = draw(st.integers(1, 49))
-        control = draw(st.integers(prediction + 1, 50))
-        rest = values | {"horizon.prediction": prediction}
-        return _with(rest, path, control, f"must lie in 1..{prediction} (horizon.prediction)")
-    if path == "ranges.thrust_acceleration_max_m_s2":
-        least = draw(st.floats(0.1, 100))
-        most = draw(st.floats(0.1, least))
-        rest = values | {"ranges.thrust_acceleration_min_m_s2": least}
-        return _with(rest, path, most, f"must be more than {least!r} (ranges.thrust_acceleration_min_m_s2)")
-    text = toml(values)
-    line = f"line {len(values) + 1}, column "
-    return Broken(f"{text}{path} = 1\n", line, path, "write each section and key once")
+def faults_of(text: str) -> list[str]:
+    """Return the lines that `text` gets as the file slow.toml, none if its settings are valid."""
+    try:
+        controller_toml.parse(text, "slow.toml")
+    except InvalidSettingsError as refused:
+        return str(refused).splitlines()
+    return []

@@ -1,26 +1,21 @@
 """What a caller of the generated C may rely on, whatever it passes in."""
 
-import re
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import event, given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.shared.inputs import Status
-from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
-from tests.support.extension import build_extension, load_extension
+from tests.support.extension import build_extension
 from tests.support.one_norm import ONE_NORM
 from tests.support.quadratic import EVERYTHING
 from tests.support.tools import toolchain
@@ -242,48 +237,6 @@ def test_the_acceleration_is_found_kept_over_a_jump_and_bounded() -> None:
         fast = 0.999 * constants.input_limit * (abs(step % 60 - 30) - 15)
         lib.tracker_update(self, [fast, -fast])
         assert max(map(abs, self.tracker.acceleration_m_step2)) <= constants.acceleration_bound_m_step2
-
-
-WIDTHS: dict[str, Literal[32, 64]] = {"float32": 32, "float64": 64}
-
-
-def any_number(limit: float, width: Literal[32, 64]) -> st.SearchStrategy[float]:
-    """Draw a number: within +/- limit mostly, at its very end, too small for a normal number, or any bits."""
-    within = st.floats(-limit, limit, width=width)
-    return st.one_of(
-        within, within, st.sampled_from([limit, -limit, 0.0, -0.0, 1e-40]), st.floats(width=width)
-    )
-
-
-@pytest.mark.parametrize("scalar", ["float32", "float64"])
-@settings(max_examples=100, deadline=None)
-@given(data=st.data())
-def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
-    """Whatever the input, among good ones: a documented status and |command| <= tilt limit."""
-    chosen = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
-    used = CompiledController(chosen, 1, built(chosen))
-    width = WIDTHS[scalar]
-    position, speed = any_number(1000, width), any_number(100, width)
-    angle, yaw = any_number(3.25, width), any_number(1024, width)
-    states = st.tuples(position, position, speed, speed, angle, angle, yaw)
-    targets = st.tuples(position, position, speed, speed)
-    thrusts = st.one_of(st.floats(1, 50, width=width), st.floats(1, 50, width=width), st.floats(width=width))
-    assert used.step([HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST]).status[0] == Status.OK
-    for _ in range(data.draw(st.integers(1, 5))):
-        step = used.step([data.draw(states)], [data.draw(targets)], [data.draw(thrusts)])
-        event(Status(int(step.status[0])).name)
-        assert np.all(np.abs(step.command_rad) <= SCALARS[scalar](chosen.limits.tilt_rad))
-
-
-def test_the_self_test_passes_and_names_the_first_difference() -> None:
-    """Zero for the unharmed code; with an expectation changed, its number."""
-    files = render(MAMBO, with_digest=False)
-    vectors = files["nmpc_self_test.c"]
-    second = re.findall(r"0x\w{8}UL(?= \})", vectors)[1]
-    for text, expected in ((vectors, 0), (vectors.replace(second, f"1UL + {second}"), 2)):
-        extension = load_extension(files | {"nmpc_self_test.c": text}, "float32")
-        scratch = extension.ffi.new("nmpc_t *")
-        assert extension.lib.nmpc_self_test(scratch) == expected
 
 
 def test_the_version_traces_a_binary_to_its_settings() -> None:
