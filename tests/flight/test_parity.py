@@ -1,13 +1,20 @@
-"""Whole flights: the compiled C gives the reference's trace, and tracks better than the paper claims."""
+"""Whole flights: the compiled C gives the reference's trace, the same on every processor, and tracks well."""
 
+import json
+import os
+import platform
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.controller_toml import parse, with_option
+from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.experiment.table2.table2 import PRINTED_IMPROVEMENT, PRINTED_PD
@@ -17,9 +24,11 @@ from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Bernoulli
 from tests.support.cases import SCALARS
+from tests.support.golden_flights import GOLDEN
 from tests.support.tools import toolchain
 
 CASE = Bernoulli(2.0, 0.5)
@@ -128,3 +137,82 @@ def test_other_scalars_fly_like_float64() -> None:
     found = {scalar: indices("mambo", scalar, Flight(CASE, duration_s=30.0)) for scalar in SCALARS}
     for scalar in ("float32", "fixed"):
         np.testing.assert_allclose(found[scalar], found["float64"], rtol=0.1, err_msg=scalar)
+
+
+ROOT = Path(__file__).parents[2]
+DISPATCHED: list[str] = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+"""Features of this processor for which NumPy has code of its own."""
+PROCESSORS: dict[str, dict[str, str]] = {
+    "as it is": {},
+    "NumPy without its optional features": {"NPY_DISABLE_CPU_FEATURES": " ".join(DISPATCHED)},
+    "C library without AVX2 and fused operations": {
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-AVX512F,-FMA,-FMA4"
+    },
+}
+
+
+def run(*command: str, processor: str) -> str:
+    """Return what a Python process prints that sees such a processor."""
+    environment = os.environ | PROCESSORS[processor]
+    return subprocess.run(
+        [sys.executable, *command], cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+
+
+CASES = [
+    *((processor, ("c",), "whole") for processor in PROCESSORS),
+    *((processor, ("numpy", "short"), "short") for processor in PROCESSORS),
+]
+
+
+@pytest.mark.parametrize(
+    ("processor", "arguments", "part"),
+    [pytest.param(*case, marks=[] if case[1] == ("c",) else [pytest.mark.long]) for case in CASES],
+)
+def test_flights_have_the_committed_digests(processor: str, arguments: tuple[str, ...], part: str) -> None:
+    """In every bit of their traces; `python -m tests.support.golden_flights --write` writes them anew.
+
+    In NumPy the first 200 ticks are flown: what differs between processors there is sine, cosine and such,
+    which every tick calls. That the engine has the bits of NumPy is tested in `tests/flight/engine`.
+    """
+    flown = json.loads(run("-m", "tests.support.golden_flights", *arguments, processor=processor))
+    assert flown == json.loads(GOLDEN.read_text("utf-8"))[part]
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has these switches")
+@pytest.mark.skipif("X86_V3" not in DISPATCHED, reason="the processor has no fused operations to hide")
+def test_the_processors_differ() -> None:
+    """Without its fused operations the C library returns other sines, or the test above could not fail."""
+    script = "import math; print([math.sin(0.001 * count) for count in range(10_000)])"
+    other = "C library without AVX2 and fused operations"
+    assert run("-c", script, processor="as it is") != run("-c", script, processor=other)
+
+
+WITHDRAWN = """
+horizon = { prediction = 6, control = 1, prediction_step_s = 0.08637 }
+model = { roll_lag_s = 0.3037, pitch_lag_s = 0.05266 }
+cost.effort_weight = 2027.0
+optimizer = { iterations = 4, initial_step_rad = 0.01142, warm_start = "plan" }
+"""
+"""Settings that fly the figure at heading 0, and away from it at others (docs/evidence/tuning.md)."""
+
+
+def largest_errors_m(settings: Settings, headings: int) -> np.ndarray:
+    """Return the largest error (headings,) on the figure of eight at headings around the whole turn, 30 s."""
+    turns = np.arange(headings) / headings
+    scenarios = [Scenario(yaw_rad=float(turn), duration_s=30.0) for turn in 2.0 * np.pi * turns]
+    flight = flight_of(scenarios, settings.horizon.update_period_s)
+    return measure(fly(flight, CompiledController(settings, headings))).max_error_m
+
+
+@pytest.mark.parametrize("name", ["mambo", "table1"])
+def test_preset_stays_with_its_target_at_every_heading(name: str) -> None:
+    """With the true state no heading takes the drone more than 0.3 m from its target."""
+    assert largest_errors_m(presets.load(name), 32).max() < 0.3
+
+
+def test_these_flights_tell_settings_that_fly_away() -> None:
+    """The withdrawn settings hold heading 0 and leave the path by metres at others."""
+    errors = largest_errors_m(parse(WITHDRAWN, "withdrawn"), 32)
+    assert errors[0] < 0.3
+    assert np.sum(errors > 5.0) >= 5
