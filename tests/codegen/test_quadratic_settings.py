@@ -189,6 +189,7 @@ def test_values_at_odds_are_refused_with_both_keys(values: Values, fault: str) -
         {"horizon.update_period_s": 0.0017, "observer.outage_s": 0.425},
         {"observer.outage_s": 0.0},
         {"horizon.ramp_s": 0.02},
+        {"height.thrust_max_m_s2": 50.0},
     ],
 )
 def test_values_at_the_rule_are_admitted(values: Values) -> None:

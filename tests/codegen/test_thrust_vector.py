@@ -1,9 +1,7 @@
 """The thrust vector: the direction of the thrust by tilt, and the tilt that the thrust can afford."""
 
-from itertools import pairwise
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     THRUST_LEFT,
 )
 from mambo_codegen.methods.shared.limits import ActiveLimit
-from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR, MINIMAX_ARC_TANGENT
+from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -96,17 +94,6 @@ def test_the_arc_tangent_keeps_its_stated_error(scalar: str) -> None:
     rounding = 0.0 if bits is None else 2.0 ** -(bits["angle"] + 1)
     largest = np.max(np.abs(errors))
     assert 0.85 * ARC_TANGENT_ERROR[scalar] < largest <= ARC_TANGENT_ERROR[scalar] + rounding
-
-
-def test_no_other_coefficients_of_the_arc_tangent_have_a_smaller_error() -> None:
-    """The largest error occurs once more than there are coefficients, with both signs (Chebyshev)."""
-    with mpmath.workdps(40):
-        terms = [mpmath.mpf(term) for term in MINIMAX_ARC_TANGENT]
-        points = [mpmath.mpf(step) / 1500 for step in range(1, 1501)]
-        errors = [sum(c * x ** (1 + 2 * k) for k, c in enumerate(terms)) - mpmath.atan(x) for x in points]
-    largest = max(map(abs, errors))
-    peaks = [error for error in errors if abs(error) > 0.99 * largest]
-    assert sum(one * other < 0 for one, other in pairwise(peaks)) == len(terms)
 
 
 def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:

@@ -1,5 +1,7 @@
 """Angles in C: sine and cosine keep the error that nmpc.c states, slewed headings the reference's bits."""
 
+import math
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.heading import slew_heading
-from mambo_codegen.numbers.trigonometry import MINIMAX_COSINE, MINIMAX_SINE, SINE_ERRORS
+from mambo_codegen.numbers.trigonometry import MINIMAX_ARC_TANGENT, MINIMAX_COSINE, MINIMAX_SINE, SINE_ERRORS
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import place
@@ -23,6 +25,7 @@ from tests.support.shell import shell
 from tests.support.tools import require
 
 PROGRAM = Path(__file__).with_name("sine_errors.c")
+EIGHTH_TURN = 1.0005 * math.pi / 4
 ODD = (np.nan, np.inf, -np.inf, 0.0, 1024.0, -1024.0, 1025.0, np.pi, -np.pi, 3.5, -3.5)
 
 
@@ -37,21 +40,23 @@ def test_no_angle_exceeds_the_stated_error(scalar: str, tmp_path: Path) -> None:
     assert 0.8 * SINE_ERRORS[scalar] < largest <= SINE_ERRORS[scalar]
 
 
-def error_of(coefficients: tuple[str, ...], r: Any) -> Any:
-    """Return the error at r of a polynomial of sine, or of cosine if its first coefficient is near -1/2."""
-    terms = [mpmath.mpf(coefficient) for coefficient in coefficients]
-    power, exact = (2, mpmath.cos(r) - 1) if terms[0] < -0.4 else (3, mpmath.sin(r) - r)
-    return exact - sum(term * r ** (power + (2 * k)) for k, term in enumerate(terms))
-
-
-@pytest.mark.parametrize("coefficients", [MINIMAX_SINE, *MINIMAX_COSINE.values()])
-def test_no_other_coefficients_have_a_smaller_error(coefficients: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("coefficients", "first_power", "exact", "largest"),
+    [
+        (MINIMAX_SINE, 3, lambda r: mpmath.sin(r) - r, EIGHTH_TURN),
+        *((terms, 2, lambda r: mpmath.cos(r) - 1, EIGHTH_TURN) for terms in MINIMAX_COSINE.values()),
+        (MINIMAX_ARC_TANGENT, 1, mpmath.atan, 1.0),
+    ],
+)
+def test_no_other_coefficients_have_a_smaller_error(
+    coefficients: tuple[str, ...], first_power: int, exact: Callable[[Any], Any], largest: float
+) -> None:
     """The largest error occurs once more than there are coefficients, with both signs (Chebyshev)."""
     with mpmath.workdps(40):
-        angles = [1.0005 * mpmath.pi / 4 * step / 2000 for step in range(1, 2001)]
-        errors = [error_of(coefficients, r) for r in angles]
-    largest = max(map(abs, errors))
-    peaks = [error for error in errors if abs(error) > 0.99 * largest]
+        terms = [mpmath.mpf(coefficient) for coefficient in coefficients]
+        points = [largest * mpmath.mpf(step) / 2000 for step in range(1, 2001)]
+        errors = [exact(x) - sum(c * x ** (first_power + 2 * k) for k, c in enumerate(terms)) for x in points]
+    peaks = [error for error in errors if abs(error) > 0.99 * max(map(abs, errors))]
     assert sum(one * other < 0 for one, other in pairwise(peaks)) == len(coefficients)
 
 

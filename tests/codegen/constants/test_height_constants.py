@@ -263,14 +263,6 @@ def test_settings_refuse_speeds_that_cannot_be_braked(name: str) -> None:
         settings_of(EXACT | {"ranges.velocity_m_s": 0.4, f"height.{name}": 0.5})
 
 
-def test_settings_refuse_more_thrust_than_the_range() -> None:
-    """As much is allowed."""
-    base = EXACT | {"ranges.thrust_acceleration_max_m_s2": 20.0}
-    assert settings_of(base | {"height.thrust_max_m_s2": 20.0}).height is not None
-    with pytest.raises(ValueError, match="thrust_max_m_s2"):
-        settings_of(base | {"height.thrust_max_m_s2": 20.001})
-
-
 def inverse(found: Reciprocal, x: Any) -> Any:
     """Return 1/x as the C computes it, in float64."""
     y = found.start - found.slope * x
