@@ -72,7 +72,7 @@ def test_a_result_is_computed_once(forgetful: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"7", bytes(32) + b"7"])
 def test_a_damaged_cache_costs_time_only(forgetful: Path, content: bytes) -> None:
-    """A file that is cut short or has other content is replaced."""
+    """A file that is cut short or has other content is replaced; so is a template's, in the same cache."""
     assert kept.keep("test", 1, lambda: 5) == 5
     (file,) = (forgetful / "kept").iterdir()
     whole = file.read_bytes()

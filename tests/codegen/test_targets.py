@@ -77,16 +77,6 @@ def test_the_manual_has_a_page_for_every_target() -> None:
         assert re.search(rf"mambo-nmpc generate (?:controller\.toml )?--for {name} -o ", page)
 
 
-def test_an_edited_file_drifts_and_is_kept(tmp_path: Path) -> None:
-    """As in every bundle: --check shows it, a run refuses it, --force takes it back."""
-    folder = str(tmp_path)
-    run("generate", "--for", "espidf", "-o", folder)
-    (tmp_path / "CMakeLists.txt").write_text("mine\n", "utf-8")
-    assert "\n-mine\n" in run("generate", "--for", "espidf", "-o", folder, "--check", code=1)[0]
-    assert "CMakeLists.txt (edited by hand)" in run("generate", "--for", "espidf", "-o", folder, code=2)[1]
-    assert run("generate", "--for", "espidf", "-o", folder, "--force")[0] == "changed CMakeLists.txt\n"
-
-
 @pytest.mark.parametrize(
     ("first", "then", "message"),
     [
