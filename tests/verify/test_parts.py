@@ -15,7 +15,7 @@ from mambo_sil.verify import fuzzing, rules, sanitizers
 from mambo_sil.verify.calls import NULL_SELF, ApiFunction, Outcomes, Tape, answers, calls
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.step_rows import StepRows
+from mambo_sil.verify.step_inputs import StepRows
 from tests.support import proven
 from tests.support.alarms import Alarm, Fault, harmed
 from tests.support.height import height_case

@@ -20,11 +20,11 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import Link
 from mambo_sil.drone.vehicles.vehicle_toml import load as load_drone
-from mambo_sil.flight import evaluation, loop
+from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import AnyPd, PdController, pd_controller
 from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
-from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled
+from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled, evaluate_numpy
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
 from mambo_sil.flight.loop import Flight, Outcome, PositionController
 from mambo_sil.flight.names import PD_NAMES, SENSORS_OF, AltitudeName
@@ -257,7 +257,7 @@ def test_a_batch_flies_in_lanes_and_a_single_flight_does_not() -> None:
 
 def expected(trace: Trace) -> str:
     """Evaluate in NumPy."""
-    return bits(evaluation.evaluate(trace, LIMIT_RAD, NOMINAL))
+    return bits(evaluate_numpy(trace, LIMIT_RAD, NOMINAL))
 
 
 @settings(max_examples=60)
@@ -301,7 +301,7 @@ def test_the_drone_and_the_limit_count() -> None:
     for name in ("mambo", "crazyflie"):
         drone = load_drone(name)
         found = evaluate(trace, 0.1, drone)
-        assert bits(found) == bits(evaluation.evaluate(trace, 0.1, drone))
+        assert bits(found) == bits(evaluate_numpy(trace, 0.1, drone))
         assert (found.saturated_share > evaluate(trace, LIMIT_RAD, drone).saturated_share).all()
 
 
