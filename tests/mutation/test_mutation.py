@@ -23,7 +23,7 @@ from tests.support.tools import require
 
 REASONS = survivors("c_survivors.txt")
 MAMBO, TRACKED = ONE_NORM, presets.load("mambo-1norm")
-STRIDE: Final = 30
+STRIDE: Final = 50
 """The test tries one fault in so many, others when the C changes; all of them take a quarter of an hour."""
 
 
