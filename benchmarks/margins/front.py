@@ -160,8 +160,8 @@ def _pair(found: dict[str, Any], key: str, form: str) -> str:
 def draw(rows: list[dict[str, Any]], stem: Path) -> None:
     """Draw damping and ringing of drones with slow motors over the error and the variation of the others."""
     panels = (
-        ("seen_median_m_s", "estimated error, median, m s", lambda slow: slow["damping_worst_tenth"]),
-        ("variation_95_rad", "command variation, 95 %, rad", lambda slow: slow["ring"]),
+        ("seen_median_m_s", "estimated error, median, m s", "damping_worst_tenth"),
+        ("variation_95_rad", "command variation, 95 %, rad", "ring"),
     )
     names = (
         "slow motors: least damping\nof the worst tenth, through the sensors",
@@ -169,10 +169,10 @@ def draw(rows: list[dict[str, Any]], stem: Path) -> None:
     )
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 3.0), layout="constrained")
-        for axes, (key, label, of), name in zip(figure.subplots(1, 2), panels, names, strict=True):
+        for axes, (key, label, slow), name in zip(figure.subplots(1, 2), panels, names, strict=True):
             for number, row in enumerate(rows):
                 shipped = not row["change"]
-                x, y = row["default"][key], of(row["slow"])
+                x, y = row["default"][key], row["slow"][slow]
                 look = (VERMILION, "D") if shipped else (BLUE, "o")
                 axes.plot([x], [y], color=look[0], marker=look[1], linestyle="none")
                 text = "mambo" if shipped else str(number)

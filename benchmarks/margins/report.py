@@ -95,7 +95,7 @@ class DrawnDrones:
             return sign * (np.inf if value is None else float(value))
 
         worse = [max(map(of_an_axis, row["margins"][state])) for row in self.rows]
-        return np.clip(np.array(worse), -LARGEST, LARGEST)
+        return np.asarray(np.clip(worse, -LARGEST, LARGEST))
 
 
 def read(folder: Path, campaign: str, controller: str) -> DrawnDrones:

@@ -95,7 +95,7 @@ class _MellingerPilot:
                 ctrl_freq=round(1.0 / STEP_S),
                 **self._parameters,
             )
-        return np.nan_to_num(np.asarray(command))
+        return np.asarray(np.nan_to_num(np.asarray(command)))
 
 
 def fly(
