@@ -42,7 +42,6 @@ from mambo_sil.link.records import (
     Stack,
     Stream,
     TakeOff,
-    Text,
 )
 from mambo_sil.link.sockets import Address, MavlinkSocket
 
@@ -55,6 +54,8 @@ POSITION_1_S, VELOCITY_1_S = 0.9, 2.0
 LARGEST_TILT_RAD: Final = 0.35
 DISARMS_S: Final = 1.0
 """Time on the ground after which it disarms by itself."""
+BATTERY: Final = 0.9
+"""The share that remains."""
 ALWAYS: Final = {Stream.EXTENDED_SYS_STATE: 1.0}
 """Rates of the streams that nobody asked for."""
 
@@ -64,16 +65,11 @@ class Condition:
     """What the simulated drone is like beside its vehicle.
 
     hover_thrust: the share of the largest thrust that carries it, and `believed` the one in its parameter.
-    refuses:      why it does not arm; nothing if it does.
     """
 
     hover_thrust: float = 0.52
     believed: float = 0.5
-    guided_options: int = 8
-    battery: float = 0.9
-    refuses: str = ""
     yaw_rad: float = 0.3
-    wind_m_s: float = 0.0
     seed: int = 0
 
 
@@ -98,7 +94,7 @@ class SimulatedAutopilot:
         seeds = (self.condition.seed,)
         vehicle = Vehicle.of(drone)
         sensors = choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone)
-        wind = Disturbances(self.condition.wind_m_s)
+        wind = Disturbances()
         flight = Flight(Hover(), vehicle=vehicle, update_period_s=drone.step_s, seeds=seeds, sensors=sensors)
         self._vehicle, self._there = vehicle, np.ones(1, np.bool_)
         self._state = vehicle.at_rest(np.array(STARTS_M)[:, np.newaxis], self.condition.yaw_rad, 0.0)
@@ -187,9 +183,7 @@ class SimulatedAutopilot:
         return True
 
     def _arm(self, order: Arm) -> None:
-        if order.arm and self.condition.refuses:
-            self._emit(Text(self.condition.refuses))
-        elif order.arm or order.force or self.is_on_ground:
+        if order.arm or order.force or self.is_on_ground:
             if order.arm and not self.armed:
                 self._aim_m = self._state.body[:3, 0].copy()
             self.armed = order.arm
@@ -255,7 +249,7 @@ class SimulatedAutopilot:
         """Send what is due."""
         if self._is_due("heartbeat", 1.0):
             self._emit(Heartbeat(1, 1, self.stack.ident, 2, self.armed, self.mode))
-            self._emit(Battery(self.condition.battery))
+            self._emit(Battery(BATTERY))
         for stream, rate_hz in self._rates.items():
             if self._is_due(stream, 1.0 / rate_hz):
                 landed = stream is Stream.EXTENDED_SYS_STATE
@@ -270,10 +264,7 @@ class SimulatedAutopilot:
         return True
 
     def _send_parameter(self, name: str) -> None:
-        values = {
-            self.stack.hover_parameter: self.condition.believed,
-            "GUID_OPTIONS": float(self.condition.guided_options),
-        }
+        values = {self.stack.hover_parameter: self.condition.believed, **self.stack.needs}
         if name in values:
             self._emit(Parameter(name, values[name]))
 
