@@ -47,7 +47,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     figure.savefig(png, metadata={"Software": None})
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    svg.write_text(_shorten_numbers(text.getvalue(), 2), "utf-8")
+    svg.write_text(_with_own_ids(_shorten_numbers(text.getvalue(), 2)), "utf-8")
     return png, svg
 
 
@@ -85,8 +85,8 @@ def _shorten_numbers(svg: str, decimals: int) -> str:
 
 
 def _with_own_ids(svg: str) -> str:
-    """Return the SVG with ids derived from its content; matplotlib's depend on last bits of positions."""
-    found = list(dict.fromkeys(re.findall(r' id="([^"]+)"', svg)))
+    """Return the SVG with ids of markers and clips from its content; matplotlib's depend on last bits."""
+    found = list(dict.fromkeys(re.findall(r' id="([a-z][0-9a-f]{10})"', svg)))
     numbered = {name: f"n{number}" for number, name in enumerate(found)}
     plain = re.sub("|".join(found), lambda name: numbered[name[0]], svg)
     digest = hashlib.sha256(plain.encode()).hexdigest()[:8]
