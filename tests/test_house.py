@@ -12,7 +12,7 @@ import grimp
 
 ROOT = Path(__file__).parent.parent
 SOURCE_ROOTS = {"mambo_codegen": "codegen", "mambo_nmpc": "sil", "mambo_sil": "sil", "benchmarks": "."}
-LONGEST_MODULE = 500
+LONGEST_MODULE, LONGEST_TEMPLATE = 500, 400
 # Rooms whose results must have the same bits on every processor, and what of them only draws or prints.
 _MANY = ("campaign", "faults", "table2")
 EXACT_ROOMS = ("api", "drone", "flight", "board.pil", *(f"experiment.{name}" for name in _MANY))
@@ -111,3 +111,10 @@ def test_modules_are_short_and_named_by_their_subject() -> None:
     for module, path in modules().items():
         assert len(path.read_text("utf-8").splitlines()) <= LONGEST_MODULE, path
         assert module.rpartition(".")[2] not in {"utils", "util", "helpers", "misc"}, path
+
+
+def test_templates_are_short() -> None:
+    """A template of more than 400 lines has more than one subject."""
+    templates = [*(ROOT / "templates").rglob("*.j2")]
+    longest = max(templates, key=lambda path: len(path.read_text("utf-8").splitlines()))
+    assert len(longest.read_text("utf-8").splitlines()) <= LONGEST_TEMPLATE, longest
