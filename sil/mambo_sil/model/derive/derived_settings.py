@@ -45,6 +45,7 @@ ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
     "given": "By the program, which knows the curve",
     "preview": "By the program, which knows the curve, now and up to 0.3 s ahead",
 }
+"""Why the settings take the target's acceleration from there."""
 
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
