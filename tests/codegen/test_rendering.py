@@ -41,6 +41,15 @@ def test_an_acceleration_is_weighed_only_if_something_weighs_it() -> None:
     assert FLOAT["weighed"]("limit") == FIXED["over_weight"]("limit") == "limit"
 
 
+def test_an_acceleration_has_a_learnt_gain_only_if_one_is_learnt() -> None:
+    """Then it is times the share of the gain of its axis, as an operand if it is weighed too."""
+    write = products(fixed=False, weighs=True, learns=True)
+    gained = write["gained"]("limit", "RIGHT")
+    assert gained == "limit * (tilt_gain_share(learnt, RIGHT))"
+    assert write["weighed"](gained) == "(limit * (tilt_gain_share(learnt, RIGHT))) * weight"
+    assert FLOAT["gained"]("limit", "RIGHT") == FIXED["gained"]("limit", "RIGHT") == "limit"
+
+
 def rendered(text: str) -> str:
     """Render a template in a new environment, which knows no template yet."""
     loader = jinja2.DictLoader({"one.j2": text})

@@ -52,10 +52,11 @@ class Infix(str):
     __slots__ = ()
 
 
-def products(*, fixed: bool, weighs: bool = False) -> dict[str, Callable[..., str]]:
+def products(*, fixed: bool, weighs: bool = False, learns: bool = False) -> dict[str, Callable[..., str]]:
     """Return the functions of the templates that write products, by name.
 
     weighed, over_weight: an acceleration of a tilt times its weight, and over it; as it is without `weighs`.
+    gained: such an acceleration times the share of the learnt gain of its axis; as it is without `learns`.
     """
 
     def call(name: str) -> Callable[..., str]:
@@ -70,9 +71,17 @@ def products(*, fixed: bool, weighs: bool = False) -> dict[str, Callable[..., st
 
     found = {name: call(name) if fixed else infix(name) for name in _NAMES}
     factors = {"weighed": "weight", "over_weight": "inverse"}
+
+    def gained(acceleration: str, axis: str) -> str:
+        share = f"tilt_gain_share(learnt, {axis})"
+        return found["factor_product"](acceleration, share) if learns else acceleration
+
     return found | {
-        name: partial(_times, found["factor_product"], factor) if weighs else str
-        for name, factor in factors.items()
+        "gained": gained,
+        **{
+            name: partial(_times, found["factor_product"], factor) if weighs else str
+            for name, factor in factors.items()
+        },
     }
 
 

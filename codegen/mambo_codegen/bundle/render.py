@@ -180,7 +180,11 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        products(fixed=numbers.formats is not None, weighs=method.has_height)
+        products(
+            fixed=numbers.formats is not None,
+            weighs=method.has_height,
+            learns=method.learns_tilt_gain,
+        )
         | {"height": None, "guard": None, "doubts": False, "vector": None, "tilt_gain": None}
         | method.context
         | {
