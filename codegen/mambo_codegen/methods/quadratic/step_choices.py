@@ -34,6 +34,7 @@ class StepChoices:
     most_right, most_forward: the largest moves.
     tilt:       the tilt from which the optimizer starts.
     limiter:    the function that clamps a command.
+    functions:  the templates of hold and guard_commands, for angles or for the direction of the thrust.
     fed:        the angles with rate feedback.
     limited:    the angles that a step without limits clamps.
     held:       the statement of a step with limits that holds the last command.
@@ -57,6 +58,7 @@ class StepChoices:
     tilt: str
     limiter: str
     angles: tuple[Angle, Angle]
+    functions: tuple[str, ...]
     fed: tuple[Angle, ...]
     limited: tuple[Angle, ...]
     held: str
@@ -100,6 +102,7 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         tilt="attitude->tilt_m_step2" if constants.settings.model.attitude == "predicted" else "tilt_m_step2",
         limiter="shared_clamp" if has_height else "clamp",
         angles=angles,
+        functions=_functions(constants),
         fed=fed,
         limited=angles if has_height or constants.learns_tilt_gain else fed,
         held=f"hold(self, attitude{inverse});" if constants.feedback_steps else "/* The command holds. */",
@@ -116,6 +119,12 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
 def _angle(index: int, name: str, axis: str, feedback: float) -> Angle:
     added = f" + feedback_rad[{index}]" if feedback else ""
     return Angle(index, name, f"attitude->command_m_step2[NMPC_{axis}]", added)
+
+
+def _functions(constants: QuadraticConstants) -> tuple[str, ...]:
+    shape = "vector" if constants.has_thrust_vector else "angles"
+    wanted = {"hold": constants.feedback_steps, "guard": constants.guard}
+    return tuple(f"quadratic/_{name}_{shape}.c.j2" for name, found in wanted.items() if found is not None)
 
 
 def _locals(constants: QuadraticConstants) -> tuple[str, ...]:
