@@ -1,6 +1,5 @@
 """What the template of the step needs of the settings: names and lists of the C, so that it reads like C."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
@@ -27,30 +26,32 @@ class StepChoices:
     estimated, none_yet: comparisons of `missed` with NMPC_NO_ESTIMATE: there is an estimate, there is none.
     lift_of:    what the lift of the height depends on beside the thrust.
     per_step2:  the constant that makes a command of a thrust over mass per squared step.
-    own:        parts of the state that a step copies, for the compiler to keep them in registers.
-    places:     where attitude model and observer are.
-    locals:     the variables that only a height or limits need.
+    parts:      declarations of pointers to the parts of the controller, and of the copies to which they
+                point where the compiler shall keep a part in registers.
+    locals:     declarations of the other variables of a step, but for the accelerations of the tilt.
+    opening:    the lines with which a step begins: it copies the parts, and clears the target for rest.
+    measuring:  the statements that measure the height and the tilt.
     goal, follows: the variable for the target, and the condition that a step may follow it.
     most_right, most_forward: the largest moves.
     tilt:       the tilt from which the optimizer starts.
     limiter:    the function that clamps a command.
-    functions:  the templates of hold and guard_commands, for angles or for the direction of the thrust.
+    guarding:   the template of hold and guard_commands, for angles or for the direction of the thrust.
     fed:        the angles with rate feedback.
     limited:    the angles that a step without limits clamps.
     held:       the statement of a step with limits that holds the last command.
     cleared:    the calls that forget the target after an outage.
-    rested:     the members of the target that stands for rest.
     target_motion: the member of a target that the tracker reads.
-    closing:    the statements that end a step.
+    closing:    the statements that end a step: they store what it has copied.
     """
 
     estimated: str
     none_yet: str
     lift_of: str
     per_step2: str
-    own: tuple[str, ...]
-    places: Mapping[str, str]
+    parts: tuple[str, ...]
     locals: tuple[str, ...]
+    opening: tuple[str, ...]
+    measuring: tuple[str, ...]
     goal: str
     follows: str
     most_right: str
@@ -58,12 +59,11 @@ class StepChoices:
     tilt: str
     limiter: str
     angles: tuple[Angle, Angle]
-    functions: tuple[str, ...]
+    guarding: str
     fed: tuple[Angle, ...]
     limited: tuple[Angle, ...]
     held: str
     cleared: tuple[str, ...]
-    rested: tuple[str, ...]
     target_motion: str
     closing: tuple[str, ...]
 
@@ -78,21 +78,23 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
     """Return what the template of the step chooses by the settings."""
     has_height, has_limits, tracker = constants.has_height, constants.has_limits, constants.tracker
     is_fixed, is_given = constants.numbers.formats is not None, constants.settings.target.gives_acceleration
-    learns_gain = constants.height is not None and constants.height.learns_gain
+    lift_of = "height, " if constants.height is not None and constants.height.learns_gain else ""
     own = () if is_fixed else ("observer",) if has_height else ("attitude", "observer")
     feedback = constants.feedback_steps or (0.0, 0.0)
     angles = (_angle(0, "roll", "RIGHT", feedback[0]), _angle(1, "pitch", "FORWARD", feedback[1]))
     fed = tuple(angle for angle in angles if angle.added)
-    estimated = "<" if has_limits else "!="
+    shape = "vector" if constants.has_thrust_vector else "angles"
+    estimated, none_yet = ("<", ">=") if has_limits else ("!=", "==")
     inverse = ", inverse" if has_height else ""
     return StepChoices(
         estimated=estimated,
-        none_yet=">=" if has_limits else "==",
-        lift_of="height, " if learns_gain else "",
+        none_yet=none_yet,
+        lift_of=lift_of,
         per_step2=_per_step2(constants),
-        own=own,
-        places={part: f"own_{part}" if part in own else f"self->{part}" for part in ("attitude", "observer")},
+        parts=_parts(own, has_height=has_height),
         locals=_locals(constants),
+        opening=_opening(constants, own),
+        measuring=_measuring(constants, none_yet, lift_of),
         goal="good" if has_height else "target",
         follows="good != NULL"
         if has_height
@@ -102,12 +104,11 @@ def step_choices(constants: QuadraticConstants) -> StepChoices:
         tilt="attitude->tilt_m_step2" if constants.settings.model.attitude == "predicted" else "tilt_m_step2",
         limiter="shared_clamp" if has_height else "clamp",
         angles=angles,
-        functions=_functions(constants),
+        guarding=f"quadratic/_hold_and_guard_{shape}.c.j2",
         fed=fed,
         limited=angles if has_height or constants.learns_tilt_gain else fed,
         held=f"hold(self, attitude{inverse});" if constants.feedback_steps else "/* The command holds. */",
         cleared=_cleared(has_height=has_height) if tracker else (),
-        rested=constants.target_members,
         target_motion="acceleration_m_s2" if is_given else "velocity_m_s",
         closing=(
             *(("height_predict(height, on_ground)",) if has_height else ()),
@@ -121,23 +122,57 @@ def _angle(index: int, name: str, axis: str, feedback: float) -> Angle:
     return Angle(index, name, f"attitude->command_m_step2[NMPC_{axis}]", added)
 
 
-def _functions(constants: QuadraticConstants) -> tuple[str, ...]:
-    shape = "vector" if constants.has_thrust_vector else "angles"
-    wanted = {"hold": constants.feedback_steps, "guard": constants.guard}
-    return tuple(f"quadratic/_{name}_{shape}.c.j2" for name, found in wanted.items() if found is not None)
+def _parts(own: tuple[str, ...], *, has_height: bool) -> tuple[str, ...]:
+    places = {part: f"own_{part}" if part in own else f"self->{part}" for part in ("attitude", "observer")}
+    places |= {"height": "self->height"} if has_height else {}
+    return (
+        *(f"nmpc_{part}_t own_{part}" for part in own),
+        *(f"nmpc_{part}_t *const {part} = &{place}" for part, place in places.items()),
+    )
 
 
 def _locals(constants: QuadraticConstants) -> tuple[str, ...]:
     has_height, has_limits = constants.has_height, constants.has_limits
-    names = ["nmpc_real_t weight", "nmpc_real_t inverse", "const nmpc_target_t *good", "int on_ground = 0"]
-    found = names if has_height else []
-    found += ["int limit_active"] if has_height and has_limits else []
-    if constants.has_thrust_vector:
-        found += ["nmpc_real_t slope[2]"]
-        found += (
-            ["unsigned int by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST"] if has_limits else []
-        )
-    return (*found, *(("nmpc_target_t limited", "const nmpc_target_t *aim = NULL") if has_limits else ()))
+    has_vector, has_guard = constants.has_thrust_vector, constants.guard is not None
+    has_feedback = constants.feedback_steps is not None
+    found = {
+        "nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 }": has_feedback,
+        "const nmpc_real_t before_rad[2] = { self->command_rad[0], self->command_rad[1] }": has_guard,
+        "unsigned int missed = self->missed": True,
+        "nmpc_real_t weight": has_height,
+        "nmpc_real_t inverse": has_height,
+        "const nmpc_target_t *good": has_height,
+        "int on_ground = 0": has_height,
+        "int limit_active": has_height and has_limits,
+        "nmpc_real_t slope[2]": has_vector,
+        "unsigned int by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST": has_vector and has_limits,
+        "nmpc_target_t limited": has_limits,
+        "const nmpc_target_t *aim = NULL": has_limits,
+    }
+    return tuple(local for local, is_wanted in found.items() if is_wanted)
+
+
+def _opening(constants: QuadraticConstants, own: tuple[str, ...]) -> tuple[str, ...]:
+    copies = tuple(f"own_{part} = self->{part};" for part in own)
+    if not constants.has_limits:
+        return copies
+    return (
+        *copies,
+        "/* One by one: for an initialiser some compilers call memset. */",
+        *(f"limited.{member} = (nmpc_real_t)0;" for member in constants.target_members),
+    )
+
+
+def _measuring(constants: QuadraticConstants, none_yet: str, lift_of: str) -> tuple[str, ...]:
+    if not constants.has_height:
+        return ("attitude_measure(state, tilt_m_step2)",)
+    weight = f"height_weight(height_lift({lift_of}height->thrust_m_step2))"
+    return (
+        f"on_ground = height_measure(height, state, missed {none_yet} NMPC_NO_ESTIMATE)",
+        f"attitude_accelerate(slope, {weight}, tilt_m_step2)"
+        if constants.has_thrust_vector
+        else f"attitude_measure(state, {weight}, tilt_m_step2)",
+    )
 
 
 def _cleared(*, has_height: bool) -> tuple[str, ...]:
