@@ -132,8 +132,16 @@ def test_a_budget_holds_a_swing_at_least() -> None:
     found = Quadratic(with_option(GUARDED, "guard.tilt_rad", 0.1)).guard
     assert found is not None
     assert found.tilt_rad == 2 * GUARDED.limits.tilt_rad
+    assert found.thrust_m_s2 == 12.0
     with pytest.raises(InvalidSettingsError, match=r'must be "quadratic" with \[guard\]'):
         parse("[guard]\n", "controller.toml")
+
+
+def test_a_budget_of_the_thrust_is_of_what_is_delivered() -> None:
+    """Its commands vary by more where the thrust is less than the commanded one."""
+    found = Quadratic(with_option(guarded_height("float64"), "height.thrust_gain", 0.8)).guard
+    assert found is not None
+    assert 0.8 * np.array([found.thrust_m_s2, found.thrust_growth_m_s2]) == pytest.approx([5.0, 0.2])
 
 
 def test_without_the_section_there_is_no_guard() -> None:

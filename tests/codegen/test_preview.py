@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from mambo_codegen.methods.quadratic.law import state_names
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
@@ -69,6 +70,7 @@ def test_what_is_not_ahead_is_as_without_a_preview() -> None:
     """A steady acceleration counts as a disturbance against it; the other gains are those of the settings."""
     settings = settings_of(PREVIEW)
     without = Quadratic(with_option(settings, "target.acceleration", "none"))
+    assert " ".join(state_names(settings)) == "e v w p0 a i c u p1 p2 p3 p4 p5 p6"
     law, height = Quadratic(settings).law, Quadratic(settings).height
     assert height is not None
     assert without.height is not None

@@ -26,7 +26,9 @@ from tests.support.height import height_case
 from tests.support.height_settings import height_settings
 
 STRONG = 7
-"""The corner of the settings whose tilt limit is the largest, without trim and with gains of 1."""
+"""The corner of the settings whose tilt limit is the largest, without trim."""
+GAINS = np.array([0.8, 0.9])
+"""Measured per commanded roll and pitch."""
 
 
 def exact_settings(tilt_rad: float = 0.7, scalar: str = "float64") -> Settings:
@@ -37,7 +39,8 @@ def exact_settings(tilt_rad: float = 0.7, scalar: str = "float64") -> Settings:
 
 def vector_of(scalar: str) -> tuple[Quadratic, ThrustVector]:
     """Return a method and its thrust vector."""
-    method = Quadratic(height_case(STRONG, scalar))
+    settings = with_option(height_case(STRONG, scalar), "model.roll_gain", GAINS[0])
+    method = Quadratic(with_option(settings, "model.pitch_gain", GAINS[1]))
     vector = method.reference_controller(1).parts.model.vector
     assert vector is not None
     return method, vector
@@ -77,7 +80,7 @@ def test_commands_lead_back_to_the_accelerations_that_they_stand_for(scalar: str
     slopes = np.random.default_rng(2).uniform(-2.5, 2.5, (5000, 2))
     wanted = numbers(method, gain * slopes, "acceleration")
     command = vector.command_rad(wanted)
-    tilt = si(method, command, "angle")
+    tilt = GAINS * si(method, command, "angle")
     forward, right, down = Rotation.from_euler("xy", tilt).apply([0.0, 0.0, -1.0]).T
     found = np.stack([right, forward], axis=1) / -down[:, np.newaxis]
     np.testing.assert_allclose(found, si(method, wanted, "acceleration") / gain, rtol=3e-6, atol=4e-6)
@@ -149,6 +152,7 @@ def test_small_angles_know_no_thrust_budget() -> None:
             1.5,
             'limits.tilt_rad = 0.9 must be at most 0.8 with model.tilt = "exact"',
         ),
+        (exact_settings(0.9), "model.pitch_gain", 1.6, "limits.tilt_rad = 0.9 must be at most 0.75 with"),
         (presets.preset("crazyflie"), "model.tilt", "exact", "has no effect without [height]"),
     ],
 )

@@ -89,8 +89,7 @@ ROOMS: Final = {
     "laws": Room(
         source=(f"{_METHODS}/*_constants.py", f"{_METHODS}/law.py"),
         tests=(
-            f"{_CONSTANTS}/test_attitude_constants.py",
-            f"{_CONSTANTS}/test_limits_constants.py",
+            *(f"{_CONSTANTS}/test_{name}_constants.py" for name in ("attitude", "limits", "height")),
             *(f"tests/codegen/test_{name}.py" for name in ("guard", "quadratic", "quadratic_settings")),
             *(f"tests/codegen/test_{name}.py" for name in ("preview", "thrust_vector")),
         ),

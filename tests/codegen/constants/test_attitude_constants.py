@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq, linprog
+from scipy.spatial.transform import Rotation
 
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, AttitudeConstants
 from mambo_codegen.methods.quadratic.method import Quadratic
@@ -91,6 +92,37 @@ def test_no_state_of_the_model_is_beyond_its_limit(height: bool) -> None:
         assert attitude_of(settings_with({}, height=True)).limit_m_step2 == pytest.approx(
             MOST_WEIGHT * attitude_of(without).limit_m_step2, rel=1e-9
         )
+
+
+def slopes(roll_rad: Any, pitch_rad: Any) -> Any:
+    """Return a rotated thrust, right and forward (n, 2), over its vertical component."""
+    tilts = np.stack(np.broadcast_arrays(roll_rad, pitch_rad), axis=-1)
+    forward, right, down = Rotation.from_euler("xy", tilts).apply([0.0, 0.0, -1.0]).T
+    return np.stack([right, forward], axis=1) / -down[:, np.newaxis]
+
+
+@pytest.mark.parametrize(
+    ("limit_rad", "trims_rad"), [(LIMIT_RAD, TRIMS_RAD), (LIMIT_RAD, (0.06, -0.01)), (0.95, TRIMS_RAD)]
+)
+def test_limits_of_a_thrust_vector_are_those_of_a_rotated_thrust(limit_rad: float, trims_rad: Any) -> None:
+    """Of a move the smaller of both ways; of a state the steepest, also counted as 1/0.3 and a hundredth."""
+    values: Values = {
+        "limits.tilt_rad": limit_rad,
+        "model.roll_trim_rad": trims_rad[0],
+        "model.pitch_trim_rad": trims_rad[1],
+    }
+    small, exact = (
+        attitude_of(settings_with(values | {"model.tilt": tilt}, height=True))
+        for tilt in ("small-angle", "exact")
+    )
+    ends_rad = np.outer([-1.0, 1.0], GAINS) * limit_rad - trims_rad
+    rows = slopes(ends_rad[:, 0], 0.0)[:, 0], slopes(0.0, ends_rad[:, 1])[:, 1]
+    moves = [in_steps(GRAVITY_M_S2 * SHARE * np.abs(row).min()) for row in rows]
+    assert exact.command_limit_m_step2 == pytest.approx(moves, rel=1e-12)
+    grid_rad = np.abs(ends_rad).max() * np.linspace(-1.0, 1.0, 41)
+    steepest = np.abs(slopes(*(angle.ravel() for angle in np.meshgrid(grid_rad, grid_rad)))).max()
+    larger = min(steepest, 1.01 / 0.3) / grid_rad[-1]
+    assert exact.limit_m_step2 == pytest.approx(larger * small.limit_m_step2, rel=1e-9)
 
 
 def test_the_observer_s_constants_are_in_steps() -> None:

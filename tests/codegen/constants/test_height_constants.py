@@ -40,6 +40,7 @@ ONE: Final[Values] = ONE_MOVE | {
     "height.lag_s": 0.05,
     "height.learn_limit": 0.2,
     "height.thrust_max_m_s2": 25.0,
+    "height.thrust_gain": 1.6,
     "height.thrust_min_m_s2": 4.0,
     "height.climb_m_s": 0.8,
     "height.descent_m_s": 0.5,
@@ -116,10 +117,13 @@ def test_units_are_those_of_differences_of_places(settings: Settings) -> None:
 
     assert found.gravity_m_step2 == pytest.approx(difference_m(GRAVITY_M_S2), rel=1e-12)
     assert found.per_gravity * difference_m(GRAVITY_M_S2) == pytest.approx(1.0, rel=1e-12)
-    assert found.step2_s2 == pytest.approx(difference_m(1.0), rel=1e-12)
-    assert found.steps2_per_s2 * difference_m(1.0) == pytest.approx(1.0, rel=1e-12)
+    delivered_m = difference_m(height.thrust_gain)
+    assert found.step2_s2 == pytest.approx(delivered_m, rel=1e-12)
+    assert found.steps2_per_s2 * delivered_m == pytest.approx(1.0, rel=1e-12)
     least, most = height.thrust_min_m_s2, height.thrust_max_m_s2
     assert found.thrust_m_step2 == pytest.approx((difference_m(least), difference_m(most)), rel=1e-12)
+    lifts = (*found.thrust_m_step2, found.gravity_m_step2)
+    assert delivered_m * np.array(found.command_m_s2) == pytest.approx(lifts, rel=1e-12)
 
 
 @pytest.mark.parametrize("learn", ["gain", "acceleration", "none"])
@@ -147,11 +151,8 @@ class PointMass:
     def __init__(self, settings: Settings, loads: tuple[float, ...]) -> None:
         height = settings.height
         assert height is not None
-        self._lag_s, self._period_s, self._load = (
-            height.lag_s,
-            settings.horizon.update_period_s,
-            np.array(loads),
-        )
+        self._lag_s, self._period_s = height.lag_s, settings.horizon.update_period_s
+        self._gain, self._load = height.thrust_gain, np.array(loads)
         self.place_m = self.climb_m_s = np.zeros(len(loads))
         self._thrust_m_s2 = np.full(len(loads), GRAVITY_M_S2)
 
@@ -163,7 +164,7 @@ class PointMass:
             state[:, 7], state[:, 8] = self.place_m, self.climb_m_s
             target = np.zeros((n, len(controller._constants.target)))
             target[:, -2] = target_m
-            commanded_m_s2 = controller.step(state, target).thrust_m_s2
+            commanded_m_s2 = self._gain * controller.step(state, target).thrust_m_s2
             for _ in range(20):
                 self._step(commanded_m_s2, self._period_s / 20)
             climbs.append(self.climb_m_s)
@@ -286,31 +287,37 @@ def best_line(low: float, high: float) -> tuple[float, float, float]:
     return start, slope, least
 
 
-@pytest.mark.parametrize("values", [{}, {"height.learn_limit": 0.2}, {"height.learn": "none"}])
+@pytest.mark.parametrize(
+    "values", [{}, {"height.learn_limit": 0.2}, {"height.learn": "none"}, {"model.tilt": "exact"}]
+)
 def test_reciprocals_have_the_best_line_and_the_error_they_say(values: Values) -> None:
     """Over the shares of the thrust that tilt and learnt gain make, and over the weights of a tilt."""
     settings = settings_of(EXACT | values)
     found, height = height_of(settings), settings.height
     assert height is not None
     deviation = height.learn_limit if height.learn == "gain" else 0.0
-    for reciprocal, low, high in (
-        (found.thrust_inverse, LEAST_COSINE * (1 - deviation), 1 + deviation),
-        (found.weight_inverse, LEAST_WEIGHT, MOST_WEIGHT),
-    ):
+    vector = Quadratic(settings).thrust_vector
+    least_share = 0.3 if vector else LEAST_COSINE
+    lines = [
+        (found.thrust_inverse, least_share * (1 - deviation), 1 + deviation, 3e-4),
+        (found.weight_inverse, LEAST_WEIGHT, MOST_WEIGHT, 3e-4),
+    ]
+    if vector:
+        lines += [(vector.share_inverse, 0.3, 1.0, 1e-6), (vector.steep_inverse, 1.0, 4.0, 1e-6)]
+    for reciprocal, low, high, allowed in lines:
         start, slope, line_error = best_line(low, high)
         assert (reciprocal.start, reciprocal.slope) == pytest.approx((start, slope), rel=1e-4)
         x = np.linspace(low, high, 100_001)
         error = x * inverse(reciprocal, x) - 1
-        is_thrust = reciprocal is found.thrust_inverse
-        if is_thrust:
-            assert -reciprocal.error * (1 + 1e-9) <= error.min() <= -0.99 * reciprocal.error
+        if reciprocal is not found.weight_inverse:
+            assert -reciprocal.error * (1 + 1e-9) - 1e-15 <= error.min() <= -0.99 * reciprocal.error
             assert error.max() <= 1e-12
             assert reciprocal.two == 2.0
         else:
             assert error.min() >= 0.0, "never too small"
             assert 1e-6 < error.min() < 2e-5
             assert 0.98 * reciprocal.error < error.max() <= reciprocal.error * 1.01
-        fewest = next(steps for steps in range(10) if line_error ** (2**steps) <= 3e-4)
+        fewest = next(steps for steps in range(10) if line_error ** (2**steps) <= allowed)
         assert reciprocal.steps == fewest
         line = reciprocal.start - reciprocal.slope * x
         assert max(line.max(), inverse(reciprocal, x).max()) < reciprocal.most < 1.02 / low

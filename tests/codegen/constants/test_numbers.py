@@ -86,6 +86,18 @@ def test_a_command_that_is_set_is_cut_off_at_the_tilt_limit(scalar: str, height:
     assert method_of(settings).tilt_limit_rad == pytest.approx(limit_rad, rel=1e-4)
 
 
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+@pytest.mark.parametrize("height", [False, True])
+def test_a_jump_of_the_frame_is_taken_up_to_the_ranges(scalar: str, height: bool) -> None:
+    """Of places, then of velocities, then of the heading."""
+    axes = 3 if height else 2
+    largest = np.diag([REACH_M] * axes + [FAST_M_S] * axes + [TURN_RAD])
+    method: Any = method_of(settings_with(scalar, "none", height=height))
+    controller = method.reference_controller(len(largest))
+    for factor, status in ((0.999, Status.OK), (1.001, Status.BAD_SHIFT)):
+        assert controller.shift(factor * largest).tolist() == [status] * len(largest)
+
+
 LIMITED = {"limits.speed_m_s": 1.5, "limits.fence.x_min_m": -1.0, "limits.fence.x_max_m": 2.0}
 ONE_NORM = with_option(presets.preset("mambo-1norm"), "limits.speed_m_s", 1.5)
 CASES = {
@@ -96,6 +108,7 @@ CASES = {
     "height, given": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "given"}),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
     "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
+    "height, guard": settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "guard.tilt_rad_s": 1.0}),
     "1-norm": ONE_NORM,
     "1-norm, given": with_option(ONE_NORM, "target.acceleration", "given"),
     "1-norm, no tracker": with_option(ONE_NORM, "target.acceleration", "none"),
@@ -108,11 +121,12 @@ def stored(settings: Settings, scalar: str) -> Any:
     controller, outcome = method.reference_controller(1), None
     heights = 2 if settings.height is not None else 0
     for step in range(40):
-        time_s = 0.01 * step
+        time_s, rattle_m_s = 0.01 * step, 0.01 * (step % 2)
         state = [0.4 + 0.3 * time_s, -0.2, 0.3, -0.4, 0.05, -0.03 + 0.1 * time_s, 0.7]
-        target = [1.1 + 0.8 * time_s, 0.3, 0.8, 0.2 - 0.3 * time_s]
+        target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
         target += [0.3, -0.2] * (len(method.level_target) > 4)
-        target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s][:heights] + [0.1] * (len(method.target) in (9,))
+        target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
+        target += [0.1] * (len(method.target) == 9)
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)
         given = () if heights else ([9.9],)
         outcome = controller.step([state], [target], *given)
