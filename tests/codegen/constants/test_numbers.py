@@ -1,10 +1,14 @@
-"""Numbers of a controller: inputs are taken up to their ranges, and fixed point stores what float64 does."""
+"""Numbers of a controller: inputs up to their ranges, fixed point beside float64, members of structures."""
 
+import re
+from itertools import product
+from math import prod
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
@@ -106,6 +110,7 @@ CASES = {
     "limits": settings_of(TWO_MOVES | LIMITED),
     "height, tracked": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "tracked"}),
     "height, given": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "given"}),
+    "preview": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "preview"}),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
     "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
     "height, guard": settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "guard.tilt_rad_s": 1.0}),
@@ -126,7 +131,7 @@ def stored(settings: Settings, scalar: str) -> Any:
         target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
         target += [0.3, -0.2] * (len(method.level_target) > 4)
         target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
-        target += [0.1] * (len(method.target) == 9)
+        target += [0.1] * (len(method.target) - len(target))
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)
         given = () if heights else ([9.9],)
         outcome = controller.step([state], [target], *given)
@@ -145,3 +150,28 @@ def test_fixed_point_stands_for_the_numbers_of_float64(name: str) -> None:
     counts = np.abs(exact) > 1e-7
     assert np.count_nonzero(counts) > 0.6 * len(exact)
     assert fixed[counts] == pytest.approx(exact[counts], rel=0.02, abs=1e-6)
+
+
+def declared(header: str, name: str) -> dict[str, list[int]]:
+    """Return the members of a structure of nmpc.h, with the lengths of arrays."""
+    body = re.search(rf"typedef struct {{\n((?: .*\n)*)}} nmpc_{name}_t;", header)
+    assert body is not None
+    found = re.findall(r"^    \w+ (\w+)(.*?);", body[1].replace("NMPC_PREVIEW_TIMES", "6"), re.MULTILINE)
+    return {member: [int(length) for length in re.findall(r"\d", array)] for member, array in found}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_members_of_structures_are_those_of_the_header(name: str) -> None:
+    """In its order: arrays by element, and what follows from the limits by its count of numbers."""
+    method: Any = method_of(CASES[name])
+    header = render(CASES[name], with_digest=False)["nmpc.h"]
+    for structure in ("state", "target", *["limits"] * method.has_limits):
+        elements = [
+            member + "".join(f"[{index}]" for index in place)
+            for member, lengths in declared(header, structure).items()
+            for place in product(*map(range, lengths))
+        ]
+        assert getattr(method, f"{structure}_members") == tuple(elements)
+    if method.has_limits:
+        counts = {member: prod(lengths) for member, lengths in declared(header, "bounds").items()}
+        assert list(method.bounds_members.items()) == list(counts.items())
