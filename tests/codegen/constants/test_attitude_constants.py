@@ -105,7 +105,7 @@ def slopes(roll_rad: Any, pitch_rad: Any) -> Any:
     ("limit_rad", "trims_rad"), [(LIMIT_RAD, TRIMS_RAD), (LIMIT_RAD, (0.06, -0.01)), (0.95, TRIMS_RAD)]
 )
 def test_limits_of_a_thrust_vector_are_those_of_a_rotated_thrust(limit_rad: float, trims_rad: Any) -> None:
-    """Of a move the smaller of both ways; of a state the steepest, also counted as 1/0.3 and a hundredth."""
+    """Of a move the smaller of both ways; of a state the steepest attitude, at most 1.01 / 0.3."""
     values: Values = {
         "limits.tilt_rad": limit_rad,
         "model.roll_trim_rad": trims_rad[0],

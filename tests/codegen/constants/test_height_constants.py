@@ -264,6 +264,13 @@ def test_settings_refuse_speeds_that_cannot_be_braked(name: str) -> None:
         settings_of(EXACT | {"ranges.velocity_m_s": 0.4, f"height.{name}": 0.5})
 
 
+def test_settings_refuse_a_thrust_that_is_no_command() -> None:
+    """The end of the range is allowed."""
+    assert settings_of(EXACT | {"ranges.thrust_acceleration_max_m_s2": 15.2}).height is not None
+    with pytest.raises(ValueError, match=r"height\.thrust_max_m_s2\n  must be at most 15\.1"):
+        settings_of(EXACT | {"ranges.thrust_acceleration_max_m_s2": 15.1})
+
+
 def inverse(found: Reciprocal, x: Any) -> Any:
     """Return 1/x as the C computes it, in float64."""
     y = found.start - found.slope * x
