@@ -108,10 +108,9 @@ def on_post_build(config: MkDocsConfig) -> None:
             (place / file).write_text(files[file], "utf-8")
     if _has_compilers():
         with TemporaryDirectory() as folder:
-            derived = f"{folder}/three-axes.toml"
-            _run("design", "crazyflie", "-o", derived)
-            sources = (derived, "crazyflie", "pid-feedforward", "pd")
-            _run("playground", *sources, "--vehicle", "crazyflie", "-o", f"{config.site_dir}/play.html")
+            for words in _playground_commands(Path(config.docs_dir, _PLAYGROUND)):
+                _run(words, folder)
+            shutil.copy(Path(folder, "play.html"), config.site_dir)
 
 
 def _has_compilers() -> bool:
@@ -119,8 +118,15 @@ def _has_compilers() -> bool:
     return all(map(shutil.which, ("clang", "wasm-ld")))
 
 
-def _run(*words: str) -> None:
+def _playground_commands(page: Path) -> list[list[str]]:
+    """Return the commands in the page's first console block, which make its playground."""
+    block = page.read_text("utf-8").partition("```console\n")[2].partition("```")[0]
+    return [line.split() for line in re.findall(r"^\$ mambo-nmpc (.+)$", block, re.MULTILINE)]
+
+
+def _run(words: list[str], folder: str) -> None:
+    """Run a command of the product in a folder; raises PluginError with what it wrote if it fails."""
     command = [sys.executable, "-m", "mambo_nmpc", *words]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if ran.returncode:
         raise PluginError(ran.stderr)

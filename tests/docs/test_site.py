@@ -63,12 +63,16 @@ def test_the_functions_of_the_c_stand_on_their_page_and_in_its_source(site: Path
 
 @pytest.mark.long
 def test_the_playground_is_part_of_its_page(site: Path) -> None:
-    """The manual has page, frame and script; nothing is left of what stands there outside of it."""
+    """The manual has page and frame, the controllers are those of the commands that the page names."""
     require("clang", "clang")
     require("wasm-ld", "lld")
     text = (site / "playground.html").read_text("utf-8")
     assert ('<iframe id="play" src="play.html' in text, "outside the manual" in text) == (True, False)
-    assert "three-axes" in (site / "play.html").read_text("utf-8")
+    source = (ROOT / "docs" / "playground.md").read_text("utf-8").partition("<!-- end -->")[2]
+    said = re.search(r"playground (\S+) (\S+) (\S+) (\S+) --vehicle crazyflie -o play.html", source)
+    flown = re.findall(r"<b>\d</b><span>([\w.-]+)", (site / "play.html").read_text("utf-8"))
+    assert said
+    assert [one.lower() for one in flown] == list(said.groups())
 
 
 def test_addresses_are_those_of_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,7 +83,9 @@ class Controls {
     this.rows.forEach((row, index) => {
       const put = (name, text) => { row.querySelector(name).textContent = text; };
       const { lost, answer } = drones[index];
-      put(".error", lost ? "lost" : answer[0] > 0n ? "refused" : distance(this.world.error(now, index)));
+      const [plane, height] = this.world.errors(now, index).map(distance);
+      put(".error", lost ? "lost" : answer[0] > 0n ? "refused" : plane);
+      if (this.world.data.spatial) put(".height", lost ? "\u2013" : height);
       put(".mean span", Number.isFinite(means[index]) ? distance(means[index]) : "\u2013");
       put(".tilt", lost ? "\u2013" : `${tiltOf(now, index).toFixed(0)}\u00b0`);
       row.querySelector(".bar").style.width = `${100 * Math.min(LOGARITHMIC_CM.share(100 * (means[index] || 0)), 1)}%`;

@@ -120,10 +120,15 @@ class World {
     drone.lost = { why, place: drone.last, until: this.time + LOST_S };
   }
 
-  /* Of a row of the history, the distance of a drone to the target in m; horizontal if no controller commands the height. */
-  error(row, drone) {
+  /* Of a row of the history, the distance of a drone to the target in m: horizontal, and vertical (0 if no controller commands the height). */
+  errors(row, drone) {
     const first = FIRST + PER_DRONE * drone, above = this.data.spatial ? row[first + 2] - row[3] : 0;
-    return Math.hypot(row[first] - row[1], row[first + 1] - row[2], above);
+    return [Math.hypot(row[first] - row[1], row[first + 1] - row[2]), Math.abs(above)];
+  }
+
+  /* The whole distance. */
+  error(row, drone) {
+    return Math.hypot(...this.errors(row, drone));
   }
 
   /* The rows that are drawn: every fourth, the same ones from picture to picture, and the last. */

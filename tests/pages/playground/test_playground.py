@@ -14,7 +14,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.engine_library import SOURCES
 from mambo_sil.flight.engine.records import flight_records
 from mambo_sil.pages.playground.bit_proof import calm, proof_flight
-from mambo_sil.pages.playground.dials import dials, weight_dial
+from mambo_sil.pages.playground.dials import dials, target_dials, weight_dial
 from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
 from mambo_sil.pages.playground.wasm_build import module, program
 from tests.support import command
@@ -55,11 +55,14 @@ def test_the_page_holds_everything_and_says_what_it_flies() -> None:
 
 
 def test_the_height_of_the_proof_swings_where_a_controller_commands_the_thrust() -> None:
-    """For all controllers of that page; else the flight is level."""
-    assert proof_flight(MAMBO, PDS).given_targets.shape[2] == 6
+    """For all controllers of a page, some of which follow it by a tuned loop; else the flight is level."""
+    level = proof_flight(MAMBO, PDS)
+    assert (level.given_targets.shape[2], level.altitude.name) == (6, "stock")
     command.run("design", "crazyflie", "-o", "height.toml")
-    spatial = proof_flight(CRAZYFLIE, page_controllers(["pd", "height.toml"])).given_targets
-    assert np.ptp(spatial[:, 0, 6]) == pytest.approx(0.6, abs=1e-3)
+    spatial = proof_flight(CRAZYFLIE, page_controllers(["pd", "height.toml"]))
+    assert np.ptp(spatial.given_targets[:, 0, 6]) == pytest.approx(0.6, abs=1e-3)
+    assert spatial.altitude.name == "pid"
+    assert next(one for one in target_dials(spatial=True) if one.key == "swing").start == 0
 
 
 def test_the_same_command_writes_the_same_page() -> None:

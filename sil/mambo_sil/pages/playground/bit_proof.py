@@ -15,6 +15,7 @@ from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
+from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.engine.records import Record, flight_records, simulation_record
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import Swing
@@ -59,7 +60,8 @@ def motion_capture(drone: VehicleFile) -> MotionCapture:
 def proof_flight(drone: VehicleFile, found: Sequence[PageController]) -> Flight:
     """Return an eight in gusts, with an impulse and motion capture; raises FlightError.
 
-    If one of the controllers commands the thrust, the height of the eight swings, for all of them.
+    If one of the controllers commands the thrust, the height of the eight swings for all of them, and
+    the drones of the others follow it by the tuned altitude loop `pid`, not by the stock one.
     """
     eight, spatial = Bernoulli(HALF_WIDTH_M, RATE_RAD_S), any(one.commands_thrust for one in found)
     return Flight(
@@ -70,6 +72,7 @@ def proof_flight(drone: VehicleFile, found: Sequence[PageController]) -> Flight:
         seeds=(_SEED,),
         disturbances=_WIND,
         sensors=motion_capture(drone),
+        altitude=AltitudeLaw("pid" if spatial else "stock"),
     )
 
 

@@ -15,7 +15,6 @@ from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.flight.engine.records import flight_records
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
-from mambo_sil.pages.playground.bit_proof import SWING_M
 
 _WIND: Final = ("gust_mean_m_s", "gust_sigma_m_s", "gust_decay", "gust_x", "gust_roots")
 _HEIGHTS_M: Final = tuple(number / 10.0 for number in range(8, 31))
@@ -90,12 +89,7 @@ def target_dials(*, spatial: bool) -> list[Dial]:
     height = Dial(
         "height", "Height of the target", "m", list(_HEIGHTS_M), _HEIGHTS_M.index(HOVER_HEIGHT_M), {}
     )
-    swing = Dial(
-        *("swing", "Swing of its height (\N{PLUS-MINUS SIGN})", "m"),
-        list(_SWINGS_M),
-        _SWINGS_M.index(SWING_M),
-        {},
-    )
+    swing = Dial("swing", "Swing of its height (\N{PLUS-MINUS SIGN})", "m", list(_SWINGS_M), 0, {})
     return [speed, height, swing] if spatial else [speed]
 
 
