@@ -10,7 +10,7 @@
 # make docs       build the manual; its first page is build/docs/index.html
 # make evidence   fly and measure anew those tables and pictures of docs/evidence that are older than the code
 # make bench      time flights against RotorPy, and updates against peers; results in build/bench
-# make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
+# make bench-peers  measure solvers of others on the problem of a control step; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
 
 PYTHON ?= python3
@@ -120,13 +120,13 @@ bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.peers.quadratic_times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.peers.footprints
+	$(BIN)/python -m benchmarks.evidence peers
 
 # The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
 # Of DAQP the C is wanted, which only the source distribution has.
 $(SETUP_PEERS): Makefile
 	$(PYTHON) -m venv --clear $(PEERS)
-	$(PEERS)/bin/python -m pip install --quiet osqp==1.1.3 casadi==3.8.2 cvxpygen==1.0.2 daqp==0.11.0
+	$(PEERS)/bin/python -m pip install --quiet osqp==1.1.3 casadi==3.8.2 cvxpygen==1.0.2 qocogen==0.1.9 daqp==0.11.0
 	$(PEERS)/bin/python -m pip install --quiet --no-deps tinympc==0.0.8
 	$(PEERS)/bin/python -m pip download --quiet --no-deps --no-binary daqp --dest $(PEERS)/sdist daqp==0.11.0
 	@touch $@

@@ -1,8 +1,9 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
 Not in the list are figures that take longer, and those that need another machine or package. `simulators` and
-`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` needs PyFlyt, which wants NumPy 1. Any
-value of the environment variables SIMULATORS and PYFLYT says that they are installed.
+`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants NumPy 1, `peers`
+the solvers of `make bench-peers`. Any value of the environment variables SIMULATORS, PYFLYT and PEERS says
+that they are installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -276,6 +277,15 @@ ITEMS: Final = (
         paths=_MEASURES,
         read=read_footprints({"design crazyflie": "derived"}),
         tables={"footprint-crazyflie": footprint("design crazyflie")},
+    ),
+    Item(
+        name="peers",
+        commands=("python -m benchmarks.peers.control_step",),
+        controllers=("mambo",),
+        paths=("benchmarks/peers", "sil/mambo_sil/board/emulation", "codegen/mambo_codegen/bundle/flags.py"),
+        read=read_printed,
+        tables={"peers": printed},
+        variable="PEERS",
     ),
     Item(
         name="faults",

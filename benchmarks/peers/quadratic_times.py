@@ -1,4 +1,4 @@
-"""Time of the exact minimum of the quadratic cost beside DAQP, which solves the same problem.
+"""Time of the exact minimum of the quadratic cost beside solvers of others, on the same problem.
 
 The problem of a control step of preset mambo: two free moves along each of two axes, within the tilt limit.
 Both get the same states and compute the gradient from them. One process passes through each set of states
@@ -6,6 +6,7 @@ with each contender in turn. Prints a table; docs/evidence/benchmarks.md has it.
 """
 
 import ctypes
+import json
 import os
 import sys
 import tempfile
@@ -20,7 +21,7 @@ from scipy.stats import trim_mean
 from benchmarks.markdown import table
 from benchmarks.peers.ours import Ours
 from benchmarks.peers.programs import NotHereError, Program, run_tool
-from benchmarks.peers.setups import PEERS
+from benchmarks.peers.setups import CONTROL_STEP
 from benchmarks.peers.times_report import FLAGS
 from mambo_codegen.methods.quadratic.controller import QuadraticController
 from mambo_codegen.methods.quadratic.law import second_derivatives
@@ -95,9 +96,10 @@ def _flown(random: np.random.Generator) -> Array:
 
 
 def write_problem(folder: Path) -> None:
-    """Write the problem for DAQP's C, in moves as shares of the limit: H of both axes, and H (-rows).
+    """Write the problem as tables of C, in moves as shares of the limit: H of both axes, and H (-rows).
 
-    H is divided by its first element, so that DAQP's tolerances, which are absolute, suit it.
+    H, which the set-ups of peers read from hessian.json, is divided by its first element, so that absolute
+    tolerances suit it.
     """
     method, hessian, gradient = Quadratic(SETTINGS), np.zeros((4, 4)), np.zeros((4, 8))
     limits = method.attitude.command_limit_m_step2
@@ -107,11 +109,12 @@ def write_problem(folder: Path) -> None:
         gradient[moves] = -scaled @ method.law.rows[axis] / limits[axis]
     tables = {
         "hessian[16]": hessian,
-        "from_state[32]": gradient,
+        "const from_state[32]": gradient,
         "upper[4]": np.ones(4),
         "lower[4]": -np.ones(4),
-        "limits[2]": limits,
+        "const limits[2]": limits,
     }
+    (folder / "hessian.json").write_text(json.dumps(hessian.tolist()), "utf-8")
     (folder / "problem.h").write_text(
         "".join(
             f"static c_float {name} = {{{', '.join(repr(float(v)) for v in values.ravel())}}};\n"
@@ -121,22 +124,17 @@ def write_problem(folder: Path) -> None:
 
 
 def contenders(work: Path) -> dict[str, tuple[Program, Path]]:
-    """Write the C of each contender into a folder in `work`; raises NotHereError without the peers."""
-    (daqp,) = (peer for peer in PEERS if peer.name == "daqp")
+    """Write the problem into `work`, and the C of ours and of each peer into a folder there.
+
+    Raises NotHereError without the peers.
+    """
+    write_problem(work)
     found: dict[str, tuple[Program, Path]] = {}
-    nothing = replace(OURS, sources=(), glue="glue/quadratic_nothing.c", title="clock and call")
-    for name, program in {
-        "nothing": nothing,
-        "ours": OURS,
-        "daqp": replace(daqp, glue="glue/quadratic_daqp.c", defines=("DAQP_SINGLE_PRECISION",)),
-        "daqp-float64": replace(daqp, glue="glue/quadratic_daqp.c", defines=(), title="DAQP, double"),
-    }.items():
-        folder = work / name
+    for program in (OURS, *CONTROL_STEP):
+        folder = work / program.name
         folder.mkdir()
         program.write(folder)
-        if program.name == "daqp":
-            write_problem(folder)
-        found[name] = program, folder
+        found[program.name] = program, folder
     return found
 
 
@@ -145,7 +143,7 @@ def build(program: Program, folder: Path, flags: str, library: Path) -> Any:
     work = library.with_suffix("")
     work.mkdir()
     contract = "off" if isinstance(program, Ours) else "fast"
-    line = [*host_toolchain().command, "-w", "-fPIC", *flags.split(), f"-ffp-contract={contract}"]
+    line = [*host_toolchain().command, "-w", "-fPIC", "-DTIMED", *flags.split(), f"-ffp-contract={contract}"]
     objects = program.compile(line, folder, work)
     run_tool([*host_toolchain().command, "-shared", "-Wl,-Bsymbolic", *objects, "-lm", "-o", str(library)])
     return ctypes.CDLL(str(library)).time_all
@@ -178,6 +176,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as place:
         try:
             programs = contenders(Path(place))
+            nothing = replace(OURS, glue="glue/quadratic_nothing.c", title="clock and call")
+            programs = {"nothing": (nothing, programs["ours"][1]), **programs}
         except NotHereError as error:
             sys.exit(str(error))
         for number, flags in enumerate(FLAGS):

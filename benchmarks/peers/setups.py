@@ -84,11 +84,11 @@ def daqp_slacks(folder: Path) -> None:
     )
 
 
-def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
-    """Write DAQP's C, and the problem as `tables` by C declarator.
+def _daqp_c(folder: Path) -> None:
+    """Write DAQP's C.
 
-    The C is from the source distribution, which the Makefile stores with the Python of the peers; it lacks
-    the code generator.
+    It is from the source distribution, which the Makefile stores with the Python of the peers; it lacks the
+    code generator.
     """
     (archive,) = Path(sys.prefix, "sdist").glob(f"daqp-{importlib.metadata.version('daqp')}.tar.gz")
     with tarfile.open(archive) as source:
@@ -96,6 +96,11 @@ def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
     (unpacked,) = folder.glob("daqp-*")
     (unpacked / "csrc").rename(folder / "csrc")
     shutil.rmtree(unpacked)
+
+
+def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
+    """Write DAQP's C, and the problem as `tables` by C declarator."""
+    _daqp_c(folder)
     (folder / "problem.h").write_text(
         "".join(
             f"static c_float {name} = {{{', '.join(repr(float(v)) for v in table.ravel())}}};\n"
@@ -176,21 +181,66 @@ def _casadi(folder: Path, solver: str, real: str) -> None:
         state = A @ state + B @ moves[move_at(step) : move_at(step) + 2]
         cost += TRACKING * casadi.sumsqr(state[list(POSITIONS)])
     problem = {"x": moves, "p": parameters, "f": cost}
-    silent = {"print_header": False, "print_iter": False, "print_info": False, "error_on_fail": False}
     if solver == "qrqp":
-        solve = casadi.qpsol("solve", "qrqp", problem, silent)
+        solve = casadi.qpsol("solve", "qrqp", problem, _SILENT)
     else:
         options: dict[str, Any] = dict.fromkeys(
             ("print_header", "print_iteration", "print_status", "print_time", "error_on_fail"), False
         )
-        options |= {"qpsol": "qrqp", "qpsol_options": silent}
+        options |= {"qpsol": "qrqp", "qpsol_options": _SILENT}
         solve = casadi.nlpsol("solve", "sqpmethod", problem, options)
     found = solve(x0=casadi.DM.zeros(4), p=parameters, lbx=-TILT_RAD, ubx=TILT_RAD)["x"]
-    step_function = casadi.Function("mpc", [parameters], [found], ["parameters"], ["moves"])
+    _casadi_c(folder, casadi.Function("mpc", [parameters], [found], ["parameters"], ["moves"]), real)
+
+
+def _casadi_c(folder: Path, step_function: Any, real: str) -> None:
+    import casadi
+
     generator = casadi.CodeGenerator("mpc.c", {"casadi_real": real, "casadi_int": "int", "with_header": True})
     generator.add(step_function)
     folder.mkdir(parents=True, exist_ok=True)
     generator.generate(f"{folder}/")
+
+
+def control_step_osqp(folder: Path, rho: float) -> None:
+    """Write the control step's problem for OSQP, with tolerances of 1e-4 of the limit."""
+    import osqp
+    from scipy import sparse
+
+    weights, moves = sparse.csc_matrix(np.triu(_hessian(folder))), sparse.eye(4, format="csc")
+    tolerances = {"eps_abs": 1e-4, "eps_rel": 1e-4}
+    solver = osqp.OSQP()
+    solver.setup(weights, np.zeros(4), moves, -np.ones(4), np.ones(4), verbose=False, rho=rho, **tolerances)
+    solver.codegen(str(folder), parameters="vectors", use_float=True, force_rewrite=True, extension_name=None)
+
+
+def control_step_cvxpygen(folder: Path, solver: str) -> None:
+    """Write the control step's problem by CVXPYgen for `solver`."""
+    import cvxpy
+    from cvxpygen import cpg
+
+    moves, linear = cvxpy.Variable(4, name="moves"), cvxpy.Parameter(4, name="q")
+    root = np.linalg.cholesky(_hessian(folder)).T
+    cost = 0.5 * cvxpy.sum_squares(root @ moves) + linear @ moves
+    linear.value = np.zeros(4)
+    problem = cvxpy.Problem(cvxpy.Minimize(cost), [moves <= 1, moves >= -1])
+    cpg.generate_code(problem, code_dir=str(folder), solver=solver, wrapper=False)
+    (folder / _SOLVER / "runtest.c").unlink(missing_ok=True)
+
+
+def control_step_casadi(folder: Path) -> None:
+    """Write the control step's problem for CasADi's qrqp."""
+    import casadi
+
+    linear, moves = casadi.MX.sym("linear", 4), casadi.MX.sym("moves", 4)
+    cost = 0.5 * casadi.bilin(casadi.DM(_hessian(folder)), moves, moves) + casadi.dot(linear, moves)
+    solve = casadi.qpsol("solve", "qrqp", {"x": moves, "p": linear, "f": cost}, _SILENT)
+    found = solve(x0=casadi.DM.zeros(4), p=linear, lbx=-1, ubx=1)["x"]
+    _casadi_c(folder, casadi.Function("mpc", [linear], [found], ["linear"], ["moves"]), "double")
+
+
+def _hessian(folder: Path) -> Matrix:
+    return np.array(json.loads((folder.parent / "hessian.json").read_text("utf-8")))
 
 
 def tinympc(folder: Path) -> None:
@@ -215,6 +265,8 @@ def tinympc(folder: Path) -> None:
         library.unlink()
 
 
+_SILENT: Final = {"print_header": False, "print_iter": False, "print_info": False, "error_on_fail": False}
+"""Options of qrqp."""
 _LIMIT: Final = f"TILT={TILT_RAD}f"
 _EFFORT: Final = f"EFFORT={2 * EFFORT}f"
 """The gradient of the effort per change of a move."""
@@ -357,11 +409,66 @@ PEERS: Final = (
     _TINYMPC,
 )
 
+_STEP_DAQP: Final = replace(
+    _DAQP,
+    name="control-step-daqp",
+    includes=(*_DAQP.includes, ".."),
+    title="DAQP, float",
+    glue="glue/quadratic_daqp.c",
+    defines=("DAQP_SINGLE_PRECISION",),
+    set_up=_daqp_c,
+)
+_STEP_OSQP: Final = replace(
+    _OSQP,
+    name="control-step-osqp",
+    includes=(*_OSQP.includes, ".."),
+    title="OSQP, float",
+    glue="glue/quadratic_osqp.c",
+    defines=(),
+    set_up=partial(control_step_osqp, rho=1.0),
+)
+_STEP_CVXPYGEN: Final = replace(
+    _CVXPYGEN,
+    name="control-step-cvxpygen-osqp",
+    includes=(*_CVXPYGEN.includes, ".."),
+    title="CVXPYgen, OSQP, double",
+    cost="quadratic",
+    glue="glue/quadratic_cvxpygen.c",
+    set_up=partial(control_step_cvxpygen, solver="OSQP"),
+)
+CONTROL_STEP: Final = (
+    _STEP_DAQP,
+    replace(_STEP_DAQP, name="control-step-daqp-double", title="DAQP, double", scalar="float64", defines=()),
+    _STEP_OSQP,
+    replace(
+        _QRQP,
+        name="control-step-casadi",
+        includes=(*_QRQP.includes, ".."),
+        title="CasADi, qrqp, double",
+        scalar="float64",
+        glue="glue/quadratic_casadi.c",
+        set_up=control_step_casadi,
+    ),
+    _STEP_CVXPYGEN,
+    replace(
+        _STEP_CVXPYGEN,
+        name="control-step-cvxpygen-qoco",
+        title="CVXPYgen, QOCO, double",
+        sources=(*_GENERATED, f"{_SOLVER}/*.c"),
+        includes=("c/include", _SOLVER, ".."),
+        defines=("SET_UP",),
+        dialect="-std=gnu99",
+        set_up=partial(control_step_cvxpygen, solver="QOCOGEN"),
+        packages=("cvxpygen", "cvxpy", "qocogen"),
+    ),
+)
+"""Peers on the problem of a control step of preset mambo, whose tables stand in the folder above that of their C."""
+
 
 def main() -> None:
     """Write the C of the peer NAME into FOLDER."""
     name, folder = sys.argv[1:]
-    (peer,) = (peer for peer in PEERS if peer.name == name)
+    (peer,) = (peer for peer in (*PEERS, *CONTROL_STEP) if peer.name == name)
     peer.set_up(Path(folder))
     print()
     print(json.dumps({package: importlib.metadata.version(package) for package in peer.packages}))

@@ -26,7 +26,7 @@ DESIGN = Quadratic(SETTINGS)
 def tables(folder: Path) -> dict[str, Array]:
     """Return the arrays of problem.h by name."""
     text = (folder / "problem.h").read_text()
-    found = re.findall(r"c_float (\w+)\[\d+\] = \{([^}]*)\}", text)
+    found = re.findall(r"c_float (?:const )?(\w+)\[\d+\] = \{([^}]*)\}", text)
     return {name: np.array([float(number) for number in numbers.split(",")]) for name, numbers in found}
 
 

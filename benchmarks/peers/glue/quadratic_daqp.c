@@ -2,7 +2,7 @@
 #include "quadratic.h"
 #include "api.h"
 #include "utils.h"
-#include "problem.h"
+#include "gradient.h"
 
 static c_float linear[4], plan[4], multipliers[4];
 static int sense[4];
@@ -13,25 +13,11 @@ static int is_set_up;
 
 void run(const float state[16], float moves[2])
 {
-    int axis;
-    int move;
-    int k;
-
     if (!is_set_up) {
         setup_daqp(&problem, &workspace, NULL);
         is_set_up = 1;
     }
-    for (axis = 0; axis < 2; axis++) {
-        for (move = 0; move < 2; move++) {
-            const c_float *row = &from_state[8 * ((2 * axis) + move)];
-            c_float sum = row[0] * state[8 * axis];
-
-            for (k = 1; k < 8; k++) {
-                sum += row[k] * state[(8 * axis) + k];
-            }
-            linear[(2 * axis) + move] = sum;
-        }
-    }
+    gradient(state, linear);
     daqp_update_ldp(DAQP_UPDATE_v, &workspace, &problem);
     daqp_solve(&result, &workspace);
     moves[0] = (float)(limits[0] * plan[0]);
