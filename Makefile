@@ -1,4 +1,4 @@
-# make fly        set up, generate the C of preset mambo, compile it, fly Table II; results in build/fly
+# make fly        set up, generate the C of preset mambo, compile it, fly Table II, show the picture; results in build/fly
 # make check      style, types, and the tests that need no compiler: what to run while editing
 # make test       set up everything, check style and types, run the tests; with CI=true also the long ones
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
@@ -49,12 +49,21 @@ LOWEST_TESTED = $(filter-out tests/test_house.py tests/drone/plant,$(CHECKED)) t
     tests/cli/test_design.py tests/cli/test_fly.py tests/cli/test_identify.py \
     tests/experiment/margins/test_command.py tests/verify/test_replay.py tests/board/footprint/test_counts.py
 
+PICTURE = build/fly/figure3.png
+
+# A machine without a screen has the path, printed above.
+define SHOW_PICTURE
+@if [ "$$(uname)" = Darwin ]; then open $(PICTURE) || true; \
+elif [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] && command -v xdg-open >/dev/null; then xdg-open $(PICTURE) >/dev/null 2>&1 & fi
+endef
+
 .PHONY: fly check test lowest thorough proofs tools generated docs evidence bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
 	$(BIN)/mambo-nmpc table2 -o build/fly
-	@echo "pictures: build/fly/figure3.png and .svg; the C: build/mambo; this table, explained: docs/tutorials/paper.md"
+	@echo "picture: $(PICTURE); the C: build/mambo; this table, explained: docs/tutorials/paper.md"
+	$(SHOW_PICTURE)
 
 check: $(SETUP_TEST)
 	$(STYLE_AND_TYPES)

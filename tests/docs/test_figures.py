@@ -165,7 +165,7 @@ FIGURES = [
     ),
     Figure("README.md", r"flash, (\d+) bytes of RAM", lambda: str(board("crazyflie", DERIVED)["ram_bytes"])),
     Figure("README.md", r"(\d+ to \d+) us a step\*\*", lambda: step_us("crazyflie", DERIVED)),
-    Figure("README.md", r"modelled from (\d+) instructions", lambda: instructions("crazyflie", DERIVED)),
+    Figure("README.md", r"(\d+) instructions on average", lambda: instructions("crazyflie", DERIVED)),
     Figure(
         "docs/index.md",
         r"needs (\S+) KB of flash",
@@ -178,8 +178,6 @@ FIGURES = [
     Figure("README.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
     Figure("README.md", r"this MPC (\S+) cm", lambda: shown(figures("space")["third-axis"])),
     Figure("README.md", r"PID's is (\d+) % larger", lambda: f"{100 * (ratio_of_pid('iae_m_s') - 1):.0f}"),
-    Figure("README.md", r"(\d+) of 300 crash with `mambo`", lambda: crashes(FAST_EIGHT)),
-    Figure("README.md", r"with `mambo`, (\d+) with the PID", lambda: crashes(FAST_EIGHT, "pid-feedforward")),
     Figure(
         OPPONENTS, r"\*\*(\S+) times the error as estimated", lambda: f"{ratio_of_pid('seen_iae_m_s'):.1f}"
     ),
@@ -201,10 +199,10 @@ FIGURES = [
         r"in the firmware, (\S+ to \S+) cm",
         lambda: f"{in_firmware('circle', 'design')} to {in_firmware('circle', 'lee')}",
     ),
-    Figure("README.md", r"2.3 kg in crazyflow (\S+) mm,", lambda: in_simulator(X500, PAGE)),
-    Figure("README.md", r"controller, tuned, (\S+) mm;", lambda: in_simulator(X500, "Mellinger, tuned")),
+    Figure("README.md", r"in crazyflow (\S+) mm,", lambda: in_simulator(X500, PAGE)),
+    Figure("README.md", r"in crazyflow \S+ mm, (\S+) mm", lambda: in_simulator(X500, "Mellinger, tuned")),
     Figure("README.md", r"gym-pybullet-drones (\S+) mm,", lambda: in_simulator(PYBULLET, PAGE)),
-    Figure("README.md", r"its own, tuned, (\S+) mm", lambda: in_simulator(PYBULLET, "DSLPIDControl, tuned")),
+    Figure("README.md", r"drones \S+ mm, (\S+) mm", lambda: in_simulator(PYBULLET, "DSLPIDControl, tuned")),
     Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
     Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("space")["pd"])),
     Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
