@@ -99,20 +99,25 @@ class _MellingerPilot:
 
 
 def fly(
-    world: SimulatedCrazyflie, challengers: Sequence[Challenger], mission: Mission, seeds: Sequence[int]
+    world: SimulatedCrazyflie,
+    challengers: Sequence[Challenger],
+    mission: Mission,
+    seeds: Sequence[int],
+    *,
+    noisy: bool = True,
 ) -> tuple[Flight3d, FloatArray]:
-    """Return the flights of each challenger with each seed of noise, and commands (k, w, 4)."""
+    """Return the flights of each challenger with each seed, through noise or not, and commands (k, w, 4)."""
     each = len(seeds)
     worlds = each * len(challengers)
     simulation, targets, times_s = world.simulation(worlds), mission.targets(), mission.times_s()
-    pilots = [challenger.pilot(each, world.mass_kg, noisy=True) for challenger in challengers]
+    pilots = [challenger.pilot(each, world.mass_kg, noisy=noisy) for challenger in challengers]
     place(simulation, np.tile(targets[0, :3], (worlds, 1)), world.mass_kg)
     position_m = np.empty((len(times_s), worlds, 3))
     commands, level = np.zeros((len(times_s), worlds, 4)), np.empty((len(times_s), worlds))
     suite = noise(sight(simulation), tuple(seeds) * len(challengers))
     for step, time_s in enumerate(times_s):
         true = sight(simulation)
-        seen = through(suite, true)
+        seen = through(suite, true) if noisy else true
         position_m[step] = true.position_m
         level[step] = np.cos(true.angles_rad[:, 0]) * np.cos(true.angles_rad[:, 1])
         for number, pilot in enumerate(pilots):
@@ -123,7 +128,9 @@ def fly(
     return Flight3d(position_m, level), commands
 
 
-def tuned(world: SimulatedCrazyflie, missions: Mapping[str, Mission]) -> tuple[Mellinger, list[float]]:
+def tuned(
+    world: SimulatedCrazyflie, missions: Mapping[str, Mission], *, noisy: bool = True
+) -> tuple[Mellinger, list[float]]:
     """Return the best of 30 random controllers on missions, the first with its own gains, and its factors."""
     draws = np.random.default_rng(11)
     factors = np.exp(draws.uniform(-1.1, 1.1, (CANDIDATES, 7)))
@@ -131,7 +138,7 @@ def tuned(world: SimulatedCrazyflie, missions: Mapping[str, Mission]) -> tuple[M
     factors[0] = 1.0
     scores: list[dict[str, Score]] = [{} for _ in factors]
     for name, mission in missions.items():
-        flown, _ = fly_rows(world, Mellinger(world.drone, factors), mission)
+        flown, _ = fly_rows(world, Mellinger(world.drone, factors), mission, noisy=noisy)
         for found, score in zip(scores, mission.scores(flown), strict=True):
             found[name] = score
     best = factors[int(np.argmin([cost_of(found) for found in scores]))]
@@ -143,7 +150,7 @@ def _mass_of(world: SimulatedCrazyflie) -> float:
 
 
 def fly_rows(
-    world: SimulatedCrazyflie, candidates: Mellinger, mission: Mission
+    world: SimulatedCrazyflie, candidates: Mellinger, mission: Mission, *, noisy: bool
 ) -> tuple[Flight3d, FloatArray]:
     """Return a flight of each candidate, all with the same noise."""
 
@@ -151,7 +158,7 @@ def fly_rows(
         def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
             return candidates.pilot(drones, mass_kg, noisy=noisy)
 
-    return fly(world, [Rows()], mission, [SEARCH_SEED] * CANDIDATES)
+    return fly(world, [Rows()], mission, [SEARCH_SEED] * CANDIDATES, noisy=noisy)
 
 
 def fly_log(world: SimulatedCrazyflie) -> list[LogRow]:
