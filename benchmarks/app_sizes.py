@@ -71,7 +71,7 @@ def main() -> None:
         "preset `crazyflie`": sizes(presets.preset("crazyflie")),
     }
     rows = [
-        {"": part}
+        {"part": part}
         | {
             f"{title}: {kind}, B": str(found[part][number])
             for title, found in columns.items()
