@@ -288,6 +288,18 @@ ITEMS: Final = (
         variable="PEERS",
     ),
     Item(
+        name="app-sizes",
+        commands=("python -m benchmarks.app_sizes",),
+        controllers=("design crazyflie", "crazyflie"),
+        paths=(
+            *("benchmarks/app_sizes.py", "codegen/mambo_codegen/bundle/self_test.py"),
+            *("sil/mambo_sil/board/desk/stand_ins", "templates/mambo_templates/firmware/crazyflie/src"),
+            *(f"templates/mambo_templates/common/nmpc_self_test.{end}.j2" for end in "ch"),
+        ),
+        read=read_printed,
+        tables={"app-sizes": printed},
+    ),
+    Item(
         name="faults",
         commands=(
             f"mambo-nmpc faults mambo -o {RESULTS}/faults/mambo",
@@ -365,6 +377,17 @@ ITEMS: Final = (
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
         read=read_figures("quick"),
         tables={"quick": quick},
+        variable="SIMULATORS",
+    ),
+    Item(
+        name="truth",
+        commands=(f"python -m benchmarks.simulators truth {RESULTS}/truth/truth",),
+        controllers=tuple(
+            f"design {drone} --sensors true" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500")
+        ),
+        paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
+        read=read_figures("truth"),
+        tables={"truth-summary": summary},
         variable="SIMULATORS",
     ),
     Item(

@@ -88,6 +88,12 @@ def size(name: str) -> str:
     return f"{found['stack_bytes']} B, {flash}, {found['ram_bytes']} B, {step_us(name)} us"
 
 
+def self_test_kb() -> str:
+    """Return the flash of the self-test of preset `crazyflie` in kilobytes."""
+    row = next(row for row in figures("app-sizes")["rows"] if row["part"] == "self-test")
+    return f"{int(row['preset `crazyflie`: flash, B']) / 1000:.1f}"
+
+
 def times_in_float64() -> str:
     """Return how many times the instructions of float32 float64 takes on the Crazyflie."""
     double = board("crazyflie", "mambo --scalar float64")["instructions"]["mean"]
@@ -150,6 +156,7 @@ FIGURES = [
     Figure(LIBRARIES, r"preset `mambo` takes (\S+) % of its period", lambda: period_percent("mega")),
     Figure(LIBRARIES, r"on a Teensy 4.1 (\S+) %", lambda: period_percent("teensy41")),
     Figure("docs/how-to/own-firmware.md", r"on a Cortex-M4F: (.+?) \(modelled\)", lambda: size("crazyflie")),
+    Figure("docs/how-to/own-firmware.md", r"adds (\S+) KB of flash \(-Os\)", self_test_kb),
     Figure(BOARDS, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
     Figure(BOARDS, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
     Figure("docs/evidence/benchmarks.md", r"(\d+) a step for `mambo`", lambda: instructions("crazyflie")),
