@@ -88,10 +88,10 @@ def size(name: str) -> str:
     return f"{found['stack_bytes']} B, {flash}, {found['ram_bytes']} B, {step_us(name)} us"
 
 
-def self_test_kb() -> str:
-    """Return the flash of the self-test of preset `crazyflie` in kilobytes."""
-    row = next(row for row in figures("app-sizes")["rows"] if row["part"] == "self-test")
-    return f"{int(row['preset `crazyflie`: flash, B']) / 1000:.1f}"
+def in_app(part: str, *columns: str) -> str:
+    """Return what a part of the Crazyflie's app takes in kilobytes, flash or RAM."""
+    row = next(row for row in figures("app-sizes")["rows"] if row["part"] == part)
+    return " KB of flash and ".join(f"{int(row[f'{column}, B']) / 1000:.1f}" for column in columns)
 
 
 def times_in_float64() -> str:
@@ -140,6 +140,9 @@ def frozen() -> str:
 
 FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
 CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
+APP = "docs/how-to/crazyflie.md"
+OF_DESIGN = "`design crazyflie`: flash", "`design crazyflie`: RAM"
+OF_PRESET = "preset `crazyflie`: flash", "preset `crazyflie`: RAM"
 X500, PYBULLET = "hb_x500, fitted", "gym-pybullet-drones, cf2x"
 OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compatibility.md"
 HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
@@ -156,7 +159,15 @@ FIGURES = [
     Figure(LIBRARIES, r"preset `mambo` takes (\S+) % of its period", lambda: period_percent("mega")),
     Figure(LIBRARIES, r"on a Teensy 4.1 (\S+) %", lambda: period_percent("teensy41")),
     Figure("docs/how-to/own-firmware.md", r"on a Cortex-M4F: (.+?) \(modelled\)", lambda: size("crazyflie")),
-    Figure("docs/how-to/own-firmware.md", r"adds (\S+) KB of flash \(-Os\)", self_test_kb),
+    Figure(
+        "docs/how-to/own-firmware.md", r"adds (\S+) KB of flash", lambda: in_app("self-test", OF_PRESET[0])
+    ),
+    Figure(APP, r"With the self-test (\S+ KB of flash and \S+) KB", lambda: in_app("together", *OF_DESIGN)),
+    Figure(
+        APP,
+        r"preset `crazyflie` (\S+ KB and \S+) KB",
+        lambda: in_app("together", *OF_PRESET).replace(" of flash", ""),
+    ),
     Figure(BOARDS, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
     Figure(BOARDS, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
     Figure("docs/evidence/benchmarks.md", r"(\d+) a step for `mambo`", lambda: instructions("crazyflie")),
