@@ -462,7 +462,7 @@ CONTROL_STEP: Final = (
         packages=("cvxpygen", "cvxpy", "qocogen"),
     ),
 )
-"""Peers on the problem of a control step of preset mambo, whose tables stand in the folder above that of their C."""
+"""Peers on the problem of a control step of preset mambo, which stands in the folder above their C."""
 
 
 def main() -> None:
