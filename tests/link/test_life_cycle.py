@@ -8,7 +8,9 @@ import pytest
 from mambo_codegen.settings.presets import preset
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.errors import LinkError
-from mambo_sil.link.life_cycle import ARM_S, CHECK_S, CONNECT_S, LifeCycle, Phase
+from mambo_sil.link.courses import Place
+from mambo_sil.link.life_cycle import ARM_S, CHECK_S, CONNECT_S, LifeCycle
+from mambo_sil.link.phases import Phase
 from mambo_sil.link.records import (
     ARDUCOPTER,
     COMPANION,
@@ -46,11 +48,16 @@ def beat(stack: Stack = PX4, *, armed: bool = False, mode: int = 0, vehicle: int
     return Heartbeat(1, 1, stack.ident, vehicle, armed, mode)
 
 
-def estimate(time_s: float, height_m: float = 0.0, roll_rad: float = 0.0) -> EstimatedState:
+def estimate(
+    time_s: float,
+    height_m: float = 0.0,
+    roll_rad: float = 0.0,
+    north_m: float = 0.0,
+    resets: int | None = None,
+) -> EstimatedState:
     """Return an estimate at rest."""
-    return EstimatedState(
-        time_s, np.array([0.0, 0.0, -height_m]), np.zeros(3), np.array([roll_rad, 0.0, 0.0])
-    )
+    position_m, attitude_rad = np.array([north_m, 0.0, -height_m]), np.array([roll_rad, 0.0, 0.0])
+    return EstimatedState(time_s, position_m, np.zeros(3), attitude_rad, resets)
 
 
 class Ground:
@@ -66,11 +73,19 @@ class Ground:
             self.life.receive(record, self.now_s)
         self.orders += self.life.orders(self.now_s)
 
-    def wait(self, duration_s: float, *, height_m: float = 0.0, every_s: float = PERIOD_S) -> None:
+    def wait(
+        self,
+        duration_s: float,
+        *,
+        height_m: float = 0.0,
+        every_s: float = PERIOD_S,
+        north_m: float = 0.0,
+        resets: int | None = None,
+    ) -> None:
         """Let estimates come for a time."""
         for _ in range(round(duration_s / every_s)):
             self.now_s += every_s
-            self.tell(estimate(self.now_s, height_m))
+            self.tell(estimate(self.now_s, height_m, north_m=north_m, resets=resets))
 
     def pass_silently(self, duration_s: float) -> None:
         """Let time pass without a message."""
@@ -91,6 +106,13 @@ class Ground:
         assert not self.life.end.good
         return self.life.end.sentence
 
+    @property
+    def landed(self) -> str:
+        """How it has ended, once the autopilot has landed."""
+        assert self.life.phase is Phase.LANDING
+        self.tell(beat(armed=True, mode=PX4.land), beat(armed=False, mode=PX4.land))
+        return self.sentence
+
 
 def kinds(orders: Sequence[Order]) -> set[type[Order]]:
     """Return the classes of orders."""
@@ -103,6 +125,8 @@ def flying() -> Ground:
     ground.connect()
     ground.wait(1.3)
     ground.tell(beat(armed=True, mode=PX4.guided))
+    for height_m in (0.3, 0.6, 0.9):
+        ground.wait(0.01, height_m=height_m)
     ground.wait(2.2, height_m=1.0)
     assert ground.life.phase is Phase.FLYING
     ground.orders.clear()
@@ -263,8 +287,7 @@ def test_a_second_pilot_in_flight_makes_it_land() -> None:
     ground.tell(Heartbeat(9, 191, 8, COMPANION, armed=False, mode=0))
     assert ground.life.phase is Phase.LANDING
     assert SetMode(PX4.land) in ground.orders
-    ground.tell(beat(armed=True, mode=PX4.land), beat(armed=False, mode=PX4.land))
-    assert ground.sentence == "landed: another pilot is on the link (system 9, component 191)"
+    assert ground.landed == "landed: another pilot is on the link (system 9, component 191)"
 
 
 def test_a_dead_link_ends() -> None:
@@ -290,13 +313,63 @@ def test_an_autopilot_with_a_slow_clock_is_flown() -> None:
 def test_the_state_out_of_range_makes_it_land() -> None:
     """The controller refuses it."""
     ground = flying()
-    for _ in range(100):
-        ground.now_s += PERIOD_S
-        far = EstimatedState(ground.now_s, np.array([9e5, 0.0, -1.0]), np.zeros(3), np.zeros(3))
-        ground.tell(far)
-    assert ground.life.phase is Phase.LANDING
-    ground.tell(beat(armed=True, mode=PX4.land), beat(armed=False, mode=PX4.land))
-    assert ground.sentence == "landed: the controller refuses the state, which is out of its [ranges]"
+    ground.wait(0.1, height_m=1.0, resets=0)
+    ground.wait(1.0, height_m=1.0, north_m=9e5, resets=1)
+    assert ground.landed == "landed: the controller refuses the state, which is out of its [ranges]"
+
+
+@pytest.mark.parametrize(
+    ("resets", "words"),
+    [
+        ((0, 0), "the estimate has jumped by 3.0 m and 0.0 m/s within 10 ms without a reset"),
+        ((None, None), "the estimate has jumped by 3.0 m and 0.0 m/s within 10 ms without a reset"),
+        ((7, 6), "the count of the estimator's resets has gone back from 7 to 6"),
+    ],
+    ids=["counted", "not-counted", "back"],
+)
+def test_an_estimate_that_jumps_without_a_reset_makes_it_land(
+    resets: tuple[int | None, int | None], words: str
+) -> None:
+    """By 3 m; it is flown by no such estimate any more, but level until the autopilot lands."""
+    ground = flying()
+    ground.wait(0.1, height_m=1.0, resets=resets[0])
+    ground.orders.clear()
+    ground.wait(0.2, height_m=1.0, north_m=3.0, resets=resets[1])
+    flown = [order for order in ground.orders if isinstance(order, SetAttitude)]
+    assert flown
+    assert not any(order.attitude_rad.any() for order in flown)
+    assert ground.landed == f"landed: {words}; somebody else may send with its system number".replace(
+        "reset;", "reset of the estimator;"
+    )
+
+
+@pytest.mark.parametrize(("resets", "jump_m"), [((255, 0), 30.0), ((None, None), 0.4)], ids=["px4", "copter"])
+def test_a_reset_of_the_estimator_is_flown(resets: tuple[int | None, int | None], jump_m: float) -> None:
+    """One that is counted, by any distance; where none is counted, one of less than half a metre."""
+    ground = flying()
+    ground.wait(0.1, height_m=1.0, resets=resets[0])
+    ground.wait(0.5, height_m=1.0, north_m=jump_m, resets=resets[1])
+    assert ground.life.phase is Phase.FLYING
+    assert ground.life.steering.frame.jumps >= 1
+
+
+def test_a_clock_far_ahead_is_not_the_autopilots() -> None:
+    """Its own estimates are flown on, though one with a clock 1e6 s ahead comes at every fourth of them."""
+    ground = flying()
+    for count in range(400):
+        ground.wait(0.01, height_m=1.0)
+        if count % 4 == 0:
+            ground.tell(estimate(ground.now_s + 1e6, 1.0, north_m=3.0))
+    assert ground.life.phase is Phase.FLYING
+    assert len([order for order in ground.orders if isinstance(order, SetAttitude)]) > 390
+
+
+def test_a_target_too_far_makes_it_land() -> None:
+    """Farther than the bound, where the drone is."""
+    ground = flying()
+    ground.life.fly(Place(np.array([25.0, 0.0, -1.0])))
+    ground.wait(0.1, height_m=1.0)
+    assert ground.landed == "landed: the target is 25 m away, farther than 20 m"
 
 
 def test_a_controller_without_the_thrust_is_refused() -> None:

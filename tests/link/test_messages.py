@@ -153,7 +153,7 @@ def test_the_pilot_reads_each_record(record: Record) -> None:
 
 def test_a_position_and_an_attitude_make_an_estimate() -> None:
     """LOCAL_POSITION_NED with the attitude before it; alone, or with an old attitude, it makes none."""
-    sender, reader = Sender(), RecordReader()
+    sender, reader = Sender(), RecordReader(ARDUCOPTER.streams)
     sender.mav.local_position_ned_send(1000, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
     sender.mav.attitude_quaternion_send(1000, math.cos(0.1), math.sin(0.1), 0.0, 0.0, 0.0, 0.0, 0.0)
     sender.mav.local_position_ned_send(1010, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
@@ -176,7 +176,7 @@ def test_an_odometry_has_its_velocity_in_either_frame(child: int, velocity: list
         *(2_000_000, 1, child, 1.0, 2.0, -3.0, [half, 0.0, 0.0, half], 0.5, 0.0, 0.0),
         *(0.0, 0.0, 0.0, unknown, unknown, 4, 8),
     )
-    (estimate,) = map(RecordReader().read, sender.messages())
+    (estimate,) = map(RecordReader(PX4.streams).read, sender.messages())
     assert isinstance(estimate, EstimatedState)
     assert (estimate.time_s, estimate.resets) == (2.0, 4)
     np.testing.assert_allclose(estimate.velocity_m_s, velocity, atol=1e-7)
@@ -193,4 +193,4 @@ def test_what_is_no_estimate_is_left_out(broken: str) -> None:
         *(2_000_000, 20 if broken == "frame" else 1, 1, x, 2.0, -3.0, q, 0.0, 0.0, 0.0),
         *(0.0, 0.0, 0.0, unknown, unknown, 0, 8),
     )
-    assert [RecordReader().read(one) for one in sender.messages()] == [None]
+    assert [RecordReader(PX4.streams).read(one) for one in sender.messages()] == [None]

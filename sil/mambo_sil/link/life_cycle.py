@@ -5,14 +5,14 @@ which it can end is a `FlightEnd` with a sentence.
 """
 
 import math
-from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
 import numpy as np
 
 from mambo_sil.link.checks import Preflight, stack_of
 from mambo_sil.link.courses import Place, TargetCourse
+from mambo_sil.link.estimates import Estimates
+from mambo_sil.link.phases import FlightEnd, Phase, Timer
 from mambo_sil.link.records import (
     COMPANION,
     SET_MODE,
@@ -39,80 +39,50 @@ REACHED_M, RESTS_S = 0.3, 2.0
 """When the climb is over: as near to the height, for as long."""
 LOST_S: Final = 2.0
 """Time without an estimate after which the pilot lands, and without any message after which it ends."""
-OLDEST_S: Final = 0.1
-"""Age of an estimate beyond which nothing is flown by it."""
 REFUSED_S: Final = 0.5
 """How long the controller may refuse the state before the pilot lands."""
-CLOCK_DRIFT: Final = 0.02
-"""By how much the autopilot's clock may be slower than the pilot's; that of PX4's simulator is, by 1.2 %."""
 ASK_S, BEAT_S = 0.5, 1.0
 """Periods of repeated requests and of heartbeats."""
+FARTHEST_M: Final = 20.0
+"""Distance from the drone to its target beyond which the pilot lands, unless it is given another."""
 STOPS: Final = 5
 """How often the motors are told to stop: a message may be lost."""
-
-
-class Phase(Enum):
-    """Phases of a flight, in words."""
-
-    CONNECTING = "connecting"
-    CHECKING = "checking"
-    ARMING = "arming"
-    CLIMBING = "climbing"
-    FLYING = "flying"
-    LANDING = "landing"
-    ENDED = "ended"
 
 
 _LONGEST: Final = {Phase.CONNECTING: CONNECT_S, Phase.CHECKING: CHECK_S, Phase.ARMING: ARM_S}
 _IN_FLIGHT: Final = (Phase.ARMING, Phase.CLIMBING, Phase.FLYING, Phase.LANDING)
 
 
-@dataclass(frozen=True)
-class FlightEnd:
-    """How a flight ended; good if as planned."""
-
-    sentence: str
-    good: bool
-
-
-class Timer:
-    """Is due at once, and then every period."""
-
-    def __init__(self, period_s: float) -> None:
-        self._period_s, self._next_s = period_s, -math.inf
-
-    def is_due(self, now_s: float) -> bool:
-        """Return whether the period is over; it then begins anew."""
-        if now_s < self._next_s:
-            return False
-        self._next_s = now_s + self._period_s
-        return True
-
-
 class LifeCycle:
-    """One flight; `steering` flies it once it is at `height_m` above the ground."""
+    """One flight; `steering` flies it once it is at `height_m` above the ground.
 
-    def __init__(self, steering: Steering, height_m: float) -> None:
-        self.steering, self.height_m = steering, height_m
+    It lands where the target is farther than `farthest_m` from the drone.
+    """
+
+    def __init__(self, steering: Steering, height_m: float, farthest_m: float = FARTHEST_M) -> None:
+        self.steering, self.height_m, self.farthest_m = steering, height_m, farthest_m
         self.phase = Phase.CONNECTING
         self.end: FlightEnd | None = None
+        self.hint = ""
+        """Why no heartbeat may be heard, as the link knows it."""
         self.stack: Stack | None = None
         self.system = 0
-        self.estimate: EstimatedState | None = None
+        self.estimates = Estimates()
         self.course: TargetCourse = Place(np.zeros(3))
         self.course_time_s = 0.0
         """Time on the clock of the course, which stands still while there is no estimate."""
         self._begun_s: float | None = None
         self._preflight: Preflight | None = None
-        self._fresh: EstimatedState | None = None
         self._landed, self._armed, self._mode = False, False, -1
         self._lands = False
         """Whether the autopilot has accepted to land."""
         self._place_m = np.zeros(3)
         self._why, self._good = "", True
-        self._last_text, self._lag_s, self._stops = "", math.inf, 0
+        self._last_text, self._stops = "", 0
+        self._believes = True
+        """Whether the drone may still be flown by the estimates."""
         self._stepped_s = -math.inf
-        self._message_s = self._estimate_s = self._rest_s = self._accepted_s = 0.0
+        self._message_s = self._rest_s = self._accepted_s = 0.0
         self._beat, self._ask, self._level = Timer(BEAT_S), Timer(ASK_S), Timer(0.0)
         self._arm, self._changes_mode = Timer(BEAT_S), Timer(BEAT_S)
 
@@ -121,6 +91,11 @@ class LifeCycle:
     def fly(self, course: TargetCourse) -> None:
         """Fly a course from now on."""
         self.course, self.course_time_s = course, 0.0
+
+    @property
+    def estimate(self) -> EstimatedState | None:
+        """The newest estimate."""
+        return self.estimates.newest
 
     @property
     def is_over(self) -> bool:
@@ -179,8 +154,6 @@ class LifeCycle:
     def _receive_heartbeat(self, beat: Heartbeat) -> None:
         if beat.vehicle == COMPANION:
             self._meet_pilot(beat)
-        elif beat.component != 1:
-            return
         elif self.stack is None:
             found = stack_of(beat)
             if isinstance(found, str):
@@ -189,7 +162,7 @@ class LifeCycle:
                 self.stack, self.system = found, beat.system
                 self._preflight = Preflight(found, self.steering.controller.update_period_s)
                 self._enter(Phase.CHECKING)
-        elif beat.system == self.system:
+        else:
             self._armed, self._mode = beat.armed, beat.mode
             self._check_control()
 
@@ -224,15 +197,12 @@ class LifeCycle:
             )
 
     def _receive_estimate(self, estimate: EstimatedState, now_s: float) -> None:
-        """Keep an estimate that is newer than the last one, and not late."""
-        if self.estimate is not None and estimate.time_s <= self.estimate.time_s:
-            return
-        lag_s = now_s - estimate.time_s
-        since_s = 0.0 if self.estimate is None else estimate.time_s - self.estimate.time_s
-        self._lag_s = min(self._lag_s + CLOCK_DRIFT * since_s, lag_s)
-        self.estimate = estimate
-        if lag_s - self._lag_s <= OLDEST_S:
-            self._fresh, self._estimate_s = estimate, now_s
+        """Keep an estimate; land by the autopilot's own controller if it cannot be believed."""
+        self.estimates.receive(estimate, now_s, in_flight=self.is_flying)
+        doubt = self.estimates.doubt
+        if doubt is not None and self.phase in (Phase.CLIMBING, Phase.FLYING):
+            self._believes = False
+            self.land(f"{doubt}; somebody else may send with its system number", good=False)
 
     # What is sent.
 
@@ -242,7 +212,7 @@ class LifeCycle:
             self._stops -= 1
             return [Arm(arm=False, force=True)]
         if self._begun_s is None:
-            self._begun_s = self._message_s = self._estimate_s = now_s
+            self._begun_s = self._message_s = self.estimates.fresh_s = now_s
             self._level = Timer(self.steering.controller.update_period_s)
         if self.phase is Phase.ENDED:
             return []
@@ -268,7 +238,7 @@ class LifeCycle:
         passed_s = now_s - self._begun_s
         if self.phase in _IN_FLIGHT and now_s - self._message_s > LOST_S + CONNECT_S:
             self._finish("the link is lost: the autopilot acts by its own failsafe", good=False)
-        elif self.phase in (Phase.CLIMBING, Phase.FLYING) and now_s - self._estimate_s > LOST_S:
+        elif self.phase in (Phase.CLIMBING, Phase.FLYING) and now_s - self.estimates.fresh_s > LOST_S:
             silent = now_s - self._message_s > LOST_S
             what = "message" if silent else "estimate that is not late"
             self.land(f"no {what} has come for {LOST_S:g} s", good=False)
@@ -285,7 +255,7 @@ class LifeCycle:
         says = f", and says: {self._last_text}" if self._last_text else ""
         if self.phase is Phase.CONNECTING:
             waited = f"no heartbeat has come within {CONNECT_S:.0f} s"
-            why = f"{waited}: start the autopilot, and let it send to this port"
+            why = f"{waited}: start the autopilot, and let it send to this port{self.hint}"
         elif self.phase is Phase.CHECKING and self._preflight is not None:
             why = f"{self._preflight.missing()}{says}"
         else:
@@ -328,7 +298,7 @@ class LifeCycle:
 
     def _hover_above(self) -> list[Order]:
         """Return the set-point above the place of take-off, of an autopilot that climbs by set-points."""
-        estimate, self._fresh = self._fresh, None
+        estimate = self.estimates.take()
         if self.stack is None or estimate is None or not self.stack.climbs_by_set_points:
             return []
         position_m = self._place_m - np.array([0.0, 0.0, self.height_m])
@@ -354,25 +324,31 @@ class LifeCycle:
 
     def _steer(self, now_s: float) -> list[Order]:
         """Return the controller's set-point for a fresh estimate, or a level one where none comes."""
-        estimate, self._fresh = self._fresh, None
-        if estimate is not None:
+        estimate, fresh_s = self.estimates.take(), self.estimates.fresh_s
+        if estimate is not None and self._believes:
             return self._step(estimate, now_s)
-        if self.estimate is None or now_s - self._estimate_s <= PAUSE_S or not self._level.is_due(now_s):
+        is_silent = not self._believes or now_s - fresh_s > PAUSE_S
+        if self.estimate is None or not is_silent or not self._level.is_due(now_s):
             return []
-        return [self.steering.level(self.estimate.time_s + now_s - self._estimate_s)]
+        return [self.steering.level(self.estimate.time_s + now_s - fresh_s)]
 
     def _step(self, estimate: EstimatedState, now_s: float) -> list[Order]:
-        """Step the controller; land if it refuses the state for long."""
+        """Step the controller; land if it refuses the state for long, or the target is too far."""
         last_s, self._stepped_s = self._stepped_s, estimate.time_s
         passed_s = estimate.time_s - last_s
         self.course_time_s += passed_s if passed_s <= PAUSE_S else 0.0
         set_point = self.steering.steer(
             estimate, lambda ago_s: self.course.target(max(self.course_time_s - ago_s, 0.0))
         )
-        if self.steering.is_accepted:
-            self._accepted_s = now_s
-        elif self.phase is Phase.FLYING and now_s - self._accepted_s > REFUSED_S:
-            self.land("the controller refuses the state, which is out of its [ranges]", good=False)
+        away_m = self.steering.away_m
+        if not self.steering.is_accepted:
+            if self.phase is Phase.FLYING and now_s - self._accepted_s > REFUSED_S:
+                self.land("the controller refuses the state, which is out of its [ranges]", good=False)
+            return [] if set_point is None else [set_point]
+        self._accepted_s = now_s
+        if self.phase is Phase.FLYING and away_m > self.farthest_m:
+            self.course = Place(estimate.position_m)
+            self.land(f"the target is {away_m:.0f} m away, farther than {self.farthest_m:g} m", good=False)
         return [] if set_point is None else [set_point]
 
     def _land(self, now_s: float) -> list[Order]:

@@ -5,7 +5,9 @@ from typing import Any
 
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.link.messages import RecordReader
+from mambo_sil.link.peer import Peer
 from mambo_sil.link.records import Record, Stack
+from mambo_sil.link.signing import sign
 from mambo_sil.link.simulated import Condition, SimulatedAutopilot
 from mambo_sil.link.sockets import Address, MavlinkSocket
 
@@ -14,15 +16,22 @@ WAIT_S = 0.005
 
 
 class UdpLink:
-    """An autopilot that sends to an address of this machine, in real time."""
+    """An autopilot that sends to an address of this machine, in real time; `key` signs both directions."""
 
-    def __init__(self, listen: Address) -> None:
-        self.socket, self._reader = MavlinkSocket(listen, None), RecordReader()
+    def __init__(self, listen: Address, key: bytes | None = None) -> None:
+        self.socket, self._peer, self._reader = MavlinkSocket(listen), Peer(), RecordReader()
+        if key is not None:
+            sign(self.socket.mav, key)
 
     @property
     def mav(self) -> Any:
         """Pymavlink's MAVLink object, which sends."""
         return self.socket.mav
+
+    @property
+    def hint(self) -> str:
+        """Why nothing may be heard, to be added to a sentence."""
+        return "; messages come that are not signed with the key" if self.socket.has_refused else ""
 
     def now_s(self) -> float:
         """Return the time of the pilot's clock."""
@@ -33,8 +42,10 @@ class UdpLink:
         return self._read(WAIT_S)
 
     def _read(self, wait_s: float) -> list[Record]:
-        records = map(self._reader.read, self.socket.receive(wait_s))
-        return [record for record in records if record is not None]
+        arrived, now_s = self.socket.receive(wait_s), self.now_s()
+        counting = [one for one, address in arrived if self._peer.counts(one, address, now_s)]
+        self.socket.peer = self._peer.address
+        return [record for record in map(self._reader.read, counting) if record is not None]
 
     def close(self) -> None:
         """Close its socket."""

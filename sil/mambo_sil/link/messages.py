@@ -6,6 +6,7 @@ mode).
 """
 
 import math
+from collections import deque
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from mambo_sil.errors import ArgumentError
 from mambo_sil.link.records import (
     COMPANION,
     SET_MODE,
+    STACKS,
     Answer,
     Arm,
     AskParameter,
@@ -199,38 +201,49 @@ def _read_record(message: Any) -> Record | None:
 
 
 class RecordReader:
-    """Reads records from messages; a position and the attitude nearest before it make an estimate.
+    """Reads records from messages; a position and the attitude nearest to it make an estimate.
 
-    After the first ODOMETRY, which has both, positions and attitudes alone are not read any more.
+    Estimates are read only from the streams that the autopilot is asked for, by the stack of its heartbeat.
     """
 
-    def __init__(self) -> None:
-        self._attitude: tuple[float, FloatArray] | None = None
-        self._has_odometry = False
+    def __init__(self, streams: tuple[Stream, ...] = ()) -> None:
+        self._streams = streams
+        self._attitudes: deque[tuple[float, FloatArray]] = deque(maxlen=ATTITUDES)
 
     def read(self, message: Any) -> Record | None:
         """Return the record in a message; None for one that is of no use."""
+        if message.get_type() == "HEARTBEAT" and not self._streams:
+            idents = {stack.ident: stack.streams for stack in STACKS.values()}
+            self._streams = idents.get(message.autopilot, ())
         return _read_record(message) or self._estimate(message)
 
     def _estimate(self, message: Any) -> EstimatedState | None:
+        if message.get_msgId() not in self._streams:
+            return None
         match message.get_type():
             case "ODOMETRY":
-                self._has_odometry = True
                 return _read_odometry(message)
             case "ATTITUDE_QUATERNION":
                 attitude_rad = _attitude([message.q1, message.q2, message.q3, message.q4])
                 if attitude_rad is not None:
-                    self._attitude = message.time_boot_ms / 1e3, attitude_rad
-            case "LOCAL_POSITION_NED" if self._attitude is not None and not self._has_odometry:
-                time_s = message.time_boot_ms / 1e3
-                measured_s, attitude_rad = self._attitude
-                if abs(time_s - measured_s) > OLDEST_ATTITUDE_S:
-                    return None
-                position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
-                return _finite(EstimatedState(time_s, np.array(position), np.array(velocity), attitude_rad))
+                    self._attitudes.append((message.time_boot_ms / 1e3, attitude_rad))
+            case "LOCAL_POSITION_NED":
+                return self._with_attitude(message)
         return None
 
+    def _with_attitude(self, message: Any) -> EstimatedState | None:
+        """Return the estimate of a position; None if no attitude is near to it in time."""
+        time_s = message.time_boot_ms / 1e3
+        near = [one for one in self._attitudes if abs(time_s - one[0]) <= OLDEST_ATTITUDE_S]
+        if not near:
+            return None
+        _, attitude_rad = min(near, key=lambda one: abs(time_s - one[0]))
+        position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
+        return _finite(EstimatedState(time_s, np.array(position), np.array(velocity), attitude_rad))
 
+
+ATTITUDES: Final = 10
+"""How many attitudes are kept."""
 OLDEST_ATTITUDE_S: Final = 0.1
 """Largest time between a position and the attitude that goes with it."""
 

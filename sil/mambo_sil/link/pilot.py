@@ -21,16 +21,20 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import ArgumentError, PilotError
 from mambo_sil.flight.trajectories import Trajectory
 from mambo_sil.link.courses import Along, Place, TargetCourse, TargetProgram
-from mambo_sil.link.life_cycle import LifeCycle, Phase
+from mambo_sil.link.life_cycle import FARTHEST_M, LifeCycle
 from mambo_sil.link.links import SimulatedLink, UdpLink
 from mambo_sil.link.messages import send_order
+from mambo_sil.link.phases import Phase
 from mambo_sil.link.records import PX4, STACKS, EstimatedState, SetMode
+from mambo_sil.link.signing import read_key
 from mambo_sil.link.sockets import parse_link
 from mambo_sil.link.steering import Steering, Update
 
 NEAR_M, STAYS_S = 0.15, 1.0
 """How near the drone is when it has arrived, and how long it has been."""
 LOWEST_M, HIGHEST_M = 0.3, 100.0
+NEAREST_BOUND_M, FARTHEST_BOUND_M = 1.0, 10_000.0
+"""Bounds on the bound `farthest_m`."""
 LONGEST_S: Final = 36_000.0
 TOLD: Final = 3
 """How often the autopilot is told to land by a pilot that ends at once: a message may be lost."""
@@ -42,8 +46,8 @@ class Pilot:
     It is a context manager: it opens its link, lands if the drone still flies, and closes the link.
     The calls must follow each other without a pause: while none runs, nothing is sent, which the autopilot
     takes for a lost link after a second. Ctrl-C lands, a second one stops the motors; either raises
-    KeyboardInterrupt after that; so does SIGTERM. Every call raises PilotError, with a sentence, if the
-    flight has ended.
+    KeyboardInterrupt after that; so does SIGTERM. It lands too if the target is farther than `farthest_m`
+    from the drone. Every call raises PilotError, with a sentence, if the flight has ended.
     """
 
     def __init__(
@@ -52,24 +56,37 @@ class Pilot:
         open_link: Callable[[], UdpLink],
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
         watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
+        *,
+        farthest_m: float = FARTHEST_M,
     ) -> None:
+        require_number("farthest_m", farthest_m, NEAREST_BOUND_M, FARTHEST_BOUND_M)
         if controller.settings.target.acceleration == "preview":
             raise ArgumentError(
                 'controller: target.acceleration = "preview" must be "given" or "tracked": the targets of a '
                 "pilot do not say what comes"
             )
         self._open_link, self.steering = open_link, Steering(controller, record)
-        self.life = LifeCycle(self.steering, 1.0)
+        self.life = LifeCycle(self.steering, 1.0, farthest_m)
         self._watch, self._interrupts, self._interrupted = watch, 0, ""
 
     @classmethod
-    def connect(cls, path: str | Path, link: str, **options: Unpack[ControllerOptions]) -> Self:
+    def connect(
+        cls,
+        path: str | Path,
+        link: str,
+        *,
+        key: str | Path | None = None,
+        farthest_m: float = FARTHEST_M,
+        **options: Unpack[ControllerOptions],
+    ) -> Self:
         """Return a pilot with the settings of a controller.toml at a link such as udp:127.0.0.1:14540.
 
-        Raises LinkError, and what `Controller.from_file` raises.
+        `key` is a file of 64 hexadecimal digits, the key with which both sides sign. Raises LinkError, and
+        what `Controller.from_file` raises.
         """
-        address = parse_link(link)
-        return cls(Controller.from_file(path, **options), lambda: UdpLink(address))
+        address, secret = parse_link(link), None if key is None else read_key(key)
+        controller = Controller.from_file(path, **options)
+        return cls(controller, lambda: UdpLink(address, secret), farthest_m=farthest_m)
 
     @classmethod
     def simulate(
@@ -77,13 +94,16 @@ class Pilot:
         path: str | Path,
         vehicle: str | Path,
         autopilot: str = "px4",
+        *,
+        farthest_m: float = FARTHEST_M,
         **options: Unpack[ControllerOptions],
     ) -> Self:
         """Return a pilot of a simulated drone behind the messages of an autopilot: "px4" or "ardupilot"."""
         require_choice("autopilot", autopilot, tuple(STACKS))
         require_path("vehicle", vehicle, f"a vehicle.toml, or one of {', '.join(vehicle_toml.names())}")
         drone = vehicle_toml.load(str(vehicle))
-        return cls(Controller.from_file(path, **options), lambda: SimulatedLink(STACKS[autopilot], drone))
+        controller = Controller.from_file(path, **options)
+        return cls(controller, lambda: SimulatedLink(STACKS[autopilot], drone), farthest_m=farthest_m)
 
     def take_off(self, height_m: float) -> None:
         """Connect, check, arm, climb by the autopilot's own controller, and take over at a height."""
@@ -172,6 +192,7 @@ class Pilot:
         """Take what has come, and send what is to be sent."""
         records = self.link.receive()
         now_s = self.link.now_s()
+        self.life.hint = self.link.hint
         for record in records:
             self.life.receive(record, now_s)
         if self._interrupts > 1:

@@ -130,7 +130,7 @@ class SimulatedAutopilot:
 
     def tick(self) -> None:
         """Obey what has come, move on by a tick, and send what is due."""
-        for message in self.socket.receive(0.0):
+        for message, _ in self.socket.receive(0.0):
             order = read_order(message, self.stack)
             if order is not None:
                 self.orders.append(order)

@@ -13,9 +13,6 @@ from mambo_sil.errors import LinkError
 PILOT: Final = (245, 191)
 """System and component of the pilot: that of an onboard computer."""
 LARGEST_DATAGRAM: Final = 65535
-_HALF: Final = 128
-_NEW_AFTER: Final = 50
-"""Messages in a row that are behind in sequence after which the sender has begun anew."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +50,19 @@ def dialect() -> Any:
 
 
 class MavlinkSocket:
-    """Messages to and from one peer; `mav` sends them.
+    """Messages from anybody, and to the address `peer`; `mav` sends them.
 
-    The peer is the first from which a message comes, unless it is given. A message that arrives late or twice
-    is left out, and so is what is no message.
+    What is no message is left out, and with a key also what is not signed with it.
     """
 
     def __init__(
-        self, listen: Address, peer: tuple[str, int] | None, source: tuple[int, int] = PILOT
+        self, listen: Address, peer: tuple[str, int] | None = None, source: tuple[int, int] = PILOT
     ) -> None:
         self._dialect = dialect()
         self.mav: Any = self._dialect.MAVLink(self, *source)
-        self._peer, self._newest = peer, dict[tuple[int, int], tuple[int, int]]()
+        self.peer = peer
+        self.has_refused = False
+        """Whether a message has come that is not signed with the key."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((listen.host, listen.port))
@@ -84,13 +82,13 @@ class MavlinkSocket:
 
     def write(self, data: bytes) -> None:
         """Send a message to the peer, if there is one yet; `mav` calls it."""
-        if self._peer is not None:
+        if self.peer is not None:
             with contextlib.suppress(OSError):  # a network that is down is a lost link
-                self._socket.sendto(data, self._peer)
+                self._socket.sendto(data, self.peer)
 
-    def receive(self, wait_s: float) -> list[Any]:
-        """Return the messages that have come; wait for the first at most `wait_s`."""
-        found: list[Any] = []
+    def receive(self, wait_s: float) -> list[tuple[Any, tuple[str, int]]]:
+        """Return the messages that have come, each with its address; wait for the first at most `wait_s`."""
+        found: list[tuple[Any, tuple[str, int]]] = []
         select.select([self._socket], [], [], wait_s)
         while True:
             try:
@@ -99,25 +97,15 @@ class MavlinkSocket:
                 return found
             except OSError:  # an answer of the network to what was sent
                 continue
-            for message in self._parse(data):
-                self._peer = self._peer or sender
-                if self._is_next(message):
-                    found.append(message)
+            found += [(message, sender) for message in self._parse(data)]
 
     def _parse(self, data: bytes) -> list[Any]:
         """Return the messages of a datagram; what is garbage in it costs none of the next one."""
         parser = self._dialect.MAVLink(None)
-        parser.robust_parsing = True
-        return [one for one in parser.parse_buffer(data) or () if one.get_type() != "BAD_DATA"]
-
-    def _is_next(self, message: Any) -> bool:
-        """Return whether a message is newer than all of its sender by its sequence number."""
-        source = message.get_srcSystem(), message.get_srcComponent()
-        number = message.get_seq()
-        newest, behind = self._newest.get(source, (number - 1, 0))
-        is_next = bool(0 < (number - newest) % 256 < _HALF) or behind >= _NEW_AFTER
-        self._newest[source] = (number, 0) if is_next else (newest, behind + 1)
-        return is_next
+        parser.robust_parsing, parser.signing = True, self.mav.signing
+        found = list(parser.parse_buffer(data) or ())
+        self.has_refused |= any(one.get_type() == "BAD_DATA" and "signature" in one.reason for one in found)
+        return [one for one in found if one.get_type() != "BAD_DATA"]
 
 
 def _cannot_listen(error: OSError) -> str:

@@ -34,6 +34,13 @@ NOISE_M_S: Final = 0.1
 SETTLES_S, SETTLING_M = 1.0, 0.005
 """ArduCopter's estimator moves its position within half a second, by less in each step: for a time after a
 jump smaller changes of the position are taken for its rest."""
+LEAP_M, LEAP_M_S = 0.5, 2.0
+"""Changes of position and velocity, beyond the motion, that the estimator of a flying drone makes only in a
+reset; one that does not count its resets moves its position by less in each step."""
+LEAP_1_S, LEAP_M_S2 = 4.0, 40.0
+"""And how much larger they must be for each second between two estimates: m/s, m/s^2."""
+_HALF: Final = 128
+"""Half the range of the counter of resets."""
 FADING_1_S: Final = 1.05
 """w: after 0.2 m the drone glides with 0.06 m/s at most, and needs 6 s for 95 % of it."""
 
@@ -115,6 +122,24 @@ class SteadyFrame:
         self._offset_m = left * (self._offset_m + passed_s * (first_m_s + passed_s / 2.0 * second_m_s2))
         self._offset_m_s = later_m_s - w * self._offset_m
         self._offset_m_s2 = left * second_m_s2 - w * (2.0 * self._offset_m_s + w * self._offset_m)
+
+
+def doubt(last: EstimatedState, estimate: EstimatedState) -> str | None:
+    """Return why an estimate cannot follow the last one, in a sentence; None if it can."""
+    passed_s = estimate.time_s - last.time_s
+    if passed_s > LONGEST_S:
+        return None
+    if last.resets is not None and estimate.resets is not None and estimate.resets != last.resets:
+        if (estimate.resets - last.resets) % (2 * _HALF) < _HALF:
+            return None
+        return f"the count of the estimator's resets has gone back from {last.resets} to {estimate.resets}"
+    moved_m, moved_m_s, _ = (np.abs(one).max() for one in _changes(last, estimate, passed_s))
+    if moved_m <= LEAP_M + LEAP_1_S * passed_s and moved_m_s <= LEAP_M_S + LEAP_M_S2 * passed_s:
+        return None
+    return (
+        f"the estimate has jumped by {moved_m:.1f} m and {moved_m_s:.1f} m/s within {1e3 * passed_s:.0f} ms "
+        "without a reset of the estimator"
+    )
 
 
 def _changes(

@@ -65,6 +65,8 @@ class Steering:
         """The shares of the largest thrust that carry the drone: as the autopilot says, and in the mean."""
         self.is_accepted = True
         """Whether the controller has accepted the last state."""
+        self.away_m = 0.0
+        """How far the drone is from the last target that the controller got."""
         self.frame = SteadyFrame()
         self.take_overs = 0
         self._record = record
@@ -144,6 +146,7 @@ class Steering:
         self._sent_rad, self._sent_m_s2 = np.array([roll_rad, pitch_rad]), thrust_m_s2
         self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
         self.is_accepted = int(outcome.status) == 0
+        self.away_m = float(np.linalg.norm(target.position_m - estimate.position_m))
         self._record(
             Update(
                 *(estimate, target, (roll_rad, pitch_rad), thrust_m_s2, int(outcome.status)),

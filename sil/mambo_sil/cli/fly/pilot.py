@@ -25,6 +25,13 @@ def pilot(
         str | None,
         typer.Option(help="Where the autopilot sends to on this machine.", metavar="udp:HOST:PORT"),
     ] = None,
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            help="File with the key that signs the messages of --link: 64 hexadecimal digits, for you alone.",
+            metavar="FILE",
+        ),
+    ] = None,
     simulate: Annotated[
         Literal["px4", "ardupilot"] | None,
         typer.Option(help="px4 or ardupilot: fly a simulated drone behind its messages.", metavar="NAME"),
@@ -38,6 +45,10 @@ def pilot(
     height_m: Annotated[
         float, typer.Option(help="Height above the place of take-off, in m.", metavar="M")
     ] = 1.5,
+    farthest_m: Annotated[
+        float,
+        typer.Option(help="Land if the target is farther from the drone than this, in m.", metavar="M"),
+    ] = 20.0,
     output: Results = Path("piloted"),
     as_json: AsJson = False,
 ) -> None:
@@ -54,10 +65,10 @@ def pilot(
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
-    open_link = _opener(source, link, simulate, vehicle)
+    open_link = _opener(source, link, simulate, vehicle, key)
     updates: list[Update] = []
     with new_results(output, PilotSummary.command, (LOG,)) as folder, progress_bar("connecting") as bar:
-        flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar))
+        flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar), farthest_m=farthest_m)
         interrupted: KeyboardInterrupt | None = None
         try:
             with flown:
@@ -86,11 +97,12 @@ def pilot(
 
 
 def _opener(
-    source: str, link: str | None, simulate: str | None, vehicle: str | None
+    source: str, link: str | None, simulate: str | None, vehicle: str | None, key: Path | None
 ) -> "Callable[[], UdpLink]":
     """Return what opens the link that the options describe; raises LinkError, BadParameter."""
     from mambo_sil.link.links import SimulatedLink, UdpLink
     from mambo_sil.link.records import STACKS
+    from mambo_sil.link.signing import read_key
     from mambo_sil.link.sockets import parse_link
 
     if (link is None) == (simulate is None):
@@ -100,8 +112,10 @@ def _opener(
     if link is not None:
         if vehicle is not None:
             raise typer.BadParameter("it is the drone of --simulate: leave it out", param_hint="--vehicle")
-        address = parse_link(link)
-        return lambda: UdpLink(address)
+        address, secret = parse_link(link), None if key is None else read_key(key)
+        return lambda: UdpLink(address, secret)
+    if key is not None:
+        raise typer.BadParameter("it signs the messages of --link: leave it out", param_hint="--key")
     stack, drone = STACKS[str(simulate)], load_drone(vehicle, source)
     return lambda: SimulatedLink(stack, drone)
 
