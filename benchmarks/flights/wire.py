@@ -22,6 +22,8 @@ class Faults:
     garbage: float = 0.0
     delay_s: float = 0.0
     """Delay of all datagrams."""
+    jitter_s: float = 0.0
+    """And the most by which each is later than that."""
 
 
 class UdpWire:
@@ -65,6 +67,8 @@ class UdpWire:
         if chance() < faults.lost:
             return
         arrives_s = now_s + faults.delay_s + (faults.late_s if chance() < faults.late else 0.0)
+        if faults.jitter_s:
+            arrives_s += faults.jitter_s * chance()
         self._on_the_way.append((arrives_s, data, to_pilot))
         if chance() < faults.doubled:
             self._on_the_way.append((arrives_s + 0.02, data, to_pilot))

@@ -112,7 +112,7 @@ class Preflight:
         return None
 
     def _estimate_fault(self) -> str | None:
-        median_s = float(np.median(np.diff([one.time_s for one in self._estimates])))
+        median_s = float(np.median(np.diff(sorted({one.time_s for one in self._estimates}))))
         if median_s > LONGEST_PERIODS * self._period_s:
             return (
                 f"an estimate comes every {1e3 * median_s:.0f} ms; the controller wants one every "

@@ -32,8 +32,8 @@ from mambo_sil.link.records import (
 )
 from mambo_sil.link.steering import PAUSE_S, Steering
 
-CONNECT_S, CHECK_S, ARM_S, LAND_S = 10.0, 8.0, 15.0, 60.0
-"""How long each phase may last before the pilot gives up; a climb: as `_climb_s`."""
+CONNECT_S, CHECK_S, ARM_S, LAND_S, STOP_S = 10.0, 8.0, 15.0, 60.0, 10.0
+"""How long each phase may last before the pilot gives up; climb and landing: longer, by the height."""
 SLOWEST_M_S: Final = 0.5
 REACHED_M, RESTS_S = 0.3, 2.0
 """When the climb is over: as near to the height, for as long."""
@@ -45,12 +45,17 @@ ASK_S, BEAT_S = 0.5, 1.0
 """Periods of repeated requests and of heartbeats."""
 FARTHEST_M: Final = 20.0
 """Distance from the drone to its target beyond which the pilot lands, unless it is given another."""
-STOPS: Final = 5
-"""How often the motors are told to stop: a message may be lost."""
+STOPS_S: Final = 0.05
+"""Period in which the motors are told to stop."""
+ARM_PASSES_S: Final = 2.0
+"""Time in which an order to arm may be on its way: a drone that is disarmed until then may be armed by it."""
+SILENT_S, FAILSAFE_S = 0.5, 5.0
+"""A silence after which the autopilot may act by its failsafe, and how long after it that is seen."""
 
 
 _LONGEST: Final = {Phase.CONNECTING: CONNECT_S, Phase.CHECKING: CHECK_S, Phase.ARMING: ARM_S}
 _IN_FLIGHT: Final = (Phase.ARMING, Phase.CLIMBING, Phase.FLYING, Phase.LANDING)
+_WITH_ESTIMATES: Final = (Phase.ARMING, Phase.CLIMBING, Phase.FLYING)
 
 
 class LifeCycle:
@@ -78,13 +83,18 @@ class LifeCycle:
         """Whether the autopilot has accepted to land."""
         self._place_m = np.zeros(3)
         self._why, self._good = "", True
-        self._last_text, self._stops = "", 0
+        self._last_text = ""
         self._believes = True
         """Whether the drone may still be flown by the estimates."""
+        self._arm_s = self._silence_s = -math.inf
+        """When the autopilot was last told to arm, and when the last silence ended."""
+        self._was_armed = self._obeyed = self._is_failsafe = False
+        """Whether it was armed since then, was in a mode that it was told, and has left that by itself."""
         self._stepped_s = -math.inf
-        self._message_s = self._rest_s = self._accepted_s = 0.0
+        self._now_s = self._message_s = self._rest_s = self._accepted_s = 0.0
+        self._land_s = LAND_S
         self._beat, self._ask, self._level = Timer(BEAT_S), Timer(ASK_S), Timer(0.0)
-        self._arm, self._changes_mode = Timer(BEAT_S), Timer(BEAT_S)
+        self._arm, self._changes_mode, self._stop = Timer(BEAT_S), Timer(BEAT_S), Timer(STOPS_S)
 
     # What the pilot is told to do.
 
@@ -99,13 +109,13 @@ class LifeCycle:
 
     @property
     def is_over(self) -> bool:
-        """Whether the flight has ended, and nothing is left to send."""
-        return self.end is not None and not self._stops
+        """Whether the flight has ended."""
+        return self.end is not None
 
     @property
     def is_flying(self) -> bool:
         """Whether the motors may turn."""
-        return self.phase in _IN_FLIGHT
+        return self.phase in _IN_FLIGHT or self.phase is Phase.STOPPING
 
     @property
     def is_course_over(self) -> bool:
@@ -113,21 +123,30 @@ class LifeCycle:
         return self.course_time_s >= self.course.duration_s
 
     def land(self, why: str, *, good: bool) -> None:
-        """Land because of `why`; what does not fly yet ends at once."""
-        if self.phase in (Phase.CONNECTING, Phase.CHECKING):
+        """Land because of `why`; what was not told to arm ends at once."""
+        is_idle = self.phase is Phase.ARMING and not self._armed and self._arm_s == -math.inf
+        if is_idle or self.phase in (Phase.CONNECTING, Phase.CHECKING):
             self._finish(f"no flight: {why}", good=False)
         elif self.phase in _IN_FLIGHT and self.phase is not Phase.LANDING:
-            if self.phase is not Phase.FLYING and self.estimate is not None:
-                self.course = Place(self.estimate.position_m)
+            if self.estimate is not None:
+                height_m = float(self._place_m[2] - self.estimate.position_m[2])
+                self._land_s = LAND_S + max(height_m, 0.0) / SLOWEST_M_S
+            if self.phase is not Phase.FLYING:
+                self.hold()
             self._enter(Phase.LANDING)
             self._why, self._good = why, good
+
+    def hold(self) -> None:
+        """Leave the course, and stay where the drone is."""
+        if self.estimate is not None:
+            self.course = Place(self.estimate.position_m)
 
     def stop(self, why: str) -> None:
         """Stop the motors at once, wherever the drone is."""
         if self.phase in _IN_FLIGHT:
-            self._stops = STOPS
-            self._finish(f"{why}: the motors are stopped", good=False)
-        elif self.phase is not Phase.ENDED:
+            self._enter(Phase.STOPPING)
+            self._why = why
+        elif self.phase in (Phase.CONNECTING, Phase.CHECKING):
             self._finish(f"no flight: {why}", good=False)
 
     # What comes.
@@ -136,12 +155,15 @@ class LifeCycle:
         """Take a record that has come."""
         if self.phase is Phase.ENDED:
             return
+        self._now_s = now_s
+        if now_s - self._message_s > SILENT_S:
+            self._silence_s = now_s
         self._message_s = now_s
         if self._preflight is not None and self.phase is Phase.CHECKING:
             self._preflight.receive(record)
         match record:
             case Heartbeat():
-                self._receive_heartbeat(record)
+                self._receive_heartbeat(record, now_s)
             case EstimatedState():
                 self._receive_estimate(record, now_s)
             case Answer() if record.command == SET_MODE and self.phase is Phase.LANDING:
@@ -151,7 +173,7 @@ class LifeCycle:
             case Text():
                 self._last_text = record.text
 
-    def _receive_heartbeat(self, beat: Heartbeat) -> None:
+    def _receive_heartbeat(self, beat: Heartbeat, now_s: float) -> None:
         if beat.vehicle == COMPANION:
             self._meet_pilot(beat)
         elif self.stack is None:
@@ -164,7 +186,10 @@ class LifeCycle:
                 self._enter(Phase.CHECKING)
         else:
             self._armed, self._mode = beat.armed, beat.mode
-            self._check_control()
+            if self.is_flying:
+                self._was_armed |= beat.armed
+                self._obeyed |= beat.mode in {self.stack.guided, self.stack.land}
+                self._check_control(self.stack, now_s)
 
     def _meet_pilot(self, beat: Heartbeat) -> None:
         """Leave the drone to one pilot: two would send set-points in turn."""
@@ -174,24 +199,38 @@ class LifeCycle:
         else:
             self.land(who, good=False)
 
-    def _check_control(self) -> None:
-        """End the flight if somebody else has taken the drone, or it is not armed any more."""
-        if self.stack is None or self.phase not in (Phase.CLIMBING, Phase.FLYING, Phase.LANDING):
+    def _check_control(self, stack: Stack, now_s: float) -> None:
+        """End the flight if the drone is not armed any more, or somebody else has taken it."""
+        if self.phase is Phase.ARMING:
             return
-        name = self.stack.name
         if not self._armed:
-            if self.phase is Phase.LANDING:
-                self._finish(f"landed: {self._why}", good=self._good)
-            else:
-                why = f", which says: {self._last_text}" if self._last_text else ""
-                self._finish(f"{name} has stopped the motors in flight{why}", good=False)
-        elif self._mode != self.stack.guided and (
-            self.phase is not Phase.LANDING or self._mode != self.stack.land
-        ):
-            mode = self.stack.modes.get(self._mode, f"mode {self._mode}")
-            wanted = self.stack.modes[self.stack.guided]
+            if now_s - self._arm_s > ARM_PASSES_S:
+                self._finish_disarmed(stack)
+        elif self._obeyed and self.phase is not Phase.STOPPING:
+            self._check_mode(stack, now_s)
+
+    def _finish_disarmed(self, stack: Stack) -> None:
+        """End the flight of a drone that is disarmed."""
+        if self.phase is Phase.LANDING:
+            end = "landed" if self._was_armed else "no flight"
+            self._finish(f"{end}: {self._why}", good=self._good and self._was_armed)
+        elif self.phase is Phase.STOPPING:
+            self._finish(f"{self._why}: the motors are stopped", good=False)
+        else:
+            why = f", which says: {self._last_text}" if self._last_text else ""
+            self._finish(f"{stack.name} has stopped the motors in flight{why}", good=False)
+
+    def _check_mode(self, stack: Stack, now_s: float) -> None:
+        """Leave the drone to who has changed its mode; land it if that was its failsafe after a silence."""
+        if self._mode == stack.guided or (self._mode == stack.land and self.phase is Phase.LANDING):
+            return
+        mode, wanted = stack.modes.get(self._mode, f"mode {self._mode}"), stack.modes[stack.guided]
+        self._is_failsafe |= now_s - self._silence_s < FAILSAFE_S
+        if self._mode == stack.hold and self._is_failsafe:
+            self.land(f"the link was silent, and {stack.name} has left {wanted} for {mode}", good=False)
+        else:
             self._finish(
-                f"{name} has changed from {wanted} to {mode}, by the pilot's switch or a failsafe: "
+                f"{stack.name} has changed from {wanted} to {mode}, by the pilot's switch or a failsafe: "
                 "nothing is sent any more",
                 good=False,
             )
@@ -208,9 +247,7 @@ class LifeCycle:
 
     def orders(self, now_s: float) -> list[Order]:
         """Return what to send now."""
-        if self._stops:
-            self._stops -= 1
-            return [Arm(arm=False, force=True)]
+        self._now_s = now_s
         if self._begun_s is None:
             self._begun_s = self._message_s = self.estimates.fresh_s = now_s
             self._level = Timer(self.steering.controller.update_period_s)
@@ -229,29 +266,35 @@ class LifeCycle:
                 orders += self._steer(now_s)
             case Phase.LANDING:
                 orders += self._land(now_s)
+            case Phase.STOPPING if self._stop.is_due(now_s):
+                orders.append(Arm(arm=False, force=True))
         return orders
 
     def _give_up(self, now_s: float) -> None:
         """End what has lasted too long."""
         if self._begun_s is None:
             return
-        passed_s = now_s - self._begun_s
-        if self.phase in _IN_FLIGHT and now_s - self._message_s > LOST_S + CONNECT_S:
-            self._finish("the link is lost: the autopilot acts by its own failsafe", good=False)
-        elif self.phase in (Phase.CLIMBING, Phase.FLYING) and now_s - self.estimates.fresh_s > LOST_S:
-            silent = now_s - self._message_s > LOST_S
-            what = "message" if silent else "estimate that is not late"
+        passed_s, silent_s = now_s - self._begun_s, now_s - self._message_s
+        name = "the autopilot" if self.stack is None else self.stack.name
+        if self.phase is Phase.LANDING and silent_s > LOST_S + CONNECT_S:
+            told = f"{name} was told to land for {passed_s:.0f} s, which it has not confirmed"
+            self._finish(f"the link is lost: {told}; it acts by its own failsafe", good=False)
+        elif self.phase is Phase.LANDING and passed_s > self._land_s:
+            told = f"{name} was told to land for {passed_s:.0f} s"
+            self._finish(f"{self._why}: {told}, and has not confirmed that it is disarmed", good=False)
+        elif self.phase is Phase.STOPPING and passed_s > STOP_S:
+            told = f"{name} was told to stop the motors for {passed_s:.0f} s"
+            self._finish(f"{self._why}: {told}, and has not confirmed that it is disarmed", good=False)
+        elif self.phase in _WITH_ESTIMATES and now_s - self.estimates.fresh_s > LOST_S:
+            what = "message" if silent_s > LOST_S else "estimate that is not late"
             self.land(f"no {what} has come for {LOST_S:g} s", good=False)
         elif self.phase in _LONGEST and passed_s > _LONGEST[self.phase]:
-            self._end_early()
+            self._end_early(name)
         elif self.phase is Phase.CLIMBING and passed_s > ARM_S + self.height_m / SLOWEST_M_S:
             self.land(f"{self.height_m:g} m were not reached within {passed_s:.0f} s", good=False)
-        elif self.phase is Phase.LANDING and passed_s > LAND_S:
-            self._finish(f"{self._why}: the drone has not landed within {LAND_S:.0f} s", good=False)
 
-    def _end_early(self) -> None:
-        """End before the flight, and say what is missing."""
-        name = "the autopilot" if self.stack is None else self.stack.name
+    def _end_early(self, name: str) -> None:
+        """End before the flight, and say what is missing; land if the drone may be armed."""
         says = f", and says: {self._last_text}" if self._last_text else ""
         if self.phase is Phase.CONNECTING:
             waited = f"no heartbeat has come within {CONNECT_S:.0f} s"
@@ -260,10 +303,7 @@ class LifeCycle:
             why = f"{self._preflight.missing()}{says}"
         else:
             why = f"{name} did not arm within {ARM_S:.0f} s{says}"
-        if self._armed:
-            self.land(why, good=False)
-        else:
-            self._finish(f"no flight: {why}", good=False)
+        self.land(why, good=False)
 
     def _check(self, now_s: float) -> list[Order]:
         """Ask for what is missing; go on once all is there and good."""
@@ -293,8 +333,15 @@ class LifeCycle:
             if self._mode != stack.guided:
                 orders += [SetMode(stack.guided)] if self._changes_mode.is_due(now_s) else []
             if self._mode == stack.guided or stack.climbs_by_set_points:
-                orders += [Arm(arm=True)] if self._arm.is_due(now_s) else []
+                orders += self._tell_to_arm(now_s)
         return orders
+
+    def _tell_to_arm(self, now_s: float) -> list[Order]:
+        """Return the order to arm, once a period; from the first one on the drone may be armed."""
+        if not self._arm.is_due(now_s):
+            return []
+        self._arm_s = now_s
+        return [Arm(arm=True)]
 
     def _hover_above(self) -> list[Order]:
         """Return the set-point above the place of take-off, of an autopilot that climbs by set-points."""
@@ -347,12 +394,12 @@ class LifeCycle:
             return [] if set_point is None else [set_point]
         self._accepted_s = now_s
         if self.phase is Phase.FLYING and away_m > self.farthest_m:
-            self.course = Place(estimate.position_m)
+            self.hold()
             self.land(f"the target is {away_m:.0f} m away, farther than {self.farthest_m:g} m", good=False)
         return [] if set_point is None else [set_point]
 
     def _land(self, now_s: float) -> list[Order]:
-        """Let the autopilot land; fly on until it has changed its mode."""
+        """Let the autopilot land, and disarm on the ground; fly on until it has changed its mode."""
         stack = self.stack
         if stack is None:
             return []
@@ -361,14 +408,14 @@ class LifeCycle:
             orders += [SetMode(stack.land)] if self._changes_mode.is_due(now_s) else []
             if self.steering.take_overs and not self._lands:
                 orders += self._steer(now_s)
-        elif self._landed and self._arm.is_due(now_s):
+        if self._landed and self._arm.is_due(now_s):
             orders.append(Arm(arm=False))
         return orders
 
     def _enter(self, phase: Phase) -> None:
-        """Begin a phase; its time begins with the next orders."""
-        self.phase, self._begun_s = phase, self._message_s
-        self._rest_s = self._accepted_s = self._message_s
+        """Begin a phase."""
+        self.phase, self._begun_s = phase, self._now_s
+        self._rest_s = self._accepted_s = self._now_s
         self._ask, self._arm, self._changes_mode = Timer(ASK_S), Timer(BEAT_S), Timer(BEAT_S)
 
     def _finish(self, sentence: str, *, good: bool) -> None:

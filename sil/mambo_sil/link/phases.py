@@ -14,6 +14,7 @@ class Phase(Enum):
     CLIMBING = "climbing"
     FLYING = "flying"
     LANDING = "landing"
+    STOPPING = "stopping the motors"
     ENDED = "ended"
 
 

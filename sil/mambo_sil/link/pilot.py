@@ -25,7 +25,7 @@ from mambo_sil.link.life_cycle import FARTHEST_M, LifeCycle
 from mambo_sil.link.links import SimulatedLink, UdpLink
 from mambo_sil.link.messages import send_order
 from mambo_sil.link.phases import Phase
-from mambo_sil.link.records import PX4, STACKS, EstimatedState, SetMode
+from mambo_sil.link.records import PX4, STACKS, EstimatedState
 from mambo_sil.link.signing import read_key
 from mambo_sil.link.sockets import parse_link
 from mambo_sil.link.steering import Steering, Update
@@ -36,8 +36,6 @@ LOWEST_M, HIGHEST_M = 0.3, 100.0
 NEAREST_BOUND_M, FARTHEST_BOUND_M = 1.0, 10_000.0
 """Bounds on the bound `farthest_m`."""
 LONGEST_S: Final = 36_000.0
-TOLD: Final = 3
-"""How often the autopilot is told to land by a pilot that ends at once: a message may be lost."""
 
 
 class Pilot:
@@ -55,7 +53,7 @@ class Pilot:
         controller: Controller,
         open_link: Callable[[], UdpLink],
         record: Callable[[Update], None] = lambda update: None,  # noqa: ARG005 - records nothing
-        watch: Callable[["Pilot"], None] = lambda pilot: None,  # noqa: ARG005 - shows nothing
+        watch: Callable[["Pilot"], None] | None = None,
         *,
         farthest_m: float = FARTHEST_M,
     ) -> None:
@@ -67,7 +65,7 @@ class Pilot:
             )
         self._open_link, self.steering = open_link, Steering(controller, record)
         self.life = LifeCycle(self.steering, 1.0, farthest_m)
-        self._watch, self._interrupts, self._interrupted = watch, 0, ""
+        self._watch, self._interrupts, self._interrupted = watch or _watch_nothing, 0, ""
 
     @classmethod
     def connect(
@@ -204,11 +202,10 @@ class Pilot:
         self._watch(self)
 
     def _abandon(self) -> None:
-        """Let the autopilot land: the pilot ends here."""
-        stack = self.life.stack
-        if stack is not None and self.life.is_flying:
-            for _ in range(TOLD):
-                send_order(self.link.mav, SetMode(stack.land), self.life.system, stack)
+        """Leave the course, whose targets may have failed, and land: `__exit__` waits for that."""
+        self._watch = _watch_nothing
+        self.life.hold()
+        self.life.land("the program has failed", good=False)
 
     @contextlib.contextmanager
     def _counted_interrupts(self) -> Iterator[None]:
@@ -244,6 +241,10 @@ class Pilot:
                     self._run(lambda: False)
         finally:
             self.link.close()
+
+
+def _watch_nothing(_: Pilot) -> None:
+    """Show nothing of a flight."""
 
 
 class _Arrival:
