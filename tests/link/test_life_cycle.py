@@ -374,7 +374,7 @@ def test_a_target_too_far_makes_it_land() -> None:
     ground = flying()
     ground.life.fly(Place(np.array([25.0, 0.0, -1.0])))
     ground.wait(0.1, height_m=1.0)
-    assert ground.landed == "landed: the target is 25 m away, farther than 20 m"
+    assert ground.landed == "landed: the target is 25 m away; farthest_m = 20"
 
 
 def test_a_controller_without_the_thrust_is_refused() -> None:

@@ -138,16 +138,49 @@ def test_a_link_with_a_key_hears_only_what_is_signed_with_it(
         assert (asked.get_type(), asked.get_signed()) == ("PARAM_REQUEST_READ", ours is not None)
 
 
-def test_a_signed_message_counts_once(sides: Any) -> None:
-    """Who records it and sends it again is not heard, though the ids and the signature are right."""
+def test_signed_messages_count_once_and_in_any_order(sides: Any) -> None:
+    """Who records them and sends them again is not heard, though the ids and the signature are right."""
     pilot, autopilot = sides[0](KEY), sides[1](KEY)
-    sent = list[bytes]()
-    autopilot.mav.file = type("Tee", (), {"write": lambda _, data: sent.append(bytes(data))})()
-    for record in (*RECORDS, Parameter("X", 1.0)):
-        send_record(autopilot.mav, record)
-    for data in (*sent, *sent):
+    records = [*RECORDS, Parameter("X", 1.0), Parameter("Y", 2.0)]
+    sent = signed(autopilot, records)
+    for place in (0, 3, 1, 2, 0, 1, 3):
+        autopilot.write(sent[place])
+    assert pilot.receive() == [records[place] for place in (0, 3, 1, 2)]
+
+
+def test_a_forged_time_stamp_far_ahead_does_not_silence_the_autopilot(sides: Any) -> None:
+    """It is not signed with the key, so it says nothing."""
+    pilot, autopilot = sides[0](KEY), sides[1](KEY)
+    sent = signed(autopilot, RECORDS)
+    forged = bytearray(sent[0])
+    forged[-12:-6] = (2**48 - 1).to_bytes(6, "little")
+    for data in (sent[0], bytes(forged), sent[1]):
         autopilot.write(data)
-    assert pilot.receive() == [*RECORDS, Parameter("X", 1.0)]
+    assert pilot.receive() == RECORDS
+
+
+def test_an_autopilot_without_a_clock_gets_that_of_the_pilot(sides: Any) -> None:
+    """Its first heartbeat may be of any time; from the answer on it signs with the pilot's."""
+    pilot, autopilot = sides[0](KEY), sides[1](KEY)
+    autopilot.mav.signing.timestamp = 1000
+    send_record(autopilot.mav, RECORDS[0])
+    send_record(autopilot.mav, RECORDS[1])
+    assert pilot.receive() == RECORDS
+    send_record(autopilot.mav, RECORDS[1])
+    assert pilot.receive() == []
+    pilot.mav.param_request_read_send(1, 1, b"X", -1)
+    assert autopilot.receive(1.0)
+    send_record(autopilot.mav, RECORDS[1])
+    assert pilot.receive() == [RECORDS[1]]
+
+
+def signed(autopilot: MavlinkSocket, records: list[Record]) -> list[bytes]:
+    """Return the signed messages of records, which are not sent."""
+    sent = list[bytes]()
+    autopilot.mav.file = type("Tape", (), {"write": lambda _, data: sent.append(bytes(data))})()
+    for record in records:
+        send_record(autopilot.mav, record)
+    return sent
 
 
 def write_key(path: Path, text: str, mode: int = 0o600) -> Path:

@@ -50,6 +50,9 @@ def test_a_simulated_flight_writes_a_log_that_replay_and_identify_read(settings:
         ("--link udp:127.0.0.1:14540 --vehicle drone.toml", "it is the drone of --simulate"),
         ("--simulate px4 --trajectory eight", "--trajectory eight must be bernoulli, gerono"),
         ("--simulate px4 --height-m 0", "height_m = 0.0 must"),
+        ("--simulate px4 --farthest-m 0", "farthest_m = 0.0 must lie in 1..10000"),
+        ("--simulate px4 --key link.key", "it signs the messages of --link: leave it out"),
+        ("--link udp:127.0.0.1:14540 --key link.key", "key link.key: cannot be read"),
     ],
 )
 def test_what_cannot_be_flown_is_refused(line: str, words: str) -> None:

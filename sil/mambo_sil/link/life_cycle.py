@@ -395,7 +395,7 @@ class LifeCycle:
         self._accepted_s = now_s
         if self.phase is Phase.FLYING and away_m > self.farthest_m:
             self.hold()
-            self.land(f"the target is {away_m:.0f} m away, farther than {self.farthest_m:g} m", good=False)
+            self.land(f"the target is {away_m:.0f} m away; farthest_m = {self.farthest_m:g}", good=False)
         return [] if set_point is None else [set_point]
 
     def _land(self, now_s: float) -> list[Order]:

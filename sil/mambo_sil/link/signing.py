@@ -33,6 +33,45 @@ def read_key(path: str | Path) -> bytes:
     return bytes.fromhex(digits.decode())
 
 
+LATEST: Final = UNITS_1_S // 2
+"""By how much the time stamp of a message may be behind the newest one: others may have overtaken it."""
+
+
+class SignedStreams:
+    """Decides which signed messages count: each once, in any order within half a second.
+
+    Pymavlink alone refuses all that is overtaken, and keeps the time stamps of forged messages too, after
+    which those of the autopilot are old.
+    """
+
+    def __init__(self) -> None:
+        self._newest: dict[tuple[int, int, int], int] = {}
+        self._seen: dict[tuple[int, int, int], set[int]] = {}
+
+    def check(self, parser: Any, data: bytes, system: int, component: int, *, first: bool) -> bool:
+        """Return whether a message is signed with the key of `parser`, pymavlink's, and is new.
+
+        A message may be a minute behind our clock, but the `first`, of an autopilot whose clock ours sets.
+        """
+        signing, ours = parser.signing, parser.signing.timestamp
+        signing.stream_timestamps.clear()
+        signing.timestamp = 0 if first else ours
+        is_right = type(parser).check_signature(parser, data, system, component)
+        signing.timestamp = max(ours, signing.timestamp)
+        if not is_right:
+            return False
+        stream, stamp = (data[-13], system, component), int.from_bytes(data[-12:-6], "little")
+        newest = max(stamp, self._newest.get(stream, 0))
+        seen = self._seen.setdefault(stream, set())
+        if stamp in seen or stamp <= newest - LATEST:
+            return False
+        if len(seen) >= 2 * LATEST:
+            seen.intersection_update(range(newest - LATEST, newest + 1))
+        self._newest[stream] = newest
+        seen.add(stamp)
+        return True
+
+
 def sign(mav: Any, key: bytes) -> None:
     """Let pymavlink's MAVLink object `mav` sign what it sends, and accept nothing else."""
     mav.signing.secret_key = key

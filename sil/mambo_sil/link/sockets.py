@@ -5,10 +5,12 @@ import errno
 import select
 import socket
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from mambo_codegen.errors import echo
 from mambo_sil.errors import LinkError
+from mambo_sil.link.signing import SignedStreams
 
 PILOT: Final = (245, 191)
 """System and component of the pilot: that of an onboard computer."""
@@ -60,7 +62,7 @@ class MavlinkSocket:
     ) -> None:
         self._dialect = dialect()
         self.mav: Any = self._dialect.MAVLink(self, *source)
-        self.peer = peer
+        self.peer, self._streams = peer, SignedStreams()
         self.has_refused = False
         """Whether a message has come that is not signed with the key."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -103,6 +105,7 @@ class MavlinkSocket:
         """Return the messages of a datagram; what is garbage in it costs none of the next one."""
         parser = self._dialect.MAVLink(None)
         parser.robust_parsing, parser.signing = True, self.mav.signing
+        parser.check_signature = partial(self._streams.check, parser, first=self.peer is None)
         found = list(parser.parse_buffer(data) or ())
         self.has_refused |= any(one.get_type() == "BAD_DATA" and "signature" in one.reason for one in found)
         return [one for one in found if one.get_type() != "BAD_DATA"]

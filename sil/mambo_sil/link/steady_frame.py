@@ -35,8 +35,8 @@ SETTLES_S, SETTLING_M = 1.0, 0.005
 """ArduCopter's estimator moves its position within half a second, by less in each step: for a time after a
 jump smaller changes of the position are taken for its rest."""
 LEAP_M, LEAP_M_S = 0.5, 4.0
-"""Change of the position, beyond the motion and for each second between two estimates, that an estimator makes
-only in a reset; one that does not count its resets moves its position by less in each step."""
+"""Change of the position beyond the motion, and more for each second between two estimates, that an estimator
+makes only in a reset; one that does not count its resets moves its position by less in each step."""
 _HALF: Final = 128
 """Half the range of the counter of resets."""
 FADING_1_S: Final = 1.05
