@@ -19,10 +19,12 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
+    Echo,
     EstimatedState,
     Heartbeat,
     Order,
     Parameter,
+    Ping,
     Record,
     SetAttitude,
     SetMode,
@@ -66,12 +68,25 @@ class Ground:
     def __init__(self, life: LifeCycle, stack: Stack = PX4) -> None:
         self.life, self.stack, self.now_s = life, stack, 100.0
         self.orders: list[Order] = life.orders(self.now_s)
+        self.trip_s = 0.0
+        """Time from a question about the delay of the link to its answer."""
+        self._asked: list[tuple[float, int]] = []
 
     def tell(self, *records: Record) -> None:
         """Let records come now."""
         for record in records:
             self.life.receive(record, self.now_s)
-        self.orders += self.life.orders(self.now_s)
+        self._listen()
+
+    def _listen(self) -> None:
+        """Take what is sent now, and answer what has come."""
+        for asked_s, number in self._asked:
+            if asked_s + self.trip_s <= self.now_s:
+                self.life.receive(Echo(number), self.now_s)
+        self._asked = [one for one in self._asked if one[0] + self.trip_s > self.now_s]
+        sent = self.life.orders(self.now_s)
+        self.orders += sent
+        self._asked += [(self.now_s, order.number) for order in sent if isinstance(order, Ping)]
 
     def wait(
         self,
@@ -208,6 +223,20 @@ def test_parameters_are_checked(hover: float, options: float, stack: Stack, word
     ground = Ground(life_cycle(), stack)
     ground.connect(hover, options)
     assert words in ground.sentence
+
+
+@pytest.mark.parametrize(("trip_s", "flies"), [(0.22, True), (0.26, False)], ids=["110-ms", "130-ms"])
+def test_a_link_with_a_long_delay_is_refused(trip_s: float, flies: bool) -> None:
+    """Of more than 120 ms each way, which half of what a question and its answer take says."""
+    ground = Ground(life_cycle())
+    ground.trip_s = trip_s
+    ground.connect()
+    ground.wait(0.6)
+    assert (ground.life.phase is Phase.ARMING) is flies
+    if flies:
+        assert ground.life.delay_s == pytest.approx(0.11, abs=0.006)
+    else:
+        assert "a message takes 130 ms each way; with more than 120 ms the drone may swing" in ground.sentence
 
 
 def test_a_low_battery_is_refused() -> None:

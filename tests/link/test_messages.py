@@ -16,11 +16,13 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
+    Echo,
     EstimatedState,
     Heartbeat,
     OnGround,
     Order,
     Parameter,
+    Ping,
     Record,
     SetAttitude,
     SetMode,
@@ -124,6 +126,8 @@ ORDERS: list[tuple[Order, Stack]] = [
     (SetRate(Stream.ODOMETRY, 50.0), PX4),
     (TakeOff(2.0), ARDUCOPTER),
     (AskParameter("MPC_THR_HOVER"), PX4),
+    (Ping(0), PX4),
+    (Ping(12), ARDUCOPTER),
 ]
 
 
@@ -140,6 +144,8 @@ RECORDS: list[Record] = [
     OnGround(landed=True),
     Battery(0.42),
     Text("Preflight Fail"),
+    Echo(0),
+    Echo(12),
 ]
 
 

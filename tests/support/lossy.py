@@ -17,11 +17,13 @@ from mambo_sil.link.records import (
     Answer,
     Arm,
     AskParameter,
+    Echo,
     EstimatedState,
     Heartbeat,
     OnGround,
     Order,
     Parameter,
+    Ping,
     Record,
     SetAttitude,
     SetMode,
@@ -102,6 +104,8 @@ class TinyAutopilot:
                     self.armed = order.arm
             case TakeOff() if self.armed and self.mode == self.stack.guided:
                 self._aim_m = order.height_m
+            case Ping():
+                self.sent.append(Echo(order.number))
             case AskParameter():
                 self.sent.append(
                     Parameter(order.name, 0.5 if "THR" in order.name or "THST" in order.name else 8)

@@ -433,6 +433,7 @@ def pilot_folder(folder: Path) -> None:
         hover_parameter="MPC_THR_HOVER",
         hover_thrust=0.5,
         mean_thrust=0.49,
+        link_delay_s=0.002,
         jumps=1,
         pauses=0,
         refused=0,

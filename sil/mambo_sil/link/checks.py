@@ -10,10 +10,12 @@ from mambo_sil.link.records import (
     STACKS,
     AskParameter,
     Battery,
+    Echo,
     EstimatedState,
     Heartbeat,
     Order,
     Parameter,
+    Ping,
     Record,
     SetRate,
     Stack,
@@ -28,6 +30,9 @@ LANDED_HZ: Final = 5.0
 LONGEST_PERIODS: Final = 2.5
 """Update periods of the controller from one estimate to the next, at the median."""
 LEAST_ESTIMATES: Final = 50
+LEAST_ECHOES: Final = 5
+LONGEST_DELAY_S: Final = 0.12
+"""Delay of the link in each direction, at the median: beyond it the loop may oscillate."""
 
 
 def stack_of(heartbeat: Heartbeat) -> Stack | str:
@@ -55,8 +60,10 @@ class Preflight:
         self._parameters: dict[str, float] = {}
         self._battery: float | None = None
         self._estimates: list[EstimatedState] = []
+        self._pings_s: list[float] = []
+        self._trips_s: list[float] = []
 
-    def receive(self, record: Record) -> None:
+    def receive(self, record: Record, now_s: float) -> None:
         """Take a record that has come."""
         match record:
             case Parameter():
@@ -65,12 +72,24 @@ class Preflight:
                 self._battery = record.share
             case EstimatedState():
                 self._estimates.append(record)
+            case Echo() if record.number < len(self._pings_s):
+                self._trips_s.append(now_s - self._pings_s[record.number])
 
     def requests(self) -> list[Order]:
         """Return what to ask the autopilot for."""
         rates = [SetRate(stream, 1.0 / self._period_s) for stream in self._stack.streams]
         asked = map(AskParameter, self._missing_parameters())
         return [*rates, SetRate(Stream.EXTENDED_SYS_STATE, LANDED_HZ), *asked]
+
+    def ping(self, now_s: float) -> Order:
+        """Return what measures the delay of the link."""
+        self._pings_s.append(now_s)
+        return Ping(len(self._pings_s) - 1)
+
+    @property
+    def delay_s(self) -> float:
+        """The delay of the link each way: half of what a question and its answer take, at the median."""
+        return 0.5 * float(np.median(self._trips_s))
 
     @property
     def hover_thrust(self) -> float:
@@ -86,11 +105,15 @@ class Preflight:
                 f"{self._stack.name} sends no position and attitude, or rarely: its estimator has none "
                 "yet, or the link is too slow"
             )
+        if len(self._trips_s) < LEAST_ECHOES:
+            return f"{self._stack.name} answers no TIMESYNC, which measures the delay of the link, or rarely"
         return None
 
     def fault(self) -> str | None:
         """Return the first fault of what has come; None if there is none."""
-        return self._parameter_fault() or self._estimate_fault() or self._battery_fault()
+        return (
+            self._parameter_fault() or self._estimate_fault() or self._delay_fault() or self._battery_fault()
+        )
 
     def _missing_parameters(self) -> list[str]:
         wanted = (self._stack.hover_parameter, *self._stack.needs)
@@ -122,6 +145,14 @@ class Preflight:
         if (tilt_rad := math.hypot(roll_rad, pitch_rad)) > LARGEST_TILT_RAD:
             return f"the drone is tilted by {math.degrees(tilt_rad):.0f} degrees: set it down level"
         return None
+
+    def _delay_fault(self) -> str | None:
+        if self.delay_s <= LONGEST_DELAY_S:
+            return None
+        return (
+            f"a message takes {1e3 * self.delay_s:.0f} ms each way; with more than "
+            f"{1e3 * LONGEST_DELAY_S:.0f} ms the drone may swing: use a quicker link"
+        )
 
     def _battery_fault(self) -> str | None:
         if self._battery is None or self._battery >= LEAST_BATTERY:

@@ -41,8 +41,8 @@ LOST_S: Final = 2.0
 """Time without an estimate after which the pilot lands, and without any message after which it ends."""
 REFUSED_S: Final = 0.5
 """How long the controller may refuse the state before the pilot lands."""
-ASK_S, BEAT_S = 0.5, 1.0
-"""Periods of repeated requests and of heartbeats."""
+ASK_S, BEAT_S, PING_S = 0.5, 1.0, 0.1
+"""Periods of repeated requests, of heartbeats, and of what measures the delay of the link."""
 FARTHEST_M: Final = 20.0
 """Distance from the drone to its target beyond which the pilot lands, unless it is given another."""
 STOPS_S: Final = 0.05
@@ -72,6 +72,8 @@ class LifeCycle:
         """Why no heartbeat may be heard, as the link knows it."""
         self.stack: Stack | None = None
         self.system = 0
+        self.delay_s = math.nan
+        """The delay of the link in each direction, as measured before the flight."""
         self.estimates = Estimates()
         self.course: TargetCourse = Place(np.zeros(3))
         self.course_time_s = 0.0
@@ -94,6 +96,7 @@ class LifeCycle:
         self._now_s = self._message_s = self._rest_s = self._accepted_s = 0.0
         self._land_s = LAND_S
         self._beat, self._ask, self._level = Timer(BEAT_S), Timer(ASK_S), Timer(0.0)
+        self._ping = Timer(PING_S)
         self._arm, self._changes_mode, self._stop = Timer(BEAT_S), Timer(BEAT_S), Timer(STOPS_S)
 
     # What the pilot is told to do.
@@ -160,7 +163,7 @@ class LifeCycle:
             self._silence_s = now_s
         self._message_s = now_s
         if self._preflight is not None and self.phase is Phase.CHECKING:
-            self._preflight.receive(record)
+            self._preflight.receive(record, now_s)
         match record:
             case Heartbeat():
                 self._receive_heartbeat(record, now_s)
@@ -311,11 +314,13 @@ class LifeCycle:
         if preflight is None:
             return []
         if preflight.missing() is not None or estimate is None:
-            return preflight.requests() if self._ask.is_due(now_s) else []
+            pings = [preflight.ping(now_s)] if self._ping.is_due(now_s) else []
+            return pings + (preflight.requests() if self._ask.is_due(now_s) else [])
         if fault := preflight.fault():
             self._finish(f"no flight: {fault}", good=False)
         else:
             self._place_m = estimate.position_m
+            self.delay_s = preflight.delay_s
             self.steering.hover_thrust = self.steering.mean_thrust = preflight.hover_thrust
             self._enter(Phase.ARMING)
         return []

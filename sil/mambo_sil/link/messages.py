@@ -25,11 +25,13 @@ from mambo_sil.link.records import (
     AskParameter,
     Battery,
     Beat,
+    Echo,
     EstimatedState,
     Heartbeat,
     OnGround,
     Order,
     Parameter,
+    Ping,
     Record,
     SetAttitude,
     SetMode,
@@ -53,6 +55,8 @@ TAKE_OFF, ARM, SET_INTERVAL = 22, 400, 511
 BY_FORCE: Final = 21196.0
 """Parameter 2 of the command to arm or disarm without checks."""
 
+ANSWERED: Final = 1
+"""Time of an answer to TIMESYNC: any but 0, which is that of a question."""
 ACCEPTED, DENIED = 0, 2
 """Results of a command."""
 
@@ -74,6 +78,8 @@ def send_order(mav: Any, order: Order, system: int, stack: Stack) -> None:
             mav.heartbeat_send(COMPANION, NO_AUTOPILOT, 0, 0, ACTIVE)
         case AskParameter():
             mav.param_request_read_send(system, 1, order.name.encode(), -1)
+        case Ping():
+            mav.timesync_send(0, order.number)
         case SetAttitude():
             q = quaternion(order.attitude_rad)
             ms = _milliseconds(order.time_s)
@@ -112,8 +118,8 @@ def _mode_parts(mode: int, stack: Stack) -> tuple[float, float]:
 def read_order(message: Any, stack: Stack) -> Order | None:
     """Return the order in a message; None for another one."""
     match message.get_type():
-        case "PARAM_REQUEST_READ":
-            return AskParameter(message.param_id)
+        case "PARAM_REQUEST_READ" | "TIMESYNC":
+            return _read_question(message)
         case "SET_ATTITUDE_TARGET" if message.type_mask == NO_RATES:
             attitude_rad = _attitude(message.q)
             if attitude_rad is None:
@@ -125,6 +131,12 @@ def read_order(message: Any, stack: Stack) -> Order | None:
         case "COMMAND_LONG":
             return _read_command(message, stack)
     return None
+
+
+def _read_question(message: Any) -> Order | None:
+    if message.get_type() == "PARAM_REQUEST_READ":
+        return AskParameter(message.param_id)
+    return Ping(message.ts1) if message.tc1 == 0 else None
 
 
 def _read_command(message: Any, stack: Stack) -> Order | None:
@@ -159,6 +171,8 @@ def send_record(mav: Any, record: Record, stream: Stream | None = None) -> None:
             mav.sys_status_send(0, 0, 0, 0, 12000, -1, share, 0, 0, 0, 0, 0, 0)
         case Text():
             mav.statustext_send(4, record.text.encode())
+        case Echo():
+            mav.timesync_send(ANSWERED, record.number)
         case EstimatedState():
             _send_estimate(mav, record, stream)
 
@@ -197,6 +211,8 @@ def _read_record(message: Any) -> Record | None:
             found = Battery(message.battery_remaining / 100.0)
         case "STATUSTEXT":
             found = Text(message.text)
+        case "TIMESYNC" if message.tc1:
+            found = Echo(message.ts1)
     return found
 
 

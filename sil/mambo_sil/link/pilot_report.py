@@ -53,6 +53,8 @@ class PilotSummary(ReportedSummary):
     """The share of the largest thrust that the autopilot's parameter gives for hover."""
     mean_thrust: Number
     """The one that the flight needed, in the mean of its last seconds."""
+    link_delay_s: Number
+    """Delay of the link in each direction, as measured before the flight."""
     jumps: int
     pauses: int
     refused: int
@@ -82,6 +84,7 @@ class PilotSummary(ReportedSummary):
                 "hover_parameter": None if stack is None else stack.hover_parameter,
                 "hover_thrust": steering.hover_thrust,
                 "mean_thrust": steering.mean_thrust,
+                "link_delay_s": life.delay_s,
                 "jumps": steering.frame.jumps,
                 "pauses": max(steering.take_overs - 1, 0),
             }
@@ -129,6 +132,7 @@ def _rows(summary: PilotSummary) -> list[tuple[str, str]]:
             "thrust of hover",
             f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",
         ),
+        ("link", f"{1e3 * summary.link_delay_s:.0f} ms each way, before the flight"),
         ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
     ]
 

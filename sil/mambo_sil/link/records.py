@@ -178,7 +178,14 @@ class Text:
     text: str
 
 
-Record = Heartbeat | EstimatedState | Parameter | Answer | OnGround | Battery | Text
+@dataclass(frozen=True)
+class Echo:
+    """The answer to a `Ping`, with its number."""
+
+    number: int
+
+
+Record = Heartbeat | EstimatedState | Parameter | Answer | OnGround | Battery | Text | Echo
 
 
 # What the pilot sends.
@@ -202,6 +209,13 @@ class AskParameter:
     """Send a parameter."""
 
     name: str
+
+
+@dataclass(frozen=True)
+class Ping:
+    """Answer at once with the same number, which is not negative."""
+
+    number: int
 
 
 @dataclass(frozen=True)
@@ -244,4 +258,4 @@ class SetAttitude:
     thrust: float
 
 
-Order = Beat | SetRate | AskParameter | SetMode | Arm | TakeOff | SetPosition | SetAttitude
+Order = Beat | SetRate | AskParameter | Ping | SetMode | Arm | TakeOff | SetPosition | SetAttitude

@@ -29,11 +29,13 @@ from mambo_sil.link.records import (
     Arm,
     AskParameter,
     Battery,
+    Echo,
     EstimatedState,
     Heartbeat,
     OnGround,
     Order,
     Parameter,
+    Ping,
     Record,
     SetAttitude,
     SetMode,
@@ -172,6 +174,8 @@ class SimulatedAutopilot:
                 self._rates[order.stream] = order.rate_hz
             case AskParameter():
                 self._send_parameter(order.name)
+            case Ping():
+                self._emit(Echo(order.number))
 
     def _change_mode(self, mode: int) -> bool:
         """Change the mode; PX4 refuses OFFBOARD without set-points."""
