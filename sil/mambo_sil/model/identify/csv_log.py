@@ -210,6 +210,12 @@ def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
     """
     signals, faults, remarks = {}, [], list(log.remarks)
     for name, signal in log.signals.items():
+        if not len(signal.time_s):
+            if name in REQUIRED:
+                faults.append(f"{log.name}: {echo(signal.column)} holds no number; {name} is needed")
+                break
+            remarks.append(f"{log.name}: {echo(signal.column)} holds no number: left out")
+            continue
         step_s = np.diff(signal.time_s)
         if (step_s < 0.0).any():
             at = int(np.argmax(step_s < 0.0))

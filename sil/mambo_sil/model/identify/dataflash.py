@@ -27,6 +27,7 @@ _MOTION: Final = {"x_m": "PN", "y_m": "PE", "z_m": "PD", "vx_m_s": "VN", "vy_m_s
 _BEGINS: Final = b"\xa3\x95\x80"
 """The definition of a message, which comes first."""
 _CLOCK: Final = "TimeUS"
+_DAMAGED: Final = "the log is damaged, or of another version; log another flight"
 _FASTER: Final = "log attitude fast (LOG_BITMASK: add 1, ATTITUDE_FAST)"
 _NO_SET_POINTS: Final = (
     f"has no {SET_POINTS}: without set-points of the attitude it shows only how the drone follows "
@@ -73,10 +74,11 @@ def _messages(path: Path) -> dict[str, Columns]:
                 raise LogError((f"{echo(str(path))}: is no DataFlash log: it begins otherwise",))
         reader: Any = DFReader_binary(str(path))
         with contextlib.closing(reader.filehandle), contextlib.closing(reader.data_map):
-            return _columns(reader)
+            return _columns(reader, echo(str(path)))
 
 
-def _columns(reader: Any) -> dict[str, Columns]:
+def _columns(reader: Any, name: str) -> dict[str, Columns]:
+    """Return the columns of each kind; raises LogError for one without a field that is needed."""
     wanted = {
         **dict.fromkeys(ATTITUDES, (_CLOCK, *_ANGLES.values())),
         SET_POINTS: (_CLOCK, *_COMMANDS.values(), "Thrust"),
@@ -85,8 +87,11 @@ def _columns(reader: Any) -> dict[str, Columns]:
     found: dict[str, list[list[float]]] = {}
     while (message := reader.recv_match(type=list(wanted))) is not None:
         kind = message.get_type()
+        if kind not in found and (lost := set(wanted[kind]) - set(message.get_fieldnames())):
+            fields = ", ".join(sorted(lost))
+            raise LogError((f"{name}: {kind} has no field {fields}; {_DAMAGED}",))
         if kind != MOTION or getattr(message, "C", 0) == 0:
-            row = [float(getattr(message, field, np.nan)) for field in wanted[kind]]
+            row = [float(getattr(message, field)) for field in wanted[kind]]
             found.setdefault(kind, []).append(row)
     return {kind: dict(zip(wanted[kind], np.array(rows).T, strict=True)) for kind, rows in found.items()}
 

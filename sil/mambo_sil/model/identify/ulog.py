@@ -83,6 +83,7 @@ _STEPS: Final[dict[str, tuple[str, float]]] = {
     **{f"{SHIFT}_{3 + k}": (f"velocity_shift[{k}]", 1.0) for k in range(3)},
     f"{SHIFT}_6": ("heading_shift", 1.0),
 }
+_DAMAGED: Final = "the log is damaged, or of another version; log another flight"
 _FASTER: Final = (
     "log at 50 Hz or more: SDLOG_PROFILE with high rate, or these lines, of topic and interval in ms, in "
     "etc/logging/logger_topics.txt on the SD card: "
@@ -98,8 +99,8 @@ def read_ulog(path: Path) -> FlightLog:
     """
     topics = _topics(path)
     name = echo(str(path))
-    steps = topics.get(STEPS, {})
-    if (flies := steps.get("active", np.zeros(0)) > 0.0).any():
+    steps = topics.get(STEPS)
+    if steps is not None and (flies := steps["active"] > 0.0).any():
         return demand_one_clock(FlightLog(name, _steps(steps, flies)), _CLOCK, f"log {STEPS} 0")
     return demand_one_clock(FlightLog(name, _signals(topics, name)), _CLOCK, _FASTER)
 
@@ -120,10 +121,9 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
     for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
         values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
         signals[f"{angle}_rad"] = stamped(attitude[_CLOCK], values, f"{ATTITUDE}.q")
-    signals |= _thrust(command, topics.get(HOVER, {}))
-    motion = topics.get(MOTION, {})
-    for signal, field in _MOTION.items():
-        if field in motion:
+    signals |= _thrust(command, topics.get(HOVER))
+    if (motion := topics.get(MOTION)) is not None:
+        for signal, field in _MOTION.items():
             signals[signal] = stamped(motion[_CLOCK], motion[field], f"{MOTION}.{field}")
     signals |= _seen(topics.get(VISION, {}))
     target = topics.get(TRAJECTORY, {})
@@ -131,9 +131,6 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
         for field in fields:
             if field in target and np.isfinite(target[field]).any():
                 signals[signal] = stamped(target[_CLOCK], target[field], f"{TRAJECTORY}.{field}")
-    empty = [signal for signal, each in signals.items() if not len(each.time_s)]
-    if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
-        raise LogError(tuple(faults))
     return signals
 
 
@@ -148,17 +145,32 @@ def _seen(vision: Mapping[str, FloatArray]) -> dict[str, Signal]:
     }
 
 
-def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
-    """Return the fields of the first instance of each topic."""
+class Topic(dict[str, FloatArray]):
+    """The fields (k,) of a topic; one that the log lacks raises LogError."""
+
+    def __init__(self, log: str, name: str, fields: Mapping[str, Any]) -> None:
+        super().__init__({field: np.asarray(values, np.float64) for field, values in fields.items()})
+        self._said = f"{log}: {name} has no field"
+
+    def __missing__(self, field: str) -> FloatArray:
+        raise LogError((f"{self._said} {field}; {_DAMAGED}",))
+
+
+def _topics(path: Path) -> dict[str, Topic]:
+    """Return the fields of the first instance of each topic.
+
+    A topic without time stamps makes pyulog lose other topics; so it is looked for before.
+    """
+    name, wanted = echo(str(path)), [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, VISION, STEPS]
     with reading(path, "ULog", "pyulog"), path.open("rb") as file:
         from pyulog import ULog  # noqa: PLC0415 - an optional extra
 
-        log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY, HOVER, VISION, STEPS])
-    return {
-        each.name: {field: np.asarray(values, np.float64) for field, values in each.data.items()}
-        for each in log.data_list
-        if each.multi_id == 0
-    }
+        log: Any = ULog(file, wanted)
+        for topic in wanted:
+            fields = getattr(log.message_formats.get(topic), "fields", [(_CLOCK,)])
+            if _CLOCK not in (field[-1] for field in fields):
+                raise LogError((f"{name}: {topic} has no field {_CLOCK}; {_DAMAGED}",))
+        return {each.name: Topic(name, each.name, each.data) for each in log.data_list if each.multi_id == 0}
 
 
 def _steps(steps: Mapping[str, FloatArray], flies: NDArray[np.bool_]) -> dict[str, Signal]:
@@ -175,11 +187,11 @@ def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     direct = [setpoint.get(f"{angle}_body") for angle in _ANGLES[:2]]
     if all(each is not None and np.isfinite(each).any() for each in direct):
         return {angle: each for angle, each in zip(_ANGLES, direct, strict=False) if each is not None}
-    parts = [setpoint.get(f"q_d[{i}]", np.full_like(setpoint[_CLOCK], np.nan)) for i in range(4)]
+    parts = [setpoint[f"q_d[{i}]"] for i in range(4)]
     return dict(zip(_ANGLES[:2], _euler_rad(parts)[:2], strict=True))
 
 
-def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray]) -> dict[str, Signal]:
+def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray] | None) -> dict[str, Signal]:
     """Return the commanded thrust, up positive, if there is one.
 
     It is over mass if PX4 has estimated the thrust of hover, else in the unit of the set-point.
@@ -187,8 +199,7 @@ def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray])
     values = setpoint.get(_THRUST)
     if values is None or not np.isfinite(values).any():
         return {}
-    valid = hover.get("valid", np.zeros(0)) > 0.0
-    if not valid.any():
+    if hover is None or not (valid := hover["valid"] > 0.0).any():
         return {THRUST_COMMAND: stamped(setpoint[_CLOCK], -values, f"-{SETPOINT}.{_THRUST}")}
     share = float(np.median(hover["hover_thrust"][valid]))
     column = f"-g*{SETPOINT}.{_THRUST}/{HOVER}"
