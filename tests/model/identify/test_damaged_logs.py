@@ -40,8 +40,7 @@ def refusal(path: Path, content: bytes) -> str | None:
     try:
         read_logs([path], {})
     except LogError as error:
-        assert len(error.faults) == 1
-        return str(error)
+        return " | ".join(error.faults)
     return None
 
 
@@ -55,7 +54,7 @@ def test_a_ulog_without_a_field_is_refused_in_one_sentence(tmp_path: Path) -> No
             assert said is None, said
         else:
             assert said is not None, (topic, field)
-            assert re.search(rf"log\.ulg: {topic} has no field {field}(\[0\])?; ", said), said
+            assert re.search(rf"log\.ulg: {topic} has no field {field}(\[0\])?; [^|]*$", said), said
     assert len(seen) == 6
 
 
@@ -74,14 +73,14 @@ def test_a_dataflash_log_without_a_field_is_refused_in_one_sentence(
     content = dataflash(WHOLE)
     unread = {"DesRoll", "DesPitch", "C", "Type"} | ({"Yaw"} if kind == "GUIA" else set())
     for field in labels.split(","):
-        lost = labels.replace(f"{field},", f"{field[:-1]}q,") if field != labels.split(",")[-1] else ""
-        lost = lost or f"{labels[:-1]}q"
+        lost = f"{labels},".replace(f",{field},", f",{field[:-1]}q,").removesuffix(",")
+        lost = lost.replace("TimeUS", "Timeus") if field == "TimeUS" else lost
         said = refusal(tmp_path / "log.bin", content.replace(labels.encode(), lost.encode()))
         if field in unread:
             assert said is None, said
         else:
             assert said is not None, field
-            assert re.search(rf"log\.bin: {kind} has no field {field}; ", said), said
+            assert re.search(rf"log\.bin: {kind} has no field {field}; [^|]*$", said), said
 
 
 def test_a_signal_without_a_number_is_left_out_or_refused(tmp_path: Path) -> None:
