@@ -11,7 +11,14 @@ from typing import Final
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.model.identify.motion import AS_LOGGED, Hypothesis, explained, fit_motion, heading_range_rad
+from mambo_sil.model.identify.motion import (
+    AS_LOGGED,
+    TURNED_RAD,
+    Hypothesis,
+    explained,
+    fit_motion,
+    heading_range_rad,
+)
 from mambo_sil.model.identify.segments import LARGEST_TILT_RAD, PERIOD_S, Segment
 from mambo_sil.model.identify.signals import (
     COMMANDS,
@@ -41,7 +48,6 @@ _CORRELATED, _RELATED, _MARGIN = 0.8, 0.5, 0.2
 _EXPLAINED, _CLEARLY = 0.5, 0.3
 """Share of the motion that a reading of the signs must explain, and its lead over the log's own reading."""
 
-TURNED_RAD: Final = 20.0 * DEGREE
 _CLOCK_S: Final = 0.08
 _SHIFTS_S: Final = tuple(0.02 * step for step in range(-15, 16))
 

@@ -13,6 +13,7 @@ of velocities that are differentiated positions: it has hardly any low frequenci
 solved linearly inside the search for lag and delay of F.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -36,6 +37,12 @@ SPAN_S: Final = 0.5
 """Time over which both sides are integrated, and then averaged."""
 EDGE_S: Final = 0.5
 """Beginning and end of a stretch that the fit leaves out: the filter does not know what is beyond."""
+TURNED_RAD: Final = math.radians(20.0)
+"""Range of the heading below which neither its sense nor a steady wind shows."""
+DRAUGHT_M_S: Final = 0.5
+"""Steady wind that the interval of a trim allows for at a constant heading."""
+ATTITUDE_RAD: Final = 0.005
+"""Constant error of the measured attitude that it always allows for."""
 _LEAST_POWER: Final = 1e-6
 """Mean square of the velocity increments, in m^2/s^2, below which the drone does not move."""
 _STRIDE: Final = 5
@@ -101,8 +108,9 @@ def explained(segments: Sequence[Segment], hypothesis: Hypothesis = AS_LOGGED) -
 def fit_motion(segments: Sequence[Segment]) -> Motion:
     """Fit the parameters on all stretches that have velocities; raises ValueError if there is none.
 
-    A controller tilts against gusts, which biases the share of g by up to about what the fit leaves
-    unexplained; its interval is widened by that.
+    A controller tilts against gusts, which biases the share of g and the drag by up to about what the fit
+    leaves unexplained; their intervals are widened by that. At a constant heading a steady wind looks like a
+    trim, and an attitude that is measured wrong always does.
     """
     moved = [(each, _rates(each, AS_LOGGED)) for each in _moved(segments)]
 
@@ -131,12 +139,15 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     share, drag, *trims = found.tolist()
     error = np.concatenate(errors)
     left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
+    surplus_rad = ATTITUDE_RAD
+    if heading_range_rad([each for each, _ in moved]) < TURNED_RAD:
+        surplus_rad += abs(drag) * DRAUGHT_M_S / (abs(share) * GRAVITY_M_S2)
     return Motion(
         Interval(share, within[0] + left * abs(share)),
-        Interval(drag, within[1]),
+        Interval(drag, within[1] + left * abs(drag)),
         (
-            Interval(trims[0] / share, abs(within[2] / share)),
-            Interval(trims[1] / share, abs(within[3] / share)),
+            Interval(trims[0] / share, abs(within[2] / share) + surplus_rad),
+            Interval(trims[1] / share, abs(within[3] / share) + surplus_rad),
         ),
         Interval(float(late[0]), within[4] + SURPLUS_S),
         1.0 - left,
