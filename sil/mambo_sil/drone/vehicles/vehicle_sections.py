@@ -176,9 +176,17 @@ class Uncertainty(VehicleSection):
     roll_gain: HalfWidth | None = Field(None, description="That of attitude.roll.gain.")
     roll_lag_s: HalfWidth | None = Field(None, description="That of attitude.roll.lag_s.")
     roll_dead_time_s: HalfWidth | None = Field(None, description="That of attitude.roll.dead_time_s.")
+    roll_split_s: HalfWidth | None = Field(
+        None,
+        description="Time of attitude.roll.lag_s that may be dead time, or the reverse.",
+    )
     pitch_gain: HalfWidth | None = Field(None, description="That of attitude.pitch.gain.")
     pitch_lag_s: HalfWidth | None = Field(None, description="That of attitude.pitch.lag_s.")
     pitch_dead_time_s: HalfWidth | None = Field(None, description="That of attitude.pitch.dead_time_s.")
+    pitch_split_s: HalfWidth | None = Field(
+        None,
+        description="Time of attitude.pitch.lag_s that may be dead time, or the reverse.",
+    )
     acceleration_per_tilt_g: HalfWidth | None = Field(
         None, description="That of attitude.acceleration_per_tilt_g."
     )

@@ -18,14 +18,22 @@ _KEYS: Final = {
         "attitude.acceleration_per_tilt_g",
         "thrust.gain",
     ),
-    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s", "thrust.lag_s"),
+    "lag_s": (
+        "attitude.roll.lag_s",
+        "attitude.pitch.lag_s",
+        "thrust.lag_s",
+        "attitude.roll.split_s",
+        "attitude.pitch.split_s",
+    ),
     "dead_time_s": ("attitude.roll.dead_time_s", "attitude.pitch.dead_time_s"),
     "drag_1_s": ("body.drag_1_s",),
 }
 """Keys of a vehicle.toml on which margins depend, by the property of the loop that they set.
 
 Keys of one property go to the same end: the keys of one axis multiply, and the axes do not act on each other.
+A split is no key of the file: it makes the lag longer and the dead time shorter, at the same sum.
 """
+_SPLIT: Final = "split_s"
 _RANGES: Final = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}
 _RANGE: Final = (0.1, 3.0)
 
@@ -72,6 +80,9 @@ def at_ends(drone: VehicleFile, ends: Ends) -> VehicleFile:
     for name, keys in intervals(drone).items():
         for key, width in keys:
             section, last = _section(document, key), key.rpartition(".")[2]
+            if last == _SPLIT:
+                _split(section, ends[name] * width)
+                continue
             low, high = _RANGES.get(last, _RANGE)
             section[last] = min(max(section[last] + ends[name] * width, low), high)
     if "thrust" in document:
@@ -101,4 +112,13 @@ def _section(document: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def _has(document: dict[str, Any], key: str) -> bool:
-    return key.rpartition(".")[2] in _section(document, key)
+    last = key.rpartition(".")[2]
+    return ("lag_s" if last == _SPLIT else last) in _section(document, key)
+
+
+def _split(axis: dict[str, Any], longer_s: float) -> None:
+    """Make the lag of an axis longer and its dead time shorter by the same time, as far as both may go."""
+    lag_s, dead_time_s = axis["lag_s"], axis["dead_time_s"]
+    (shortest_s, _), (least_s, longest_s) = _RANGES["lag_s"], _RANGES["dead_time_s"]
+    moved_s = min(max(longer_s, shortest_s - lag_s, dead_time_s - longest_s), dead_time_s - least_s)
+    axis["lag_s"], axis["dead_time_s"] = lag_s + moved_s, dead_time_s - moved_s
