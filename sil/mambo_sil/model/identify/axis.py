@@ -132,6 +132,9 @@ def judge_axis(
     weak = _weaknesses(command_rad, duration_s(segments), fit)
     weak += [] if refused else _disagreement(pieces, axis, fit.whole)
     verdict: Verdict = "refused" if refused else "weak" if weak else "good"
+    known = (fit.intervals, fit.first_order)
+    if weak:
+        known = (fit.intervals.without_split(), fit.first_order.without_split())
     return AxisResult(
         verdict=verdict,
         reasons=refused or weak,
@@ -139,8 +142,8 @@ def judge_axis(
         held_out_r2=fit.r2,
         held_out_error_rad=fit.error_rad,
         other_error_rad=fit.other_error_rad,
-        fitted=None if refused else fit.intervals,
-        first_order=None if refused else fit.first_order,
+        fitted=None if refused else known[0],
+        first_order=None if refused else known[1],
         offset_rad=sum(fit.whole.offset_rad) / len(fit.whole.offset_rad),
         tilt_noise_rad=tilt_noise_rad,
     )

@@ -20,7 +20,7 @@ from mambo_codegen.plain_file import read_plain_file
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.columns import KNOWN, Column, choose_columns
-from mambo_sil.model.identify.signals import OPTIONAL, REQUIRED, TIME, FlightLog, Signal
+from mambo_sil.model.identify.signals import COMMANDS, OPTIONAL, REQUIRED, TIME, FlightLog, Signal
 
 LARGEST_FILE_BYTES: Final = 100_000_000
 LARGEST_VALUE: Final = 1e15
@@ -36,16 +36,21 @@ COUNTER_BITS: Final = (24, 32)
 WRAP_SHARE: Final = 64.0
 """A fall from the last to the first of this many parts of a counter's range is an end of the counter."""
 
-LONGEST_OPTIONAL_PERIOD_S: Final = 0.1
+LONGEST_RARE_PERIOD_S: Final = 0.12
+"""The same where what lies between two samples may be interpolated, which widens intervals."""
+LONGEST_OPTIONAL_PERIOD_S: Final = 0.12
 """Median time between two samples of position, velocity or yaw beyond which they are left out."""
 
 
 def read_csv(
-    path: Path, chosen: Mapping[str, Column], signals: Mapping[str, Sequence[Column]] = KNOWN
+    path: Path,
+    chosen: Mapping[str, Column],
+    signals: Mapping[str, Sequence[Column]] = KNOWN,
+    longest_period_s: float = LONGEST_PERIOD_S,
 ) -> FlightLog:
     """Read the log at `path`; `chosen` has the columns that the user named, `signals` the known ones of each.
 
-    Raises LogError, all faults.
+    Raises LogError, all faults; also for angles that come less often than every `longest_period_s`.
     """
     name = echo(str(path))
     rows = _rows(read_text(path))
@@ -59,7 +64,8 @@ def read_csv(
     values, faults, remarks = _values(rows, places, len(header))
     if faults:
         raise LogError(tuple(f"{name}: {fault}" for fault in faults))
-    return _log(name, columns, values, [f"{name}: {remark}" for remark in remarks])
+    log = _log(name, columns, values, [f"{name}: {remark}" for remark in remarks])
+    return demand_one_clock(log, columns[TIME].text, _FASTER, longest_period_s)
 
 
 def read_text(path: Path) -> str:
@@ -166,7 +172,7 @@ def _log(
         signals[signal] = Signal(time_s[there], column.factor * values[signal][there], column.text)
     if faults:
         raise LogError(tuple(faults))
-    return demand_one_clock(FlightLog(name, signals, tuple(remarks)), columns[TIME].text, _FASTER)
+    return FlightLog(name, signals, tuple(remarks))
 
 
 def _unwrapped(ticks: FloatArray) -> FloatArray:
@@ -202,10 +208,12 @@ def reading(path: Path, kind: str, package: str) -> Iterator[None]:
         raise LogError((f"{name}: is no {kind}: {echo(str(error))}",)) from error
 
 
-def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
+def demand_one_clock(
+    log: FlightLog, clock: str, fix: str, longest_period_s: float = LONGEST_PERIOD_S
+) -> FlightLog:
     """Return the log without repeated times and rare signals.
 
-    Raises LogError if times fall, or are in another unit.
+    Raises LogError if times fall, or are in another unit, or angles come too rarely.
     `fix` says how to log faster.
     """
     signals, faults, remarks = {}, [], list(log.remarks)
@@ -231,11 +239,17 @@ def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
         if name in OPTIONAL and period_s > LONGEST_OPTIONAL_PERIOD_S:
             remarks.append(f"{log.name}: {rate}: left out, because that is too rare")
             continue
-        if name in REQUIRED and not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
+        if name in REQUIRED and not SHORTEST_PERIOD_S <= period_s <= longest_period_s:
+            why = ", since nothing shows what happens in between" if period_s > longest_period_s else ""
             faults.append(
-                f"{log.name}: {rate}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: {fix}"
+                f"{log.name}: {rate}; that must be {SHORTEST_PERIOD_S:g}..{longest_period_s:g} s{why}: {fix}"
             )
             break
+        if name == COMMANDS[0] and period_s > LONGEST_PERIOD_S:
+            remarks.append(
+                f"{log.name}: {rate}: whether it was held in between is not known, so the intervals of lag "
+                f"and dead time are wider by {250.0 * period_s:.0f} ms; {fix}"
+            )
         signals[name] = Signal(signal.time_s[fresh], signal.value[fresh], signal.column)
     if faults:
         raise LogError(tuple(faults))

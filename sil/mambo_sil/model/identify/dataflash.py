@@ -15,7 +15,7 @@ import numpy as np
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.csv_log import demand_one_clock, reading
+from mambo_sil.model.identify.csv_log import LONGEST_PERIOD_S, demand_one_clock, reading
 from mambo_sil.model.identify.signals import DEGREE, THRUST_COMMAND, FlightLog, Signal, stamped
 
 ATTITUDES: Final = ("ANG", "ATT")
@@ -37,10 +37,11 @@ _NO_SET_POINTS: Final = (
 Columns = dict[str, FloatArray]
 
 
-def read_dataflash(path: Path) -> FlightLog:
+def read_dataflash(path: Path, longest_period_s: float = LONGEST_PERIOD_S) -> FlightLog:
     """Read commanded and measured angles, motion and thrust.
 
-    Raises LogError for a file that is no DataFlash log or lacks a message, and if pymavlink is not installed.
+    Raises LogError for a file that is no DataFlash log or lacks a message or a field, or whose angles come
+    less often than every `longest_period_s`, and if pymavlink is not installed.
     """
     name = echo(str(path))
     messages = _messages(path)
@@ -61,7 +62,7 @@ def read_dataflash(path: Path) -> FlightLog:
             signals[signal] = stamped(motion[_CLOCK], motion[field], f"{MOTION}.{field}")
     signals[THRUST_COMMAND] = stamped(set_points[_CLOCK], set_points["Thrust"], f"{SET_POINTS}.Thrust")
     signals = _between(signals, *(1e-6 * set_points[_CLOCK][[0, -1]]).tolist())
-    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
+    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER, longest_period_s)
 
 
 def _messages(path: Path) -> dict[str, Columns]:

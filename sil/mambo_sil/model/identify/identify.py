@@ -13,13 +13,13 @@ from mambo_sil.errors import LogError
 from mambo_sil.model.identify.axis import AxisFit, fit_axis, judge_axis
 from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, Checked, check_log, check_units
 from mambo_sil.model.identify.columns import Column
-from mambo_sil.model.identify.csv_log import read_csv
+from mambo_sil.model.identify.csv_log import LONGEST_RARE_PERIOD_S, read_csv
 from mambo_sil.model.identify.curves import Curves
 from mambo_sil.model.identify.dataflash import read_dataflash
 from mambo_sil.model.identify.estimator import estimator_errors
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
-from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, tumbled
+from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, is_rare, tumbled
 from mambo_sil.model.identify.signals import POSITION, TILTS, VELOCITY, FlightLog
 from mambo_sil.model.identify.thrust import fit_thrust
 from mambo_sil.model.identify.ulog import read_ulog
@@ -34,7 +34,7 @@ LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
 """Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
 
 
-READERS: Final[dict[str, Callable[[Path], FlightLog]]] = {".ulg": read_ulog, ".bin": read_dataflash}
+READERS: Final[dict[str, Callable[[Path, float], FlightLog]]] = {".ulg": read_ulog, ".bin": read_dataflash}
 """What reads the logs of autopilots, by ending: ULog of PX4, DataFlash of ArduPilot."""
 
 
@@ -56,7 +56,11 @@ def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> tuple[lis
             faults.append(f"{echo(str(path))}: is named twice; a log counts once")
             continue
         try:
-            logs.append(read_csv(path, columns) if read is None else read(path))
+            logs.append(
+                read_csv(path, columns, longest_period_s=LONGEST_RARE_PERIOD_S)
+                if read is None
+                else read(path, LONGEST_RARE_PERIOD_S)
+            )
         except LogError as error:
             mistaken |= not path.is_file()
             faults += error.faults
@@ -190,12 +194,15 @@ def _why_no_motion(moved: Sequence[Segment]) -> str:
 
 
 def _white_noise(logs: Sequence[FlightLog], names: Sequence[str]) -> float:
-    """Return the rms of the white noise of signals, from third differences of samples; NaN if absent."""
+    """Return the rms of the white noise of signals, from third differences of samples.
+
+    NaN if they are absent, or so rare that they move between two samples.
+    """
     parts = [
         np.diff(log.signals[name].value, 3) / math.sqrt(20.0)
         for log in logs
         for name in names
-        if name in log.signals
+        if name in log.signals and not is_rare(log.signals[name])
     ]
     return float(np.sqrt(np.median(np.concatenate(parts) ** 2) / 0.455)) if parts else math.nan
 

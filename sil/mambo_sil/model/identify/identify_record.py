@@ -1,5 +1,6 @@
 """The record of an identification: its summary and its result."""
 
+import math
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -54,7 +55,7 @@ class AxisResult:
     offset_rad: Number
     """Mean measured tilt at no command."""
     tilt_noise_rad: Number
-    """White noise of the measured tilt."""
+    """White noise of the measured tilt; NaN where that is rarely logged."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,11 @@ class IdentifySummary(ReportedSummary):
         parts: dict[str, AxisResult | ThrustResult] = {**self.axes}
         parts |= {} if self.thrust is None else {"thrust": self.thrust}
         said = [f"{name} is {one.verdict}: {reason}" for name, one in parts.items() for reason in one.reasons]
+        said += [
+            f"{name}: only the sum of lag and dead time is known, not how it splits"
+            for name, axis in self.axes.items()
+            if axis.fitted is not None and not axis.fitted.split_is_known
+        ]
         advice = [] if all(axis.verdict == "good" for axis in self.axes.values()) else [ADVICE]
         return CommandResult(
             f"Identification from {', '.join(log.name for log in self.logs)}",
@@ -187,6 +193,8 @@ def axis_cells(axis: AxisResult) -> list[str]:
     if fit is None or axis.first_order is None:
         return ["-"] * 6 + [r2, axis.verdict]
     times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
+    if not fit.split_is_known:
+        times[1:] = ["not known"] * 2
     integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
     plain = axis.first_order
     flown = f"{plain.gain.value:.3f}, {1e3 * plain.lag_s.value:.0f} + {1e3 * plain.delay_s.value:.0f} ms"
@@ -229,10 +237,9 @@ def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
     """Return name and value of the measured tilts' offset, of each noise and of the estimator's error."""
     tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
     offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
-    rows = [
-        ("roll, pitch at no command", f"{offsets} degrees"),
-        ("white noise of roll, pitch", f"{tilts} degrees"),
-    ]
+    rows = [("roll, pitch at no command", f"{offsets} degrees")]
+    if not any(math.isnan(axis.tilt_noise_rad) for axis in summary.axes.values()):
+        rows.append(("white noise of roll, pitch", f"{tilts} degrees"))
     for words, value, unit in (
         ("white noise of position", summary.noise.position_m, "m"),
         ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),

@@ -3,7 +3,7 @@
 from typing import Final
 
 from mambo_sil.model.identify.identify_record import IdentifySummary
-from mambo_sil.model.identify.response import Interval
+from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.results.number_format import three_digits
 
 UNKNOWN_MASS: Final = (
@@ -25,6 +25,8 @@ def model_text(summary: IdentifySummary) -> str:
     ]
     for key, value in summary.model.items():
         lines.append(f"{key} = {value!r}" + (f"  # +- {within[key]:.2g}" if key in within else ""))
+        fit = {f"{name}_delay_s": axis.fitted for name, axis in summary.axes.items()}.get(key)
+        lines += [] if fit is None else [each.strip() for each in (_of_split(fit),) if each]
     return "\n".join(lines) + "\n"
 
 
@@ -47,7 +49,9 @@ def vehicle_text(summary: IdentifySummary, mass_kg: float | None) -> str:
             raise ValueError(f"{name} has no model")
         found = {"gain": fit.gain, "lag_s": fit.lag_s, "dead_time_s": fit.delay_s}
         values = ", ".join(f"{key} = {_round(each.value)}" for key, each in found.items())
-        responses.append(f"{name} = {{ {values} }}")
+        responses.append(f"{name} = {{ {values} }}{_of_split(fit)}")
+        if not fit.split_is_known:
+            found = {"gain": fit.gain, "split_s": Interval(0.0, fit.split_s), "dead_time_s": fit.sum_s}
         within |= {f"{name}_{key}": each for key, each in found.items()}
     thrust, vertical = _thrust_lines(summary)
     within |= vertical
@@ -70,6 +74,14 @@ def vehicle_text(summary: IdentifySummary, mass_kg: float | None) -> str:
         *(f"{key} = {float(f'{each.within:.2g}')!r}" for key, each in within.items()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _of_split(fit: AxisParameters) -> str:
+    """Return a comment that says of an axis that only the sum of lag and dead time is known."""
+    if fit.split_is_known:
+        return ""
+    known = f"{fit.sum_s.value:.3f} +- {fit.sum_s.within:.3f} s"
+    return f"  # lag and dead time together: {known}; how it splits is not known"
 
 
 def _thrust_lines(summary: IdentifySummary) -> tuple[list[str], dict[str, Interval]]:

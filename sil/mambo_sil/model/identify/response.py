@@ -13,7 +13,7 @@ the model describes slow motion, in which a drone of higher order has another la
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,7 +24,8 @@ from scipy.optimize import least_squares
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.segments import PERIOD_S, Segment
 
-_LOW: Final = np.log([0.005, 0.001, 0.02])
+SHORTEST_DELAY_S: Final = 0.001
+_LOW: Final = np.log([0.005, SHORTEST_DELAY_S, 0.02])
 _HIGH: Final = np.log([2.0, 0.3, 10.0])
 """Bounds on lag, dead time (s) and integrator (1/s)."""
 _HIGH_SECOND_ORDER: Final = np.log([2.0, 0.3, 200.0])
@@ -43,6 +44,10 @@ DEAD_TIME_WIDENING: Final = 3.0
 SURPLUS_S: Final = 0.005
 """Factors on the 95 % intervals, and what is added to times. Residuals of real logs are correlated
 for longer than the window; with these factors the intervals hold from flight to flight."""
+
+SURPLUS_RARE_GAIN: Final = 0.01
+"""Added to the half-width of the gain, over it, where commands are rarely logged: cubics through their
+samples leave out a part of quick motion."""
 
 _LEAST_VARIANCE: Final = 1e-12
 """Least variance of the residuals that intervals assume."""
@@ -153,12 +158,28 @@ class AxisParameters:
     lag_s: Interval
     delay_s: Interval
     integral_1_s: Interval | None
+    split_is_known: bool = True
+    """Else only `sum_s` is: the lag may be anything from 0 up to it, as its interval says."""
+
+    @property
+    def split_s(self) -> float:
+        """By how much the lag may be longer or shorter, and the dead time the reverse, at the same sum."""
+        return max(self.lag_s.value, self.delay_s.value)
+
+    def without_split(self) -> "AxisParameters":
+        """Return the parameters with intervals of lag and dead time that hold every split of their sum."""
+        within_s = self.split_s + self.sum_s.within
+        lag_s, delay_s = (Interval(each.value, within_s) for each in (self.lag_s, self.delay_s))
+        return replace(self, lag_s=lag_s, delay_s=delay_s, split_is_known=False)
 
 
 def intervals(
     response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks, span: int = 1
 ) -> AxisParameters:
-    """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
+    """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened.
+
+    Of rarely logged commands the dead time is in the middle between that of moving and that of held ones.
+    """
     logs = response.logs
     slopes = [
         np.column_stack([_smooth(column, span) for column in each.T])
@@ -174,11 +195,14 @@ def intervals(
 
     lag, delay = response.lag_s, response.delay_s
     order = len(logs)
+    unknown_s = max(segment.command[axis].unknown_s for segment in segments)
+    surplus_s, known_s = SURPLUS_S + unknown_s, max(delay - unknown_s, SHORTEST_DELAY_S)
+    surplus_gain = SURPLUS_RARE_GAIN * response.gain if unknown_s else 0.0
     return AxisParameters(
-        gain=Interval(response.gain, half_width([0.0] * order + [1.0], WIDENING)),
-        sum_s=Interval(lag + delay, half_width([lag, delay], WIDENING) + SURPLUS_S),
-        lag_s=Interval(lag, half_width([lag], WIDENING) + SURPLUS_S),
-        delay_s=Interval(delay, half_width([0.0, delay], DEAD_TIME_WIDENING) + SURPLUS_S),
+        gain=Interval(response.gain, half_width([0.0] * order + [1.0], WIDENING) + surplus_gain),
+        sum_s=Interval(lag + known_s, half_width([lag, delay], WIDENING) + surplus_s),
+        lag_s=Interval(lag, half_width([lag], WIDENING) + surplus_s),
+        delay_s=Interval(known_s, half_width([0.0, delay], DEAD_TIME_WIDENING) + surplus_s),
         integral_1_s=Interval(response.integral_1_s, half_width([0.0, 0.0, response.integral_1_s], WIDENING))
         if order == 3
         else None,
@@ -224,7 +248,7 @@ def _unit_response(logs: FloatArray, segment: Segment, axis: int, zero: float) -
     else:
         (integral,) = rest
         top, bottom = _second_order_filter(lag, integral, zero)
-    return filter_command(top, bottom, command)
+    return segment.as_measured(axis, filter_command(top, bottom, command))
 
 
 def filter_command(top: FloatArray, bottom: FloatArray, command: FloatArray) -> FloatArray:

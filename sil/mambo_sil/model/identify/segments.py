@@ -30,6 +30,8 @@ PERIOD_S: Final = 0.01
 SETTLE_S: Final = 2.0
 """Beginning of each stretch that fits and judgements leave out, because the model does not know its past."""
 
+LONGEST_HELD_S: Final = 0.025
+"""Median time between two samples of a command up to which it is taken as held."""
 LONGEST_GAP_S: Final = 0.2
 LARGEST_TILT_RAD: Final = math.radians(45.0)
 TUMBLE_MARGIN_S: Final = 0.5
@@ -44,15 +46,23 @@ _VELOCITY_SPAN_S: Final = 0.1
 
 @dataclass(frozen=True, eq=False)
 class HeldCommand:
-    """A command that is held from each of its times (k,) to the next; its integral is exact."""
+    """A command that is held from each of its times (k,) to the next; its integral is exact.
+
+    Of a rarely logged one nobody knows what happened between two samples. It is taken as moving on evenly; if
+    it was held instead, a response to it is quicker than it seems, by half the period.
+    """
 
     time_s: FloatArray
     integral: FloatArray
     """Integral of the command (k,) from the first time on, in rad s."""
+    unknown_s: float = 0.0
+    """A quarter of the period of a rarely logged one: a response may be quicker by 0 to twice that."""
 
     @classmethod
     def of(cls, signal: Signal) -> "HeldCommand":
         """Return the command of a signal; the last value is held for ten more seconds."""
+        if is_rare(signal):
+            return replace(cls.of(_interpolate(signal)), unknown_s=0.25 * _mean_gap_s(signal))
         time_s = np.append(signal.time_s, signal.time_s[-1] + 10.0)
         steps = np.concatenate([[0.0], np.cumsum(np.diff(time_s) * signal.value)])
         first = signal.value[0]
@@ -62,6 +72,35 @@ class HeldCommand:
         """Return the mean (m,) over the grid period that ends at each time (m,)."""
         ends = np.interp(np.append(time_s[0] - PERIOD_S, time_s), self.time_s, self.integral)
         return np.asarray(np.diff(ends) / PERIOD_S)
+
+
+def is_rare(signal: Signal) -> bool:
+    """Return whether a signal changes between its samples by more than its use can leave out."""
+    return float(np.median(np.diff(signal.time_s))) > LONGEST_HELD_S
+
+
+def _mean_gap_s(signal: Signal) -> float:
+    """Return the mean length of the gap in which a time lies; gaps that no stretch spans do not count."""
+    gaps_s = np.diff(signal.time_s)
+    gaps_s = gaps_s[gaps_s <= LONGEST_GAP_S]
+    return float(gaps_s @ gaps_s / gaps_s.sum())
+
+
+def _interpolate(signal: Signal) -> Signal:
+    """Return values every 5 ms or less, each in the middle of its step, on cubics (Catmull and Rom 1974).
+
+    A gap that no stretch spans has one value, that before it.
+    """
+    knots_s, values = signal.time_s, signal.value
+    gaps_s, rises, slopes = np.diff(knots_s), np.diff(values), np.gradient(values, knots_s)
+    spanned = gaps_s <= LONGEST_GAP_S
+    counts = np.where(spanned, np.ceil(2.0 * gaps_s / PERIOD_S), 1.0).astype(np.int64)
+    at = np.repeat(np.arange(len(gaps_s)), counts)
+    step = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
+    x = np.where(spanned[at], (step + 0.5) / counts[at], 0.0)
+    bend = (1.0 - x) * (gaps_s * slopes[:-1] - rises)[at] - x * (gaps_s * slopes[1:] - rises)[at]
+    middle = values[at] + x * (rises[at] + (1.0 - x) * bend)
+    return Signal(knots_s[at] + step / counts[at] * gaps_s[at], middle, signal.column)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +127,19 @@ class Segment:
     """Whether `thrust` is over mass; else it has a unit of its own."""
     begun_s: float = 0.0
     """Time at which the log begins."""
+    tilt_times_s: tuple[FloatArray, FloatArray] | None = None
+    """Times at which rarely logged tilts were measured; None if that was often."""
 
     def command_means(self, axis: int, delay_s: float = 0.0) -> FloatArray:
         """Return the command (m,) of an axis, as the grid's period means, `delay_s` late."""
         return self.command[axis].means(self.time_s - delay_s)
+
+    def as_measured(self, axis: int, tilt_rad: FloatArray) -> FloatArray:
+        """Return a modelled tilt (m,) as a log would have it: interpolated where tilts are rarely logged."""
+        if self.tilt_times_s is None:
+            return tilt_rad
+        times_s = self.tilt_times_s[axis]
+        return np.interp(self.time_s, times_s, np.interp(times_s, self.time_s, tilt_rad))
 
     @property
     def counted(self) -> NDArray[np.bool_]:
@@ -123,6 +171,8 @@ def _cut_stretch(
 ) -> list[Segment]:
     """Return the stretches of a part (m,) without gaps that have neither tumble nor ground contact."""
     tilt_rad = np.stack([_onto(time_s, log.signals[name]) for name in TILTS])
+    times_s = log.signals[TILTS[0]].time_s, log.signals[TILTS[1]].time_s
+    tilt_times_s = times_s if any(is_rare(log.signals[name]) for name in TILTS) else None
     tumbling = np.asarray((np.abs(tilt_rad) > LARGEST_TILT_RAD).any(axis=0))
     flown = ~_widen(tumbling, TUMBLE_MARGIN_S)
     grounded = _grounded(log, time_s)
@@ -151,6 +201,7 @@ def _cut_stretch(
             thrust_command,
             THRUST_COMMAND not in log.signals,
             float(log.signals[COMMANDS[0]].time_s[0]),
+            tilt_times_s,
         )
         for a, b in _runs(flown)
         if (b - a) * PERIOD_S >= SHORTEST_S

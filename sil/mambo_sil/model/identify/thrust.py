@@ -50,8 +50,8 @@ LEAST_CHANGE, GOOD_CHANGE = 0.03, 0.05
 """Change of the thrust, over hover, below which the thrust is refused, and weak."""
 LEAST_R2, GOOD_R2 = 0.5, 0.8
 """Share of the changes of height that the model must explain in the windows that were held out."""
-SURPLUS_GAIN: Final = 0.01
-"""Added to the half-width of the gain, over it: a steady vertical wind of 0.1 m/s^2 looks like it."""
+SURPLUS_GAIN: Final = 0.015
+"""Added to the half-width of the gain, over it: a steady vertical wind of 0.15 m/s^2 looks like it."""
 SURPLUS_LAG_S: Final = 0.01
 """Added to the interval of the lag: the noise of the height comes back through the altitude loop."""
 SAG_WIDENING: Final = 2.5
@@ -243,7 +243,10 @@ def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
     covariance = newey_west(slopes, errors, 2 * SIZE)[2:, 2:]
     times_s = fit.times_s
     variance = max(float(times_s @ covariance @ times_s), 0.0)
-    return Interval(float(times_s.sum()), NORMAL_95 * WIDENING * variance**0.5 + SURPLUS_LAG_S)
+    unknown_s = max(each.thrust.unknown_s for each in segments if each.thrust is not None)
+    sum_s = float(times_s.sum())
+    lag_s = min(sum_s, max(sum_s - unknown_s, 2.0 * LAGS_S[0]))
+    return Interval(lag_s, NORMAL_95 * WIDENING * variance**0.5 + SURPLUS_LAG_S + unknown_s)
 
 
 def _hover(windows: Sequence[Windows], fit: _Fit) -> tuple[Interval, Interval]:

@@ -11,7 +11,7 @@ from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.csv_log import demand_one_clock, reading
+from mambo_sil.model.identify.csv_log import LONGEST_PERIOD_S, demand_one_clock, reading
 from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
@@ -91,18 +91,19 @@ _FASTER: Final = (
 )
 
 
-def read_ulog(path: Path) -> FlightLog:
+def read_ulog(path: Path, longest_period_s: float = LONGEST_PERIOD_S) -> FlightLog:
     """Read commanded and measured angles, motion and target; PX4 has the frames of this project.
 
     A log of the steps of our own flight mode is read in their place.
-    Raises LogError for a file that is no ULog or lacks a topic, and if pyulog is not installed.
+    Raises LogError for a file that is no ULog or lacks a topic or a field, or whose angles come less often
+    than every `longest_period_s`, and if pyulog is not installed.
     """
     topics = _topics(path)
     name = echo(str(path))
     steps = topics.get(STEPS)
     if steps is not None and (flies := steps["active"] > 0.0).any():
         return demand_one_clock(FlightLog(name, _steps(steps, flies)), _CLOCK, f"log {STEPS} 0")
-    return demand_one_clock(FlightLog(name, _signals(topics, name)), _CLOCK, _FASTER)
+    return demand_one_clock(FlightLog(name, _signals(topics, name)), _CLOCK, _FASTER, longest_period_s)
 
 
 def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[str, Signal]:
