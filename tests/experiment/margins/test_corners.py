@@ -93,6 +93,22 @@ def test_intervals_are_those_of_the_file() -> None:
     assert value_of(high, "attitude.pitch.gain") == value_of(drone, "attitude.pitch.gain")
 
 
+@pytest.mark.parametrize("split_s", [0.02, 1.0])
+def test_a_split_moves_lag_and_dead_time_at_the_same_sum(split_s: float) -> None:
+    """Of one axis, as far as both may go; the other axis moves by its lag."""
+    widths = f"\n[uncertainty]\nroll_split_s = {split_s}\npitch_lag_s = 0.01\n"
+    drone = vehicle_toml.parse(VEHICLES.text("crazyflie-flown") + widths, "mine", "mine.toml")
+    lag_s, dead_time_s, pitch_s = (
+        value_of(drone, f"attitude.{key}") for key in ("roll.lag_s", "roll.dead_time_s", "pitch.lag_s")
+    )
+    low, high = (at_ends(drone, ends) for ends in corners(drone))
+    shorter_s, longer_s = min(split_s, lag_s - 0.001), min(split_s, dead_time_s)
+    for moved, by_s, end in ((low, -shorter_s, -1), (high, longer_s, 1)):
+        assert value_of(moved, "attitude.roll.lag_s") == pytest.approx(lag_s + by_s)
+        assert value_of(moved, "attitude.roll.dead_time_s") == pytest.approx(dead_time_s - by_s, abs=1e-12)
+        assert value_of(moved, "attitude.pitch.lag_s") == pytest.approx(pitch_s + end * 0.01)
+
+
 def test_no_end_lies_outside_of_the_ranges_of_a_file() -> None:
     """Where the interval is wider than the range the drone is at its end, which the file's schema takes."""
     drone = uncertain_drone(factor=3000.0)

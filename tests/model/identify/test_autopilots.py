@@ -18,7 +18,8 @@ from mambo_sil.model.identify.signals import POSITION, SEEN, THRUST, THRUST_COMM
 from mambo_sil.results.terminal import result_text
 from tests.support.logs import Flown, Lifting, Truth, dataflash, fly, lift, log_of, ulog
 
-FLOWN = fly(Truth(), Flown(duration_s=20.0, yaw_rate_rad_s=0.4), 1)[0]
+TRUTH = Truth()
+FLOWN = fly(TRUTH, Flown(duration_s=20.0, yaw_rate_rad_s=0.4), 1)[0]
 HOVER = 0.37
 LIFTING = Lifting(hover_command=HOVER)
 DURATION_S, STEP_S, CAMERA_M = 90.0, 0.02, 0.002
@@ -73,29 +74,17 @@ def test_without_an_estimate_of_hover_the_thrust_has_its_own_unit(kind: str, tmp
     np.testing.assert_allclose(log.signals[THRUST_COMMAND].value, lifted()["thrust_command"], rtol=1e-5)
 
 
-def test_rare_angles_name_the_lines_that_px4_needs(tmp_path: Path) -> None:
-    """Of its default profile: a sample every 48 ms."""
-    path = tmp_path / "log.ulg"
-    rare = {name: values[::5] for name, values in FLOWN.items()}
-    path.write_bytes(ulog(rare, quaternion=True))
-    with pytest.raises(LogError) as raised:
-        read_logs([path], {})
-    for line in (
-        "vehicle_attitude_setpoint 10",
-        "vehicle_attitude 10",
-        "vehicle_local_position 10",
-        "hover_thrust_estimate 100",
-    ):
-        assert line in str(raised.value)
-    assert "logger_topics.txt" in str(raised.value)
-
-
 def test_rare_angles_name_the_bit_that_ardupilot_needs(tmp_path: Path) -> None:
-    """Its default is 10 Hz."""
+    """At 5 Hz; the 10 Hz of its default are taken."""
     path = tmp_path / "log.bin"
-    path.write_bytes(dataflash(FLOWN, every=10))
-    with pytest.raises(LogError, match=r"has a sample every 0.1 s .*LOG_BITMASK: add 1"):
+    path.write_bytes(dataflash(FLOWN, every=20))
+    with pytest.raises(LogError, match=r"has a sample every 0.2 s .*LOG_BITMASK: add 1"):
         read_logs([path], {})
+    path.write_bytes(dataflash(FLOWN, every=10))
+    (log,), _ = read_logs([path], {})
+    fit = identify([log])[0].roll.fitted
+    assert fit is not None
+    assert abs(fit.sum_s.value - TRUTH.lag_s[0] - TRUTH.delay_s[0]) <= fit.sum_s.within < 0.03
 
 
 def test_a_log_without_set_points_is_refused(tmp_path: Path) -> None:

@@ -1,16 +1,22 @@
 """What the fits find in logs with a known truth."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
+from mambo_sil.experiment.margins.corners import at_ends, corners
 from mambo_sil.model.identify.identify import identify
 from mambo_sil.model.identify.identify_record import IdentifySummary
+from mambo_sil.model.identify.identify_report import model_text, vehicle_text
 from mambo_sil.model.identify.motion import Motion, fit_motion
 from mambo_sil.model.identify.response import AxisParameters, Interval, filter_command
 from mambo_sil.model.identify.segments import cut
+from mambo_sil.results.terminal import result_text
 from tests.support.logs import NAMES, Array, Flown, Truth, drop_and_jitter, filter_velocity, fly, log_of
 
 TRUTH = Truth()
@@ -86,7 +92,24 @@ def test_one_frequency_cannot_tell_lag_from_dead_time() -> None:
         assert any("the lag is known within" in reason for reason in axis.reasons)
         assert abs(fit.gain.value - 1.0) < fit.gain.within < 0.05
         assert abs(fit.sum_s.value - lag_s - 0.03) < fit.sum_s.within < 0.02
-        assert abs(fit.lag_s.value - lag_s) < fit.lag_s.within
+        assert not fit.split_is_known
+        for one in (fit.lag_s, fit.delay_s):
+            assert one.value - one.within <= 0.0
+            assert one.value + one.within >= fit.sum_s.value
+    said = " ".join(result_text(summary.result(Path())).split())
+    assert "lag, ms not known not known dead time, ms not known not known" in said
+    assert "roll: only the sum of lag and dead time is known, not how it splits" in said
+    for text in (vehicle_text(summary, 0.5), model_text(summary)):
+        assert text.count("how it splits is not known") == 2
+    drone = vehicle_toml.parse(vehicle_text(summary, 0.5), "mine", "mine.toml")
+    assert drone.uncertainty is not None
+    assert drone.uncertainty.roll_lag_s is None
+    assert isinstance(drone.attitude, FirstOrderAttitude)
+    for ends in corners(drone):
+        moved = at_ends(drone, ends).attitude
+        assert isinstance(moved, FirstOrderAttitude)
+        for response, fit in zip((moved.roll, moved.pitch), fits(summary), strict=True):
+            assert abs(response.lag_s + response.dead_time_s - fit.sum_s.value) < fit.sum_s.within + 0.002
 
 
 @pytest.mark.parametrize(

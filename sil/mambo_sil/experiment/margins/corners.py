@@ -18,22 +18,17 @@ _KEYS: Final = {
         "attitude.acceleration_per_tilt_g",
         "thrust.gain",
     ),
-    "lag_s": (
-        "attitude.roll.lag_s",
-        "attitude.pitch.lag_s",
-        "thrust.lag_s",
-        "attitude.roll.split_s",
-        "attitude.pitch.split_s",
-    ),
+    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s", "thrust.lag_s"),
     "dead_time_s": ("attitude.roll.dead_time_s", "attitude.pitch.dead_time_s"),
     "drag_1_s": ("body.drag_1_s",),
 }
 """Keys of a vehicle.toml on which margins depend, by the property of the loop that they set.
 
 Keys of one property go to the same end: the keys of one axis multiply, and the axes do not act on each other.
-A split is no key of the file: it makes the lag longer and the dead time shorter, at the same sum.
 """
 _SPLIT: Final = "split_s"
+_SPLITS: Final = {"lag_s": (f"attitude.roll.{_SPLIT}", f"attitude.pitch.{_SPLIT}")}
+"""Of no key of the file: a longer lag with a shorter dead time, or the reverse, at the same sum."""
 _RANGES: Final = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}
 _RANGE: Final = (0.1, 3.0)
 
@@ -59,6 +54,7 @@ def intervals(drone: VehicleFile) -> dict[str, list[tuple[str, float]]]:
     document = drone.model_dump(exclude_none=True)
     found = {
         name: [(key, widths.get(_width_of(key), 0.0)) for key in keys if _has(document, key)]
+        + [(key, widths[_width_of(key)]) for key in _SPLITS.get(name, ()) if widths.get(_width_of(key))]
         for name, keys in _KEYS.items()
     }
     return {name: keys for name, keys in found.items() if any(width for _, width in keys)}
@@ -112,8 +108,7 @@ def _section(document: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def _has(document: dict[str, Any], key: str) -> bool:
-    last = key.rpartition(".")[2]
-    return ("lag_s" if last == _SPLIT else last) in _section(document, key)
+    return key.rpartition(".")[2] in _section(document, key)
 
 
 def _split(axis: dict[str, Any], longer_s: float) -> None:
