@@ -146,6 +146,8 @@ class Lifting:
     """Age of the measured height."""
     noise_m: float = 0.001
     gusts_m_s2: float = 0.03
+    error_m_s: float = 0.0
+    """Standard deviation of the error of the estimated climb, which lasts for 0.7 s and moves the height."""
 
     @property
     def gain(self) -> float:
@@ -182,15 +184,19 @@ def lift(truth: Lifting, seed: int = 1) -> dict[str, Array]:
     gusts = truth.gusts_m_s2 * np.sqrt(tick_s) * draws[:, 1:]
     height, climb, state, gust, seen_climb = 1.0, 0.0, 1.0, 0.0, 0.0
     noises_m = (truth.noise_m * draws[:, 0]).tolist()
+    errors = _estimate_errors(truth.error_m_s, row_s, rows, seed)
     seen = height + noises_m[0]
     table = np.empty((rows, 2))
-    inputs = zip(targets_m.tolist(), np.cos(tilts_rad).tolist(), noises_m, gusts.tolist(), strict=True)
-    for row, (target_m, level, noise_m, pushes) in enumerate(inputs):
+    inputs = zip(
+        targets_m.tolist(), np.cos(tilts_rad).tolist(), noises_m, errors, gusts.tolist(), strict=True
+    )
+    for row, (target_m, level, noise_m, (error_m_s, error_m), pushes) in enumerate(inputs):
         before, seen = seen, heights_m[-1] + noise_m
         seen_climb += row_s / (row_s + 0.03) * ((seen - before) / row_s - seen_climb)
-        wanted = frequency_rad_s * (frequency_rad_s * (target_m - seen) - 1.8 * seen_climb)
+        off_m, climbs_m_s = target_m - seen - error_m, seen_climb + error_m_s
+        wanted = frequency_rad_s * (frequency_rad_s * off_m - 1.8 * climbs_m_s)
         sent = min(max((1.0 + wanted / G) / level, 0.2), 1.8)
-        table[row] = truth.hover_command * sent, seen
+        table[row] = truth.hover_command * sent, seen + error_m
         for tick, push in enumerate(pushes):
             queue = [sent**truth.power, *queue[:-1]]
             target = queue[-1] ** 0.5 if truth.of_speed else queue[-1]
@@ -204,6 +210,15 @@ def lift(truth: Lifting, seed: int = 1) -> dict[str, Array]:
             heights_m = [height, *heights_m[:-1]]
     flat = dict.fromkeys(NAMES[:4], np.zeros(rows)) | {"roll_rad": tilts_rad}
     return {"time_s": time_s} | flat | {"thrust_command": table[:, 0], "z_m": -table[:, 1]}
+
+
+def _estimate_errors(error_m_s: float, row_s: float, rows: int, seed: int) -> list[tuple[float, float]]:
+    """Return the errors of climb and height in each row, as an autopilot's estimator makes them."""
+    keep = float(np.exp(-row_s / 0.7))
+    draws = error_m_s * np.sqrt(1.0 - keep * keep) * default_rng([seed, 1]).normal(size=(rows, 1, 1))
+    climbs = _correlated(keep, draws)
+    heights = _correlated(keep, row_s * climbs)
+    return list(zip(climbs[:, 0, 0].tolist(), heights[:, 0, 0].tolist(), strict=True))
 
 
 def draw_lifting(random: Generator) -> Lifting:

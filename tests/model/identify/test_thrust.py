@@ -76,6 +76,21 @@ def test_drawn_drones_are_found() -> None:
     assert np.median(widths) < 0.02
 
 
+@pytest.mark.long
+def test_an_estimator_that_errs_does_not_pass_for_a_lag() -> None:
+    """The controller answers its errors; the lag then found is too long, its interval holds the truth."""
+    truths = [
+        replace(TRUTH, lag_s=0.04, step_m=step_m, error_m_s=error_m_s, duration_s=40.0)
+        for error_m_s, step_m in ((0.1, 0.1), (0.15, 0.1), (0.15, 0.25))
+    ]
+    both = [(found(lift(truth, seed)), truth) for truth in truths for seed in (1, 2)]
+    known = [(result.lag_s, truth.late_s) for result, truth in both if result.lag_s is not None]
+    assert len(known) >= 4
+    late_s, widths_s = np.array([(lag.value - truth, lag.within) for lag, truth in known]).T
+    assert late_s.max() > 0.02
+    assert (2.0 * np.abs(late_s) < widths_s).all()
+
+
 @pytest.mark.parametrize("gusts_m_s2", [0.0, 0.03, 0.3])
 def test_hover_alone_is_refused(gusts_m_s2: float) -> None:
     """It shows the command of hover and no lag; the message says so, and what to fly."""

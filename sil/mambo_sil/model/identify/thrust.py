@@ -54,6 +54,10 @@ SURPLUS_GAIN: Final = 0.015
 """Added to the half-width of the gain, over it: a steady vertical wind of 0.15 m/s^2 looks like it."""
 SURPLUS_LAG_S: Final = 0.01
 """Added to the interval of the lag: the noise of the height comes back through the altitude loop."""
+EXPLAINED_R2, UNEXPLAINED_LAG_S = 0.98, 0.3
+"""Share of the height beyond which noise explains the rest, and what is added times the share below it: the
+controller answers the errors of an estimator, which looks like a thrust that is later by 0.1 to 0.3 s times
+that share."""
 SAG_WIDENING: Final = 2.5
 """Factor on the interval of the sag besides: slow gusts look like it."""
 VAGUE_LAG_S, UNKNOWN_LAG_S = 0.05, 0.1
@@ -95,7 +99,8 @@ def fit_thrust(segments: Sequence[Segment]) -> ThrustResult | None:
     if change < LEAST_CHANGE:
         return _refused(_calm(hover_command, change, moved_m), change)
     fit = _fit(shown)
-    r2, lag = _held_out_r2(shown), _lag(shown, fit)
+    r2 = _held_out_r2(shown)
+    lag = _lag(shown, fit, r2)
     hover, sag = _hover(cut_windows(shown, fit.logs), fit)
     weight_g = float(fit.values[0]) * hover.value / GRAVITY_M_S2
     if why := _refusal(moved_m, r2, weight_g, lag):
@@ -228,8 +233,8 @@ def _modelled(rates: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(values[0] * rates[0] + values[1] * rates[1])
 
 
-def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
-    """Return the sum of lag and dead time, with an interval like the angles'."""
+def _lag(segments: Sequence[Segment], fit: _Fit, r2: float) -> Interval:
+    """Return the sum of lag and dead time; its interval is wider by what is left unexplained."""
     windows = cut_windows(segments, fit.logs)
     columns = [[each.rates[0], each.rates[1]] for each in windows]
     for index in range(2):
@@ -244,9 +249,10 @@ def _lag(segments: Sequence[Segment], fit: _Fit) -> Interval:
     times_s = fit.times_s
     variance = max(float(times_s @ covariance @ times_s), 0.0)
     unknown_s = max(each.thrust.unknown_s for each in segments if each.thrust is not None)
+    surplus_s = SURPLUS_LAG_S + unknown_s + UNEXPLAINED_LAG_S * max(EXPLAINED_R2 - r2, 0.0)
     sum_s = float(times_s.sum())
     lag_s = min(sum_s, max(sum_s - unknown_s, 2.0 * LAGS_S[0]))
-    return Interval(lag_s, NORMAL_95 * WIDENING * variance**0.5 + SURPLUS_LAG_S + unknown_s)
+    return Interval(lag_s, NORMAL_95 * WIDENING * variance**0.5 + surplus_s)
 
 
 def _hover(windows: Sequence[Windows], fit: _Fit) -> tuple[Interval, Interval]:
