@@ -203,20 +203,29 @@ def design(
     """
     from mambo_codegen.settings import controller_toml
     from mambo_sil.drone.vehicles import vehicle_toml
-    from mambo_sil.model.derive.derived_flight import chosen_text
+    from mambo_sil.model.derive.derived_flight import choose_settings
     from mambo_sil.model.derive.derived_margins import missing_height
+    from mambo_sil.model.derive.reach import reach_words
 
     source, drone = echo(vehicle), vehicle_toml.load(vehicle)
     if sensors is not None:
         drone = drone.with_sensors(sensors)
-    text = chosen_text(drone, source, _relative(vehicle, output), acceleration)
-    settings = controller_toml.parse(text, f"settings for vehicle {source}")
-    if write_file(text, output, force=force):
+    with progress_bar("deriving"):
+        chosen = choose_settings(drone, source, _relative(vehicle, output), acceleration)
+    settings = controller_toml.parse(chosen.text, f"settings for vehicle {source}")
+    if write_file(chosen.text, output, force=force):
         name = echo(str(output))
         typer.echo(f"wrote {name}; next: mambo-nmpc fly {name}", err=True)
     if settings.height is None:
         typer.echo(sentence(missing_height(drone)), err=True)
-    if not _print_judgement(settings, drone):
+    if chosen.small_angles is not None:
+        typer.echo(sentence(f"tilt: small angles, since {chosen.small_angles}"), err=True)
+    typer.echo(sentence(reach_words(settings)), err=True)
+    with progress_bar("flying") as bar:
+        said, good = _judgement(settings, drone, bar)
+    for line in said:
+        typer.echo(sentence(line), err=True)
+    if not good:
         raise typer.Exit(1)
 
 
@@ -228,28 +237,33 @@ def _relative(vehicle: str, output: Path) -> str:
     return f"./{found}" if found in VEHICLE_NAMES else found
 
 
-def _print_judgement(settings: "Settings", drone: "VehicleFile") -> bool:
-    """Print how derived settings fly, and how far they are from instability; return whether they fly well.
+def _judgement(settings: "Settings", drone: "VehicleFile", bar: Bar) -> tuple[list[str], bool]:
+    """Return how derived settings fly, here and as an app, with their margins, and whether they fly well.
 
-    Margins of what does not fly well are printed only if they say why. Without a compiler say so.
+    Margins are no verdict; those of what does not fly well are said only if they say why. Without a compiler
+    nothing is flown, and nothing refused.
     """
+    from mambo_sil.api.app_flights import app_flight_of
     from mambo_sil.model.derive.derived_flight import fly_derived
     from mambo_sil.model.derive.derived_margins import judge_margins
 
+    fly_app = app_flight_of(drone)
     try:
-        flown = fly_derived(settings, drone)
+        flown = [fly_derived(settings, drone)]
+        if fly_app is not None:
+            bar.stage("flying the app on the desk")
+            flown.append(fly_app(settings, drone))
     except BuildError as error:
-        typer.echo(sentence(f"neither flown nor margins: {error}"), err=True)
-        return True
-    typer.echo(sentence(flown.words), err=True)
+        where = "flown" if fly_app is None else "flown here nor on the desk,"
+        return [f"neither {where} nor margins: {error}"], True
+    good, said = all(one.good for one in flown), [one.words for one in flown]
+    bar.stage("measuring margins")
     try:
         judged = judge_margins(settings, drone)
-        said = judged.lines() if flown.good or judged.warning else []
+        said += judged.lines() if good or judged.warning else []
     except FlightError as error:
-        said = [f"no margins: {error}"]
-    for line in said:
-        typer.echo(sentence(line), err=True)
-    return flown.good
+        said.append(f"no margins: {error}")
+    return said, good
 
 
 def tune(

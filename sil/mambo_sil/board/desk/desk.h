@@ -25,7 +25,7 @@ typedef struct {
     double accelerometer_bias_g[3];
     int sensors;                        /* DESK_MOCAP or DESK_FLOW_DECK */
     int camera_period_ms;
-    int camera_delay_ms;                /* at most 60 */
+    int camera_delay_ms;                /* at most 200 */
     int camera_offset_ms;               /* of the camera's, or the flow deck's, clock against the estimator's */
     double camera_noise_m;
     double flow_noise_counts;           /* of a frame of the flow deck, tenths of pixels */

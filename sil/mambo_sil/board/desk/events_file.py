@@ -59,7 +59,7 @@ class SensorsSection(FileSection):
     accelerometer_bias_g: _Vector = (0.0, 0.0, 0.0)
     gyroscope_bias_rad_s: _Vector = (0.0, 0.0, 0.0)
     camera_period_ms: int = Field(10, ge=1, le=1000)
-    camera_delay_ms: int = Field(10, ge=0, le=60)
+    camera_delay_ms: int = Field(10, ge=0, le=200)
     camera_noise_m: float = Field(0.001, ge=0.0, le=1.0)
     flow_noise_counts: float = Field(2.0, ge=0.0, le=100.0)
     initial_yaw_deg: float = Field(0.0, ge=-180.0, le=180.0)

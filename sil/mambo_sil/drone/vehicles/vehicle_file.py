@@ -16,6 +16,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     AnySensors,
     AutopilotSensors,
     Body,
+    FirmwareName,
     FirstOrderAttitude,
     FlowDeckSensors,
     MamboSensors,
@@ -148,6 +149,13 @@ class VehicleFile(VehicleSection):
             rule = f"needs its figures, [sensors], in the file of vehicle {echo(self.name)}"
             raise InvalidSettingsError((f"sensors = {spell(kind)} {rule}",))
         return self.model_copy(update={"sensors": plain[kind]})
+
+    @property
+    def firmware(self) -> FirmwareName | None:
+        """The firmware whose estimator measures, as far as the sensors say it."""
+        if isinstance(self.sensors, FlowDeckSensors):
+            return "crazyflie"
+        return self.sensors.estimator if isinstance(self.sensors, MocapSensors) else None
 
     @property
     def weight_n(self) -> float:

@@ -196,6 +196,10 @@ class Uncertainty(VehicleSection):
     thrust_lag_s: HalfWidth | None = Field(None, description="That of thrust.lag_s.")
 
 
+FirmwareName = Literal["crazyflie"]
+"""A firmware whose app `generate` writes."""
+
+
 class TrueState(VehicleSection):
     """Controller and loops get the true state."""
 
@@ -226,6 +230,11 @@ class MocapSensors(VehicleSection):
         description="Time constant of the low-pass on the difference quotient of positions; 0 for none."
     )
     attitude_noise_rad: Noise = Field(description="Standard deviation of roll, pitch and yaw.")
+    estimator: FirmwareName | None = Field(
+        None,
+        description="Firmware whose filter gets the positions, and flies on by its gyroscope: crazyflie. "
+        "`design` then flies its app too; other commands fly the filter of velocity_filter_s.",
+    )
 
 
 class FlowDeckSensors(VehicleSection):

@@ -16,13 +16,14 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import first_crash
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.flown_settings import FlownSettings
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.metrics import height_error_m
 from mambo_sil.flight.names import SENSORS_OF, SensorsName, TargetAcceleration
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.flight.trajectories import Circle, Hover, Trajectory
-from mambo_sil.model.derive.derived_settings import controller_text, wants_exact
+from mambo_sil.model.derive.derived_settings import controller_text, wants_exact, why_not_exact
 
 DURATION_S: Final = 10.0
 JUDGED_S: Final = 5.0
@@ -45,11 +46,11 @@ SWINGING_M_S: Final = 0.2
 
 
 @dataclass(frozen=True)
-class FlownSettings:
-    """Whether a drone flew well with its settings, in words."""
+class ChosenSettings:
+    """A controller.toml, and why it has small angles where the exact tilt was asked for or is of use."""
 
-    good: bool
-    words: str
+    text: str
+    small_angles: str | None
 
 
 def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
@@ -135,22 +136,41 @@ def _target_m(trace: Trace) -> FloatArray:
     return np.concatenate([trace.target[..., :2], -trace.target_height_m[..., np.newaxis]], axis=-1)
 
 
+def choose_settings(
+    drone: VehicleFile,
+    source: str,
+    vehicle: str | None = None,
+    acceleration: TargetAcceleration = "tracked",
+) -> ChosenSettings:
+    """Return the controller.toml that `design` writes: see `controller_text`.
+
+    With the exact thrust vector if it is of use, and the drone survives a circle that is too quick for it.
+    Small angles stay without a compiler.
+    """
+    plain = controller_text(drone, source, vehicle, acceleration=acceleration)
+    if not wants_exact(drone, acceleration):
+        why = None if acceleration == "tracked" else why_not_exact(drone)
+        return ChosenSettings(plain, why)
+    exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration)
+    settings = controller_toml.parse(exact, source)
+    try:
+        if flies_quick_circle(settings, drone):
+            return ChosenSettings(exact, None)
+    except BuildError:
+        return ChosenSettings(plain, "no compiler: not flown with the exact tilt")
+    rate_rad_s = quick_rate_rad_s(settings.limits.tilt_rad)
+    why = (
+        f"with the exact tilt, up to {settings.limits.tilt_rad:g} rad, it is lost on a circle of 1 m at "
+        f"{rate_rad_s:.2g} rad/s with rotors {SLOWER_ROTORS:g} times slower"
+    )
+    return ChosenSettings(plain, why)
+
+
 def chosen_text(
     drone: VehicleFile,
     source: str,
     vehicle: str | None = None,
     acceleration: TargetAcceleration = "tracked",
 ) -> str:
-    """Return the controller.toml that `design` writes: see `controller_text`.
-
-    With the exact thrust vector if it is of use, and the drone survives a circle that is too quick for it.
-    Small angles stay without a compiler.
-    """
-    if wants_exact(drone, acceleration):
-        exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration)
-        try:
-            if flies_quick_circle(controller_toml.parse(exact, source), drone):
-                return exact
-        except BuildError:
-            pass
-    return controller_text(drone, source, vehicle, acceleration=acceleration)
+    """Return the text alone that `choose_settings` returns."""
+    return choose_settings(drone, source, vehicle, acceleration).text

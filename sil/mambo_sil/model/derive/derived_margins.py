@@ -10,7 +10,7 @@ from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
-from mambo_sil.experiment.margins.axis_margins import Margins
+from mambo_sil.experiment.margins.axis_margins import PLACES, Margins
 from mambo_sil.experiment.margins.corners import Ends, at_ends, corners, intervals, uncertain
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.experiment.margins.margin_figures import verdict
@@ -37,8 +37,11 @@ class JudgedMargins:
     warning: str | None
 
     def lines(self) -> list[str]:
-        """Return what `design` prints."""
+        """Return what `design` prints: each axis, the loop whose margin is the least, and the warning."""
         said = [f"{verdict(axis)} ({self.where})" for axis in self.axes]
+        least = min((one for axis in self.axes for one in _reserves(axis)), default=None)
+        if least is not None and all(axis.stable for axis in self.axes):
+            said.append(f"least margin: {least[1]}")
         return [*said, *([] if self.warning is None else [f"warning: {self.warning}"])]
 
 
@@ -69,11 +72,22 @@ def _at(drone: VehicleFile, ends: Ends) -> VehicleFile:
     return at_ends(drone, ends) if ends else drone
 
 
+def _reserves(axis: Margins) -> Iterator[tuple[float, str]]:
+    """Yield the finite margins of an axis, each over the least that is not warned of, and in words."""
+    for place, loop in axis.loops.items():
+        if math.isfinite(loop.gain_up):
+            words = f"{axis.axis}, {loop.gain_up:.2g} times the gain at {PLACES[place]}"
+            yield loop.gain_up / LEAST_GAIN, words
+    if axis.command is not None and math.isfinite(axis.command.delay_s):
+        delay_s = axis.command.delay_s
+        yield delay_s / LEAST_DELAY_S, f"{axis.axis}, {1e3 * delay_s:.0f} ms more delay at the command"
+
+
 def _reserve(axis: Margins) -> float:
     """Return the least margin of an axis over the least that is not warned of; 0 if it is unstable."""
-    gains = [loop.gain_up / LEAST_GAIN for loop in axis.loops.values()]
-    delay = math.inf if axis.command is None else axis.command.delay_s / LEAST_DELAY_S
-    return float(min((*gains, delay))) if axis.stable else -axis.poles.growth_1_s
+    if not axis.stable:
+        return -axis.poles.growth_1_s
+    return min((reserve for reserve, _ in _reserves(axis)), default=math.inf)
 
 
 def _reserve_of(axes: Axes) -> float:

@@ -55,6 +55,9 @@ LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
 ESTIMATED_POSITION_M, ESTIMATED_VELOCITY_M_S, SLOW_DISTURBANCE_M_S3 = 0.03, 1.0, 0.5
 """Noise densities of the observer."""
+LONGEST_AGE_S: Final = 0.2
+LONGEST_GYROSCOPE_AGE_S: Final = 0.02
+"""With a firmware's filter, whose velocity and attitude are those of now: an older state shakes the drone."""
 
 QUICKEST_HEIGHT_S, SLOWNESS, CLIMB_WEIGHT = 0.1, 1.3, 2.0
 HEIGHT_DISTURBANCE_M_S3: Final = 1.5
@@ -90,6 +93,13 @@ def wants_exact(drone: VehicleFile, acceleration: TargetAcceleration = "tracked"
     """
     useful = acceleration != "tracked" or drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
     return useful and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
+
+
+def why_not_exact(drone: VehicleFile) -> str:
+    """Return why a larger tilt is of no use to a drone whose target says its acceleration."""
+    if isinstance(drone.sensors, MamboSensors):
+        return "the optical flow drifts in larger tilts"
+    return "the settings do not hold the height, which a larger tilt takes"
 
 
 def derive(
@@ -223,11 +233,7 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
         words = "Large, because the filter of the velocity makes it late"
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, words)
-        held_s = max(1.0 / sensors.position_rate_hz - UPDATE_PERIOD_S, 0.0) / 2.0
-        words = "As sensors.position_delay_s" + (
-            ", and half the time that a position is held" if held_s else ""
-        )
-        yield Derived("observer", "age_s", _round(min(sensors.position_delay_s + held_s, 0.2)), words)
+        yield _age(sensors)
     elif isinstance(sensors, FlowDeckSensors):
         words = "A flow deck's position is an integral: with less, commands rattle and take the thrust"
         yield Derived("observer", "position_noise", FLOW_POSITION_M, words)
@@ -253,6 +259,17 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         )
         yield Derived("observer", "disturbance_noise", CALM_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
+
+
+def _age(sensors: MocapSensors) -> Derived:
+    """Return the age of the state: all of the delay, unless a filter makes up for a part by its gyroscope."""
+    held_s = max(1.0 / sensors.position_rate_hz - UPDATE_PERIOD_S, 0.0) / 2.0
+    age_s, most_s = sensors.position_delay_s + held_s, LONGEST_AGE_S
+    words = "As sensors.position_delay_s" + (", and half the time that a position is held" if held_s else "")
+    if sensors.estimator is not None and age_s > LONGEST_GYROSCOPE_AGE_S:
+        most_s = LONGEST_GYROSCOPE_AGE_S
+        words += f"; at most {most_s:g}, since the estimator makes up for the rest by its gyroscope"
+    return Derived("observer", "age_s", _round(min(age_s, most_s)), words)
 
 
 def _limits(drone: VehicleFile, tilt: Derived) -> Iterator[Derived]:
