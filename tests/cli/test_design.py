@@ -22,6 +22,15 @@ acceleration_per_tilt_g = 0.95
 roll = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
 pitch = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
 """
+CAMERAS = """
+[sensors]
+kind = "mocap"
+position_noise_m = 0.001
+position_delay_s = 0.03
+velocity_filter_s = 0.03
+attitude_noise_rad = 0.003
+estimator = "crazyflie"
+"""
 
 
 @pytest.mark.long
@@ -29,15 +38,17 @@ def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
-    wrote, *height, flown, roll, pitch = said.splitlines()
+    wrote, *height, reach, flown, roll, pitch, least = said.splitlines()
     assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml"
     height_text = unwrapped("\n".join(height))
     assert height_text.startswith(
         "height: not in the settings, since the thrust is not known; by its altitude"
     )
+    assert reach == "largest horizontal acceleration: 4.5 m/s^2, by limits.tilt_rad = 0.5"
     assert flown == "flown for 10 s: stays at its target (true state)"
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")
+    assert re.fullmatch(r"least margin: (roll|pitch), .* at the command", least)
     assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
     run("fly", "controller.toml", "--no-pictures", "--duration-s", "20")
     assert json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["max_error_m"] < 0.2
@@ -131,10 +142,41 @@ def test_a_drone_without_settings_is_refused(old: str, new: str, said: str) -> N
 
 @pytest.mark.usefixtures("_no_tool")
 def test_without_a_compiler_the_file_is_written() -> None:
-    """And it says that nothing was flown."""
+    """And it says that nothing was flown, of a Crazyflie its app neither."""
     _, said = run("design", "crazyflie-flown")
-    assert "neither flown nor margins: no C compiler found" in said
+    assert "neither flown here nor on the desk, nor margins: no C compiler found" in unwrapped(said)
     assert load("controller.toml").cost.norm == "quadratic"
+    _, said = run("design", "generic", "--force")
+    assert "neither flown nor margins: no C compiler found" in said
+
+
+@pytest.mark.long
+def test_the_flight_of_the_app_is_the_verdict() -> None:
+    """A Crazyflie whose tilt answers by a half of what its file says flies here, and shakes on the desk."""
+    Path("mine.toml").write_text(DRONE.replace("0.9, lag_s = 0.06", "0.4, lag_s = 0.1") + CAMERAS, "utf-8")
+    _, said = run("design", "mine.toml", code=1)
+    assert "flown for 10 s: stays at its target (through sensors mocap)\n" in said
+    assert "flown on the desk, cameras 30 ms late: hover SHAKES, by commands of 0." in unwrapped(said)
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("vehicle", "why"),
+    [
+        ("generic", "since the settings do not hold the height, which a larger tilt takes"),
+        ("mambo", "since the optical flow drifts in larger tilts"),
+        (
+            "hummingbird",
+            "since with the exact tilt, up to 1.03 rad, it is lost on a circle of 1 m at 4.9 rad/s",
+        ),
+    ],
+)
+def test_a_wish_for_tilt_that_is_not_met_is_told(vehicle: str, why: str) -> None:
+    """With the reason; not where nobody asked."""
+    _, said = run("design", vehicle, "--acceleration", "given")
+    assert f"tilt: small angles, {why}" in unwrapped(said)
+    _, said = run("design", "crazyflie", "--acceleration", "given", "-o", "-")
+    assert "small angles" not in said
 
 
 def test_a_thrust_that_cannot_lift_is_refused() -> None:

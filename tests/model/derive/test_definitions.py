@@ -96,6 +96,15 @@ def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_
     )
 
 
+@pytest.mark.parametrize(("delay_s", "age_s"), [(0.01, 0.01), (0.019, 0.019), (0.021, 0.02), (0.06, 0.02)])
+def test_the_age_behind_a_crazyflie_s_filter_is_at_most_20_ms(delay_s: float, age_s: float) -> None:
+    """It makes up for the rest by its gyroscope; the settings say so."""
+    sensors = {"position_delay_s": delay_s, "estimator": "crazyflie"}
+    drone = changed(GENERIC, sensors=sensors)
+    assert settings_for(drone).observer.age_s == age_s
+    assert ("by its gyroscope" in controller_text(drone, "x")) == (delay_s > 0.02)
+
+
 @pytest.mark.parametrize("noise_m", [0.0, 0.0005, 0.00105, 0.002, 0.3, 50.0])
 def test_the_noise_of_the_position_is_that_of_the_sensors(noise_m: float) -> None:
     """At least a millimetre, at most the 10 m that settings allow."""

@@ -58,8 +58,8 @@ def fly_trial(settings: Settings, drone: VehicleFile) -> FlownSettings:
                 words = f"flown on the desk{_late([sensors])}: {name} {judged.fault}"
                 return FlownSettings(good=False, words=words)
             farthest_m = max(farthest_m, judged.off_m)
-    names, most_mm = " and ".join(FLIGHTS), 1e3 * farthest_m
-    words = f"flown on the desk{_late(seen)}: {names} are calm, at most {most_mm:.0f} mm off"
+    names, off = " and ".join(FLIGHTS), "in height" if seen[0].kind == "flow-deck" else "off"
+    words = f"flown on the desk{_late(seen)}: {names} are calm, at most {1e3 * farthest_m:.0f} mm {off}"
     return FlownSettings(good=True, words=words)
 
 
@@ -105,7 +105,7 @@ def _fault(trace: DeskTrace, flight: EventsFile, farthest_m: float) -> str | Non
         late = trace.time_s > JUDGED_FROM_S
         shaking_rad = float(trace.command_rad[late].std(axis=0).max())
         if not shaking_rad < SHAKING_RAD:
-            return f"SHAKES, by commands of {shaking_rad:.2g} rad (rms)"
+            return f"SHAKES, by commands of {shaking_rad:.2g} rad (rms); raise cost.response_time_s"
     if not farthest_m < FAR_M:
         return f"is FAR OFF, by {farthest_m:.2g} m" if math.isfinite(farthest_m) else "is LOST"
     return None

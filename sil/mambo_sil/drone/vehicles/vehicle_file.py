@@ -1,5 +1,6 @@
 """A drone as data: the content of a vehicle.toml, the rules between its sections, and its JSON schema."""
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, Final, Self, get_args
@@ -34,7 +35,22 @@ SENSORS_HZ: Final = 200
 KINDS: Final = frozenset({"attitude", "sensors"})
 """Sections whose key `kind` decides which others they have."""
 
+_THRUST_OF_A_ROTOR: Final = (
+    "thrust_factor_n_s2",
+    "speed_squared_per_command_rad2_s2",
+    "command_max",
+)
+"""Keys of [rotors] whose product is the largest thrust of one."""
+_LARGEST: Final = 1e9
+"""Bound of most numbers in the sections."""
 _INERTIA: Final = ("inertia_x_kg_m2", "inertia_y_kg_m2", "inertia_z_kg_m2")
+
+
+def _number(document: Mapping[str, Any], section: str, key: str, default: float) -> float:
+    """Return a positive number in a document that is not checked yet, or a default."""
+    found = document.get(section)
+    value = found.get(key) if isinstance(found, Mapping) else None
+    return value if isinstance(value, int | float) and 0.0 < value <= _LARGEST else default
 
 
 class VehicleFile(VehicleSection):
@@ -54,21 +70,18 @@ class VehicleFile(VehicleSection):
     @model_validator(mode="before")
     @classmethod
     def _with_altitude(cls, document: Any) -> Any:
-        """Give a drone without an altitude loop one of 10 1/s^2 and 5 1/s, and twice its weight of thrust.
+        """Give a drone without an altitude loop one of 10 1/s^2 and 5 1/s, and the thrust of its rotors.
 
-        That is what it delivers for the largest demand.
+        Without rotors it delivers twice its weight for the largest demand.
         """
         if not isinstance(document, Mapping) or "altitude" in document:
             return document
-        body = document.get("body")
-        mass_kg = body.get("mass_kg") if isinstance(body, Mapping) else None
-        if not isinstance(mass_kg, int | float) or not 0.0 < mass_kg < 1e6:
-            mass_kg = 1.0  # the fault of the mass is reported
-        thrust = document.get("thrust")
-        gain = thrust.get("gain", 1.0) if isinstance(thrust, Mapping) else 1.0
-        if not isinstance(gain, int | float) or not 0.0 < gain < 1e6:
-            gain = 1.0  # likewise
-        thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2 / gain
+        # A fault of one of these values is reported by its own section.
+        mass_kg = min(_number(document, "body", "mass_kg", 1.0), 1e6)
+        thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2 / _number(document, "thrust", "gain", 1.0)
+        if isinstance(document.get("rotors"), Mapping):
+            figures = [_number(document, "rotors", key, 0.0) for key in _THRUST_OF_A_ROTOR]
+            thrust_max_n = min(4.0 * math.prod(figures), _LARGEST) or thrust_max_n
         gains = {"p_n_m": 10.0 * mass_kg, "d_n_s_m": 5.0 * mass_kg, "thrust_max_n": thrust_max_n}
         return {**document, "altitude": gains}
 
@@ -114,7 +127,8 @@ class VehicleFile(VehicleSection):
         if self.largest_thrust_n <= self.weight_n:
             weight = f"{self.hover_demand_n:.4g}, the weight of body.mass_kg"
             over = "" if self.thrust is None else " over thrust.gain"
-            yield self._fault("altitude", "thrust_max_n", f"must be more than {weight}{over}")
+            source = "" if self.rotors is None else "; without [altitude] it is that of the four rotors"
+            yield self._fault("altitude", "thrust_max_n", f"must be more than {weight}{over}{source}")
         rate_hz = self.attitude.rate_hz
         if isinstance(self.sensors, MocapSensors) and rate_hz % self.sensors.position_rate_hz != 0:
             yield self._fault(

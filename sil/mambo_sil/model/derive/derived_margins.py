@@ -74,10 +74,9 @@ def _at(drone: VehicleFile, ends: Ends) -> VehicleFile:
 
 def _reserves(axis: Margins) -> Iterator[tuple[float, str]]:
     """Yield the finite margins of an axis, each over the least that is not warned of, and in words."""
-    for place, loop in axis.loops.items():
-        if math.isfinite(loop.gain_up):
-            words = f"{axis.axis}, {loop.gain_up:.2g} times the gain at {PLACES[place]}"
-            yield loop.gain_up / LEAST_GAIN, words
+    for loop, where in zip((axis.command, axis.motors), PLACES.values(), strict=True):
+        if loop is not None and math.isfinite(loop.gain_up):
+            yield loop.gain_up / LEAST_GAIN, f"{axis.axis}, {loop.gain_up:.2g} times the gain at {where}"
     if axis.command is not None and math.isfinite(axis.command.delay_s):
         delay_s = axis.command.delay_s
         yield delay_s / LEAST_DELAY_S, f"{axis.axis}, {1e3 * delay_s:.0f} ms more delay at the command"
