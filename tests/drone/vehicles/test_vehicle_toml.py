@@ -196,3 +196,44 @@ def test_every_shipped_drone_is_documented() -> None:
     text = (DOCS / "reference" / "vehicles.md").read_text("utf-8")
     for name in vehicle_toml.names():
         assert f"\n| `{name}` | " in text
+
+
+def without_altitude(name: str) -> str:
+    """Return the file of a shipped drone without its [altitude]."""
+    return re.sub(r"(?ms)^\[altitude\].*?(?=^\[)", "", VEHICLES.text(name))
+
+
+def test_rotors_say_the_largest_thrust() -> None:
+    """Four at 1500 rad/s, ten weights; a drone without rotors has two."""
+    drone = vehicle_toml.parse(without_altitude("hummingbird"), "drone", "drone.toml")
+    assert drone.altitude.thrust_max_n == pytest.approx(4.0 * 5.57e-6 * 1500.0**2)
+    plain = vehicle_toml.parse(FLOWN, "drone", "drone.toml")
+    assert plain.altitude.thrust_max_n == pytest.approx(2.0 * 0.1 * 9.81)
+
+
+@pytest.mark.parametrize(
+    ("most", "fault"),
+    [
+        (
+            "100000.0",
+            "drone.toml: altitude.thrust_max_n = 2.228 (the default) must be more than 4.905, the weight",
+        ),
+        ("-1.0", "drone.toml: rotors.command_max = -1.0 must lie in "),
+        ('"a"', 'drone.toml: rotors.command_max = "a" must be a number'),
+    ],
+)
+def test_rotors_that_lift_nothing_are_refused(most: str, fault: str) -> None:
+    """With key, value and rule, once."""
+    text = re.sub("command_max = [0-9.]+", f"command_max = {most}", without_altitude("hummingbird"))
+    (found,) = refusals(text)
+    assert found.startswith(fault)
+
+
+def test_sensors_say_the_firmware() -> None:
+    """The app of a Crazyflie is flown by `design`; no other drone has one."""
+    firmware = {name: vehicle_toml.preset(name).firmware for name in vehicle_toml.names()}
+    assert {name for name, one in firmware.items() if one == "crazyflie"} == {
+        name for name in firmware if name.startswith("crazyflie")
+    }
+    assert vehicle_toml.preset("crazyflie").with_sensors("flow-deck").firmware == "crazyflie"
+    assert vehicle_toml.preset("crazyflie").with_sensors("true").firmware is None
