@@ -104,7 +104,7 @@ ROOMS: Final = {
     ),
     "derive": Room(
         source=("sil/mambo_sil/model/derive/*.py",),
-        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "settings")),
+        tests=tuple(f"tests/model/derive/test_{name}.py" for name in ("definitions", "reach", "settings")),
         without=("derived_margins.py", "derived_flight.py"),
     ),
     "design": Room(

@@ -50,6 +50,7 @@ def test_late_cameras_are_worth_their_age_up_to_20_ms() -> None:
     settings = settings_for(drone)
     assert settings.observer.age_s == 0.02
     assert fly_trial(settings, drone).good
+    assert not fly_trial(settings, late(0.15)).good
     cameras = FLIGHTS["eight"].sensors.model_copy(update={"camera_delay_ms": 40})
     eight = FLIGHTS["eight"].model_copy(update={"sensors": cameras})
     late_m_s, default_m_s = (iae_m_s(one, eight) for one in (settings, settings_for(CRAZYFLIE)))

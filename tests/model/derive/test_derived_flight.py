@@ -84,9 +84,9 @@ def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survi
     assert (exact.model.tilt, wants_exact(drone)) == ("exact", strong)
     assert exact.limits.tilt_rad > 0.7
     assert flies_quick_circle(exact, drone) is survives
-    found_settings = choose_settings(drone, name)
-    assert (found_settings.small_angles is None) is survives
-    chosen = controller_toml.parse(found_settings.text, name)
+    written = choose_settings(drone, name)
+    assert (written.small_angles is None) is survives
+    chosen = controller_toml.parse(written.text, name)
     assert chosen == (exact if survives else settings_for(drone))
     found = (chosen.model.tilt, chosen.limits.tilt_rad)
     assert found == (("exact", 0.74) if survives else ("small-angle", 0.5))

@@ -28,7 +28,7 @@ OFFSET_MS: Final = 0
 SHAKING_RAD: Final = 0.1
 """Rms of the commands of a hover, about their mean: 0.02 is the most of good settings, 0.3 of an orbit."""
 FAR_M: Final = 0.25
-"""Distance to the target: 0.06 is the most of good settings with cameras that are 60 ms late."""
+"""Distance to the target: 0.08 is the most of good settings with cameras that are 60 ms late."""
 
 
 @dataclass(frozen=True)
