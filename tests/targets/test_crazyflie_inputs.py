@@ -88,6 +88,18 @@ def test_several_measurements_a_prediction_are_dated_by_their_mean(app: Crazyfli
         assert app.logged("x") == pytest.approx(0.001 * (1990 + offset_ms), abs=0.0025)
 
 
+def test_a_filter_that_starts_anew_measures_no_flow(app: Crazyflie) -> None:
+    """Its variance falls from its start to the largest that it keeps, where it stays until the next frame."""
+    for variance in (1e-4, 1e-5, 10000.0, 100.0, 1e-4):
+        for k in range(30):
+            app.host.host_variances = [variance * (1.0 + 1e-4 * k), 1e-4]
+            app.aim(np.zeros(6))
+            app.tick()
+            if variance != 1e-4:
+                assert (app.logged("lost"), app.logged("source")) == (0, 1)
+    assert "settings are for" not in app.console
+
+
 def test_an_estimate_without_variances_is_taken_as_it_is(app: Crazyflie) -> None:
     """That of another estimator, whatever its position does."""
     app.aim(np.zeros(6))

@@ -93,6 +93,7 @@ static void add_cross(matrix_t matrix, int row, int column, const double vector[
     }
 }
 
+/* As the firmware's, a filter that starts exceeds the largest variance that it keeps, until its noise is added. */
 void estimator_start(estimator_t *filter, double yaw_rad)
 {
     const double deviations[3] = { START_XY_M, START_VELOCITY_M_S, START_ANGLE_RAD };
@@ -103,7 +104,6 @@ void estimator_start(estimator_t *filter, double yaw_rad)
     for (int k = 0; k < ESTIMATOR_STATES; k++) {
         filter->variance[k][k] = squared((k == 2) ? START_Z_M : deviations[k / 3]);
     }
-    bound(filter->variance);
 }
 
 /* The Jacobian of the motion over a time. */
