@@ -3,11 +3,14 @@
 Writing replaces what is at a path, and a pipe, a socket or a device is no file of ours.
 """
 
+import difflib
 import errno
 import os
 import stat
 from pathlib import Path
 from typing import Final
+
+from mambo_codegen.errors import echo
 
 _KINDS: Final = {
     stat.S_IFDIR: "a folder",
@@ -25,6 +28,17 @@ def find_obstacle(path: Path) -> str | None:
     except OSError:
         return "a link to nothing" if path.is_symlink() else None
     return None if stat.S_ISREG(mode) else _KINDS[stat.S_IFMT(mode)]
+
+
+def guess_name(path: Path) -> str:
+    """Return " (did you mean NAME?)" with a file of a similar name beside `path`; "" if one is there."""
+    try:
+        beside = [] if os.path.lexists(path) else sorted(path.parent.iterdir())
+    except (OSError, ValueError):  # no folder, too long a name
+        return ""
+    by_stem = {one.stem: one for one in sorted(beside, key=lambda one: one.suffix == path.suffix)}
+    near = difflib.get_close_matches(path.stem, by_stem, n=1, cutoff=0.75)
+    return f" (did you mean {echo(str(by_stem[near[0]]))}?)" if near else ""
 
 
 def read_plain_file(path: Path, most_bytes: int) -> bytes:

@@ -81,6 +81,54 @@ def test_an_option_that_may_be_there_again_has_all_its_values() -> None:
 
 
 @pytest.mark.parametrize(
+    "line",
+    [
+        "fly contoller.toml",
+        "generate contoller.toml -o out",
+        "diff mambo contoller.toml",
+        "margins contoler.toml",
+        "fly mambo --vehicle contoller.toml",
+        "design contoller.toml",
+        "footprint --board contoller.toml",
+        "fly mambo --app crazyflie --events contoller.toml",
+        "fly mambo --trajectory contoller.csv",
+        "fly --repeat contoller.json",
+        "campaign contoller.toml",
+        "regress contoller.toml",
+        "regress --controller contoller.toml",
+        "tune contoller.toml",
+        "identify contoller.csv",
+        "replay contoller.csv mambo",
+        "identify-binary contoller.elf",
+        "report contoller",
+    ],
+)
+def test_a_misspelt_file_gets_the_name_of_the_one_beside_it(line: str, tmp_path: Path) -> None:
+    """As a misspelt key does, in every command that takes a file."""
+    (tmp_path / "controller.toml").touch()
+    said, talk = run(*line.split(), code=2)
+    assert (said, "(did you mean controller.toml?)" in talk) == ("", True), talk
+
+
+def test_a_misspelt_file_of_a_campaign_is_looked_for_beside_it(tmp_path: Path) -> None:
+    """Its names are relative to its own folder; a file like no other gets no guess."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "controller.toml").touch()
+    for name, guess in (("contoller.toml", " (did you mean mine/controller.toml?)"), ("other.toml", "")):
+        (tmp_path / "mine" / "campaign.toml").write_text(f'controllers = ["{name}"]\n')
+        talk = run("campaign", "mine/campaign.toml", code=2)[1]
+        assert talk.endswith(f"to start from{guess}\n"), talk
+
+
+def test_an_empty_program_is_no_controller_of_a_campaign(tmp_path: Path) -> None:
+    """It is named with its place, and nothing flies."""
+    (tmp_path / "mypid.py").touch()
+    (tmp_path / "campaign.toml").write_text('controllers = ["mambo", "mypid.py"]\n')
+    talk = run("campaign", "campaign.toml", code=2)[1]
+    assert talk.startswith("campaign.toml: controllers: mypid.py: is a Python program; name a preset")
+
+
+@pytest.mark.parametrize(
     ("line", "message"),
     [
         ("fly table1 --controller pd", "table1: --controller pd has no settings; leave it out"),

@@ -108,7 +108,7 @@ def test_bounds_are_closed(key: Key) -> None:
             "horizon.prediction_step_s = 100",
             "must lie in 0.001..1; it is a period in seconds: for 100 Hz write 0.01",
         ),
-        ("limits.tilt_rad = 20", "must lie in 0.01..1.2; it is in radians: for 20 degrees write 0.349"),
+        ("limits.tilt_rad = 20", "must lie in 0.01..1.2; it is in radians: for 20 degrees write 0.3491"),
         ("cost.tracking_weight = nan", "must be a finite number; it must lie in 0.001..1000000"),
         ('horizon.prediction = "ten"', "must be a whole number and lie in 1..50"),
         ("horizon.prediction = 10.0", "must be a whole number and lie in 1..50"),
@@ -283,6 +283,25 @@ def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
         controller_toml.read(tmp_path / "none.toml")
     with pytest.raises(UnreadableFileError, match="is a folder"):
         controller_toml.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("controller.toml", "", "controller.toml: has no settings; name a preset or a controller.toml"),
+        ("controller.toml", "# mine\n", "has no settings"),
+        ("controller.toml", 'vehicle = "mambo"\n', "has no settings"),
+        ("mypid.py", "", "mypid.py: is a Python program; name a preset or a controller.toml"),
+        ("mypid.py", "cost = 1\n", "is a Python program"),
+    ],
+)
+def test_a_file_without_settings_is_refused(name: str, text: str, message: str, tmp_path: Path) -> None:
+    """Table I is flown by its name only; one key is enough to be settings."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(MamboNmpcError, match=message):
+        controller_toml.read(tmp_path / name)
+    (tmp_path / "few.toml").write_text("[horizon]\ncontrol = 3\n")
+    assert controller_toml.read(tmp_path / "few.toml").horizon.control == 3
 
 
 def test_byte_order_mark_is_read_over(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
+from mambo_codegen.errors import InvalidSettingsError, UnreadableFileError, echo, echo_value
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.messages import faults
 from mambo_codegen.settings.model import Settings
@@ -19,14 +19,21 @@ VEHICLE: Final = "vehicle"
 """The key of the drone that the settings are for: commands fly it, and the C does not depend on it."""
 
 _TITLE = "Settings of a mambo-nmpc controller."
+_FIX = "name a preset or a controller.toml, which `mambo-nmpc init` writes"
 
 
 def read(path: Path) -> Settings:
-    """Read the settings in the file at `path`.
+    """Read the settings in the file at `path`, which has one at least.
 
     Raises UnreadableFileError if it is not TOML, InvalidSettingsError if settings break a rule.
     """
-    return parse(read_text(path), echo(str(path)))
+    source = echo(str(path))
+    if path.suffix == ".py":
+        raise UnreadableFileError(f"{source}: is a Python program; {_FIX}")
+    settings = _split(parse_document(read_text(path), source), source)[0]
+    if not settings:
+        raise InvalidSettingsError((f"{source}: has no settings; {_FIX}",))
+    return validate(settings, source)
 
 
 def parse(text: str, source: str) -> Settings:

@@ -77,8 +77,13 @@ def _unit_hint(value: float, key: Key) -> str:
     if key.path.endswith(("_period_s", "_step_s")) and key.low <= 1 / value <= key.high:
         return f"; it is a period in seconds: for {value:g} Hz write {1 / value:.3g}"
     if key.path.endswith("_rad") and key.low <= math.radians(value) <= key.high:
-        return f"; it is in radians: for {value:g} degrees write {math.radians(value):.3g}"
+        return degrees_hint(value)
     return ""
+
+
+def degrees_hint(degrees: float) -> str:
+    """Return the end of a message that refuses an angle in radians which is one in degrees."""
+    return f"; it is in radians: for {degrees:g} degrees write {math.radians(degrees):.4g}"
 
 
 def _unknown(names: list[str], dotted: str, form: Form) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from mambo_codegen.errors import SourceNotFoundError, UnreadableFileError, echo
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import guess_name, read_plain_file
 
 LARGEST_FILE_BYTES = 64_000
 
@@ -70,8 +70,9 @@ class ShippedFiles:
 
     def _not_found(self, name: str, what: str) -> SourceNotFoundError:
         names = self.names()
-        near = difflib.get_close_matches(name, names, n=1)
-        guess = f" (did you mean {near[0]}?)" if near else ""
+        near = [f" (did you mean {one}?)" for one in difflib.get_close_matches(name, names, n=1)]
+        beside = [guess_name(Path(name))]
+        guess = next(filter(None, [*beside, *near] if Path(name).suffix else [*near, *beside]), "")
         return SourceNotFoundError(
             f"{echo(name)} is {what}{guess}; {self.several} are {', '.join(names)}, and {self.advice}"
         )
@@ -97,7 +98,7 @@ def read_text(path: Path) -> str:
     try:
         content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise UnreadableFileError(f"{name}: there is no such file") from None
+        raise UnreadableFileError(f"{name}: there is no such file{guess_name(path)}") from None
     except IsADirectoryError:
         raise UnreadableFileError(f"{name}: is a folder; name a TOML file in it") from None
     except OSError as error:

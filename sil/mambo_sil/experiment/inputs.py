@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, echo, echo_value
+from mambo_codegen.plain_file import guess_name
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
@@ -79,7 +80,10 @@ def _loaded(
     try:
         return load(named if named in shipped or not path.exists() else str(path))
     except MamboNmpcError as error:
-        raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
+        guess = "" if "(did you mean" in str(error) else guess_name(path)
+        raise InvalidSettingsError(
+            tuple(f"{place}: {line}" for line in f"{error}{guess}".splitlines())
+        ) from None
 
 
 def load_drone(named: str, folder: Path, place: str) -> VehicleFile:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.errors import echo
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import guess_name, read_plain_file
 from mambo_sil.errors import TrajectoryError
 
 LARGEST_FILE_BYTES: Final = 10_000_000
@@ -21,7 +21,7 @@ def named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
+        raise TrajectoryError(f"{name}: cannot be read: {error.strerror}{guess_name(path)}") from error
     except UnicodeDecodeError:
         raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
     except TrajectoryError as error:

@@ -23,7 +23,7 @@ from pydantic import (
 )
 
 from mambo_codegen.errors import echo
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import guess_name, read_plain_file
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL, Airframe, airframe_of
@@ -260,7 +260,7 @@ def read_record(path: Path) -> Record:
     try:
         content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except OSError as error:
-        raise ScenarioError(f"{name}: cannot be read: {error.strerror}") from error
+        raise ScenarioError(f"{name}: cannot be read: {error.strerror}{guess_name(path)}") from error
     if len(content) > LARGEST_FILE_BYTES:
         raise ScenarioError(f"{name}: is larger than 1 MB; the record of a flight takes a few kB")
     try:

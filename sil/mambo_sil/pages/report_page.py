@@ -9,6 +9,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from mambo_codegen.errors import echo
+from mambo_codegen.plain_file import guess_name
 from mambo_sil.board.desk.desk_report import DeskSummary
 from mambo_sil.board.footprint.footprint_report import FootprintSummary
 from mambo_sil.board.footprint.sweep_report import SweepSummary
@@ -100,7 +101,7 @@ def read_summary(folder: Path) -> ReportedSummary:
         return _read(folder / SUMMARY, *RESULTS)
     if (folder / _UNFINISHED).is_file():
         return _read(folder / _UNFINISHED, UnfinishedCampaign)
-    what = f"has no {SUMMARY}" if folder.is_dir() else "is not a folder"
+    what = f"has no {SUMMARY}" if folder.is_dir() else f"is not a folder{guess_name(folder)}"
     commands = ", ".join(kind.command for kind in RESULTS)
     raise ResultsError(f"{echo(str(folder))}: {what}; name a result folder of {commands}")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.errors import MamboNmpcError, echo
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import guess_name, read_plain_file
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 
@@ -53,7 +53,7 @@ def held_controllers(path: Path) -> tuple[HeldController, ...]:
     try:
         content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except OSError as error:
-        raise ImageError(f"{name}: cannot be read: {error.strerror}") from error
+        raise ImageError(f"{name}: cannot be read: {error.strerror}{guess_name(path)}") from error
     if len(content) > LARGEST_FILE_BYTES:
         raise ImageError(f"{name}: is larger than 256 MB; name the image of one firmware")
     if not content:

@@ -12,6 +12,7 @@ import typer
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
+from mambo_codegen.settings.messages import degrees_hint
 from mambo_codegen.settings.model import Settings
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
 from mambo_sil.cli.options import load, load_drone, show_result
@@ -35,7 +36,6 @@ from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
     LARGEST_SIZE_M,
-    LARGEST_YAW_RAD,
     LONGEST_S,
     Scenario,
     choose_sensors,
@@ -96,7 +96,7 @@ def described_flight(
     """Return the flight that the options describe; raises FlightError and TrajectoryError."""
     period_s = settings.horizon.update_period_s
     curve = curve_of(course)
-    _within("--yaw-rad", course.yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD)
+    _demand_angle("--yaw-rad", course.yaw_rad)
     disturbances = Disturbances(_wind_speed_m_s(conditions.wind), push_m_s2=_push_m_s2(conditions.push))
     vehicle = _vehicle(conditions, drone)
     try:
@@ -320,6 +320,15 @@ def _push_m_s2(text: str) -> tuple[float, float]:
     _within("--push", x, -100.0, 100.0)
     _within("--push", y, -100.0, 100.0)
     return x, y
+
+
+def _demand_angle(option: str, angle_rad: float) -> None:
+    """Raise FlightError unless an angle is at most a full turn: what is more may be in degrees."""
+    try:
+        _within(option, angle_rad, -math.tau, math.tau)
+    except FlightError as error:
+        hint = degrees_hint(angle_rad) if abs(math.radians(angle_rad)) <= math.tau else ""
+        raise FlightError(f"{error}{hint}") from None
 
 
 def _within(option: str, value: float, low: float, high: float) -> None:

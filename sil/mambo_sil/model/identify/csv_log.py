@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.errors import echo
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import guess_name, read_plain_file
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.columns import KNOWN, Column, choose_columns
@@ -74,11 +74,11 @@ def read_text(path: Path) -> str:
     try:
         content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise LogError((f"{name}: there is no such file",)) from None
+        raise LogError((f"{name}: there is no such file{guess_name(path)}",)) from None
     except IsADirectoryError:
         raise LogError((f"{name}: is a folder; name a log in it, such as its trace.csv",)) from None
     except OSError as error:
-        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+        raise LogError((f"{name}: cannot be read: {error.strerror}{guess_name(path)}",)) from error
     if len(content) > LARGEST_FILE_BYTES:
         raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: cut it",))
     try:
@@ -201,7 +201,7 @@ def reading(path: Path, kind: str, package: str) -> Iterator[None]:
         needs = f"reading {kind.removesuffix(' log')} needs {package}"
         raise LogError((f"{name}: {needs}; install it: {install}",)) from None
     except OSError as error:
-        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+        raise LogError((f"{name}: cannot be read: {error.strerror}{guess_name(path)}",)) from error
     except LogError:
         raise
     except Exception as error:  # whatever a damaged file makes of the parser
