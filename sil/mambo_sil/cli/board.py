@@ -117,13 +117,13 @@ def sweep(
     ],
     fit: Annotated[
         bool,
-        typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
+        typer.Option("--fit", help="Print only the closest one within budget and margins.", metavar=""),
     ] = False,
     vehicle: Drone = None,
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
-    """Vary one or two settings; measure footprint and tracking error of each controller.
+    """Vary one or two settings; measure footprint, tracking error and margins of each controller.
 
     When a controller does not fit its board, or to see what a setting costs.
     """
@@ -132,6 +132,7 @@ def sweep(
     from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, write_points
     from mambo_sil.experiment.campaign.executors import processes
+    from mambo_sil.model.derive.margin_reference import margin_reference
 
     settings = load(source, scalar)
     chosen, drone = boards.load(board), load_drone(vehicle, source)
@@ -142,8 +143,9 @@ def sweep(
         new_results(output, SweepSummary.command, SWEEP_FILES) as folder,
         counting_bar("sweeping", "controllers", len(grid(axes))) as bar,
     ):
+        reference = margin_reference(source, settings, drone)
         with processes(os.cpu_count() or 1) as pool:
-            points = measure_grid(settings, chosen, axes, pool.run, bar, drone=drone)
+            points = measure_grid(settings, chosen, axes, pool.run, bar, reference=reference, drone=drone)
         bar.stage("drawing pictures")
         from mambo_sil.board.footprint.footprint_plots import draw_sweep
 
@@ -159,6 +161,7 @@ def sweep(
             axes=axes,
             points=points,
             closest_fit=best,
+            reference=reference,
         )
         summary.write(folder)
     if fit and not as_json:

@@ -336,7 +336,7 @@ def _tune(
                 ):
                     search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
             found = finished_trials(study)
-        bar.stage("drawing the front")
+        bar.stage("measuring margins, drawing the front")
         return finish(tuning, found, output)
 
 

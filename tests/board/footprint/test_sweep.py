@@ -16,8 +16,9 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.footprint.footprint_plots import draw_sweep
 from mambo_sil.board.footprint.sweep import Axis, Point, budgets, grid, measure_grid
-from mambo_sil.board.footprint.sweep_report import closest_fit, write_points
+from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, write_points
 from mambo_sil.experiment.campaign.executors import processes
+from mambo_sil.experiment.margins.margin_reserve import MarginReference
 from mambo_sil.results.summary import Number
 from tests.support.command import run, unwrapped
 from tests.support.one_norm import ONE_NORM
@@ -38,20 +39,24 @@ POINT = Point(
     fits=True,
 )
 UNMEASURED = replace(POINT, stack_bytes=math.nan, instructions=math.nan, time_ms=math.nan)
+UNKNOWN = MarginReference("a 1-norm", "true", {}, "not linear")
 REFUSED = Point({PREDICTION: 1, CONTROL: 2}, refusal="horizon.control = 2 must lie in 1..1")
 
 
-def point(prediction: int, flash_bytes: int, iae_m_s: float, *, fits: bool = True) -> Point:
+def point(
+    prediction: int, flash_bytes: int, iae_m_s: float, *, fits: bool = True, share: float = 1.0
+) -> Point:
     """Return a point of a grid."""
     values: dict[str, Number] = {PREDICTION: prediction, CONTROL: 2}
-    return replace(POINT, values=values, flash_bytes=flash_bytes, iae_m_s=iae_m_s, fits=fits)
+    found = replace(POINT, values=values, flash_bytes=flash_bytes, iae_m_s=iae_m_s, fits=fits)
+    return replace(found, gain_margin=1.5, delay_margin_s=0.042, margin_share=share)
 
 
 def measured(settings: Settings, board: Board, *axes: Axis) -> list[Point]:
     """Measure a grid on two processes; demand that progress is counted."""
     counts: list[int] = []
     with processes(2) as pool:
-        points = measure_grid(settings, board, axes, pool.run, counts.append)
+        points = measure_grid(settings, board, axes, pool.run, counts.append, reference=UNKNOWN)
     assert counts == list(range(len(points) + 1))
     return points
 
@@ -77,11 +82,52 @@ def test_a_grid_has_every_combination() -> None:
         pytest.param([], None, id="none"),
         pytest.param([point(5, 1, math.nan)], None, id="lost"),
         pytest.param([point(5, 1, 1, fits=False)], None, id="over budget"),
+        pytest.param([point(5, 1, 1, share=0.79), point(10, 1, 2, share=0.81)], 1, id="keeps margins"),
+        pytest.param([point(5, 1, 1, share=math.nan), point(10, 1, 2)], 0, id="margins unknown"),
+        pytest.param([point(5, 1, 1, share=0.0)], None, id="unstable"),
     ],
 )
 def test_the_closest_fit_follows_its_rule(points: list[Point], best: int | None) -> None:
-    """Least IAE within budget, then least flash; lost flights are excluded."""
+    """Least IAE within budget and margins, then least flash; lost flights are excluded."""
     assert closest_fit(points) is (None if best is None else points[best])
+
+
+def test_a_closer_point_with_small_margins_is_named() -> None:
+    """With what it tolerates; the answer says too where no point keeps its margins, or none are known."""
+    small, calm = point(5, 1, 1.0, share=0.5), point(10, 1, 2.0)
+    for points, reference, lines in (
+        (
+            [small, calm],
+            replace(UNKNOWN, whose="preset mambo", missing=None),
+            [
+                "closest: horizon.prediction 10, horizon.control 2, IAE 2 m s",
+                "closer, but with a loop more than 20 % worse than with preset mambo: horizon.prediction 5, "
+                "horizon.control 2, IAE 1 m s, which tolerates 1.50 times the gain or 42.0 ms",
+            ],
+        ),
+        (
+            [small],
+            replace(UNKNOWN, whose="preset mambo", missing=None),
+            ["none keeps the margins of preset mambo: each has a loop more than 20 % worse", "closer, but "],
+        ),
+        ([small], UNKNOWN, ["margins are not known: not linear"]),
+        ([calm], replace(UNKNOWN, missing=None), ["closest: horizon.prediction 10, "]),
+    ):
+        found = SweepSummary(
+            source="mambo",
+            settings="",
+            board="crazyflie",
+            budget={},
+            axes=[*AXES],
+            points=points,
+            closest_fit=closest_fit(points),
+            reference=reference,
+        ).result(Path())
+        first, *said = found.answer
+        assert first.endswith("controllers fit")
+        assert len(said) == len(lines)
+        assert all(line.startswith(start) for line, start in zip(said, lines, strict=True))
+        assert found.good == (closest_fit(points) is not None)
 
 
 def test_points_read_back(tmp_path: Path) -> None:
@@ -130,21 +176,24 @@ def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_command_writes_table_and_pictures_and_answers_with_the_closest(tmp_path: Path) -> None:
-    """The default preset with two response times, the slower of which settings refuse."""
+    """The default preset with three response times: on the edge, good, and refused by the settings."""
     board_builder("crazyflie")
-    said, _ = run("sweep", "--vary", "cost.response_time_s=0.2:3:2", "--fit", "-o", "out")
-    assert said.startswith("1 of 1 controllers fit\nclosest: cost.response_time_s 0.2, IAE ")
-    assert len(said.splitlines()) == 5
+    said, _ = run("sweep", "--vary", "cost.response_time_s=0.1:2.3:3", "--fit", "-o", "out")
+    assert said.startswith("1 of 1 controllers fit\nclosest: cost.response_time_s 1.2, IAE ")
     out = tmp_path / "out"
     assert {path.name for path in out.iterdir()} == {"sweep.csv", "sweep.png", "sweep.svg", "summary.json"}
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert [one["values"] for one in summary["points"]] == [
-        {"cost.response_time_s": 0.2},
-        {"cost.response_time_s": 3},
+        {"cost.response_time_s": pytest.approx(0.1)},
+        {"cost.response_time_s": pytest.approx(1.2)},
+        {"cost.response_time_s": pytest.approx(2.3)},
     ]
-    assert summary["closest_fit"] == summary["points"][0]
-    refusal = "cost.response_time_s = 3 must lie in 0.02..2"
-    assert summary["points"][1]["refusal"].startswith(refusal.replace("= 3 ", "= 3.0 "))
+    edge, good, refused = summary["points"]
+    assert summary["closest_fit"] == good
+    assert edge["iae_m_s"] < good["iae_m_s"]
+    assert edge["margin_share"] == pytest.approx(0.163, abs=0.005)
+    assert good["margin_share"] > 0.8
+    assert refused["refusal"].startswith("cost.response_time_s = 2.3 must lie in 0.02..2")
 
 
 @pytest.mark.long

@@ -25,6 +25,7 @@ from mambo_sil.model.tune.study import (
     DRAWN_AT_RANDOM,
     IAE_ALLOWANCE,
     ROUND,
+    RULE,
     FinishedTrial,
     choose,
     finished_trials,
@@ -35,6 +36,8 @@ from mambo_sil.model.tune.study import (
     propose,
     search,
 )
+from mambo_sil.model.tune.tuning_report import controller_text, front_csv, judge_trials, summarise
+from mambo_sil.results.blocks import Sentence
 from tests.support.command import command, run
 from tests.support.tools import require_module
 
@@ -146,7 +149,9 @@ def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, 
     settings = controller_toml.read(whole / "controller.toml")
     assert settings.cost.effort_weight == float(picked[0]["cost.effort_weight"])
     found = found_in(whole, source)
-    assert settings == tuning_file.read(source).settings(choose(pareto_front(found)).values)
+    chosen = choose(found)
+    assert chosen is not None
+    assert settings == tuning_file.read(source).settings(chosen.values)
     head = " ".join((whole / "controller.toml").read_text().split("[horizon]")[0].replace("#", "").split())
     assert f"trial {picked[0]['trial']} of {TRIALS} in study mambo-nmpc-" in head
     assert "seed 1:" in head
@@ -241,6 +246,45 @@ def test_the_front_is_pareto_optimal_and_the_choice_follows_the_rule() -> None:
     assert front == [best, calm, calmest]
     assert choose(front) == calm
     assert choose(front[:1]) == best
+
+
+def test_the_choice_is_among_trials_that_keep_their_margins() -> None:
+    """Also a trial that another beats, which keeps none; it asks of no more trials than it needs."""
+    trials = [one(0, 1.0, 0.2), one(1, 1.04, 0.5), one(2, 1.1, 0.3), one(3, 1.12, 0.1), one(4, 2.0, 0.05)]
+    asked: list[int] = []
+
+    def keeps(trial: FinishedTrial) -> bool:
+        asked.append(trial.number)
+        return trial.number not in (0, 3)
+
+    assert choose(trials, keeps) == trials[2]
+    assert 4 not in asked
+    assert choose(trials, lambda _: False) is None
+
+
+def test_the_closest_trial_is_not_chosen_without_its_margins() -> None:
+    """A response time on the edge, which is the closest, stands in the front with what it tolerates."""
+    tuning = tuning_file.default()
+    quick = tuning.start | {"cost.response_time_s": 0.1}
+    trials = [
+        FinishedTrial(0, tuning.start, 1.0, 0.002, 0),
+        FinishedTrial(1, quick, 0.5, 0.001, 0),
+    ]
+    judged = judge_trials(tuning, trials)
+    assert (judged.chosen.number, judged.keeps_margins) == (0, True)
+    assert [trial.number for trial in judged.front] == [1, 0]
+    first, _second = csv.DictReader(front_csv(judged).splitlines())
+    assert first["chosen"] == "0"
+    assert float(first["gain_margin"]) == pytest.approx(1.5, abs=0.01)
+    said = summarise(tuning, trials, judged).result(Path()).blocks[0]
+    assert said == Sentence(
+        f"chosen: {RULE}, of trials without a loop more than 20 % worse than with preset mambo"
+    )
+    alone = judge_trials(tuning, trials[1:])
+    assert (alone.chosen.number, alone.keeps_margins, alone.base) == (1, False, None)
+    assert "MARGINS NOT KEPT: every trial has a loop" in controller_text(tuning, trials[1:], alone).replace(
+        "\n# ", " "
+    )
 
 
 ONE_NORM = 'base = "mambo-1norm"\n'

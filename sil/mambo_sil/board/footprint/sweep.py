@@ -1,4 +1,4 @@
-"""Vary one or two settings: footprint on a board, and tracking of the Table II case."""
+"""Vary one or two settings: footprint on a board, tracking of the Table II case, margins."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,6 +15,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError, WorkerError
+from mambo_sil.experiment.margins.margin_reserve import MarginReference, Reserve, reserve
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
@@ -51,6 +52,16 @@ class Point:
     fits: bool = False
     refusal: str | None = None
     """Why these settings are no controller, or cannot fly."""
+    gain_margin: Number = math.nan
+    delay_margin_s: Number = math.nan
+    """The least of all loops at hover, and at the commands."""
+    margin_share: Number = math.nan
+    """The least share that a margin of a loop is of the reference's."""
+
+    @property
+    def reserve(self) -> Reserve:
+        """What is left of the margins of the reference."""
+        return Reserve(self.gain_margin, self.delay_margin_s, self.margin_share)
 
 
 def grid(axes: Sequence[Axis]) -> list[dict[str, Number]]:
@@ -66,13 +77,14 @@ def measure_grid(
     run: Run,
     progress: Callable[[int], None],
     *,
+    reference: MarginReference,
     drone: VehicleFile = NOMINAL,
 ) -> list[Point]:
     """Return the points of `grid` in order; `run` measures them, in any order.
 
     Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
     """
-    documents = settings.model_dump(), board.model_dump(), drone.model_dump()
+    documents = settings.model_dump(), board.model_dump(), drone.model_dump(), reference
     jobs = [(*documents, values) for values in grid(axes)]
     found: dict[int, Point] = {}
     progress(0)
@@ -95,14 +107,19 @@ def budgets(board: Board, settings: Settings, axes: Sequence[Axis]) -> dict[str,
 
 
 def _measure_point(
-    document: dict[str, Any], board: dict[str, Any], drone: dict[str, Any], values: Mapping[str, Number]
+    document: dict[str, Any],
+    board: dict[str, Any],
+    drone: dict[str, Any],
+    reference: MarginReference,
+    values: Mapping[str, Number],
 ) -> Point:
     """Measure one point in a worker process; the arguments are plain data: generic models do not pickle."""
     for key, value in values.items():
         document = with_value(document, key, value)
     try:
         chosen = validate(document, "")
-        vehicle = Vehicle.of(VehicleFile.model_validate(drone))
+        flown = VehicleFile.model_validate(drone)
+        vehicle = Vehicle.of(flown)
         case = next(iter(CASES.values()))
         flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
         controller = CompiledController(chosen)
@@ -112,6 +129,7 @@ def _measure_point(
         return Point(dict(values), refusal=f"horizon.{error}")
     footprint = measure_footprint(chosen, Board.model_validate(board), counted_ticks=COUNTED_TICKS)
     metrics = measure(fly(flight, controller))
+    margins = reserve(chosen, flown, reference)
     return Point(
         dict(values),
         flash_bytes=footprint.added.flash.total,
@@ -121,4 +139,7 @@ def _measure_point(
         time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
         iae_m_s=float(metrics.iae_m_s[0]),
         fits=footprint.fits and footprint.complete,
+        gain_margin=margins.gain,
+        delay_margin_s=margins.delay_s,
+        margin_share=margins.share,
     )

@@ -12,6 +12,8 @@ from markupsafe import Markup
 from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.experiment.margins.margin_reserve import HEADS as MARGIN_HEADS
+from mambo_sil.experiment.margins.margin_reserve import WORSE, MarginReference
 from mambo_sil.results.blocks import CommandResult, Picture, ResultTable, Sentence
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number, ReportedSummary
@@ -20,7 +22,11 @@ CAPTION: Final = (
     "Resources of the board and tracking error of each controller. Dots fit the budget; the dashed line is "
     "the budget, if in range; crosses are refused settings."
 )
-_HEADS: Final = ("settings", "flash B", "RAM B", "stack B", "instructions", "time, ms", "IAE, m s", "")
+_HEADS: Final = (
+    *("settings", "flash B", "RAM B", "stack B", "instructions", "time, ms", "IAE, m s"),
+    *(*MARGIN_HEADS, ""),
+)
+_WIDE: Final = (3, 4, 5)
 
 
 class SweepSummary(ReportedSummary):
@@ -36,6 +42,7 @@ class SweepSummary(ReportedSummary):
     axes: list[Axis]
     points: list[Point]
     closest_fit: Point | None
+    reference: MarginReference | None = None
 
     def result(self, _folder: Path, /) -> CommandResult:
         """Return the result: a table of the points, then why others were refused."""
@@ -46,20 +53,17 @@ class SweepSummary(ReportedSummary):
             return sweep_panels(self.points, self.axes, self.budget)
 
         flown = [point for point in self.points if point.refusal is None]
-        best = self.closest_fit
+        best, fitting = self.closest_fit, sum(point.fits for point in flown)
         answer = [f"nothing fits {self.board}"]
-        if best is not None:
-            answer = [
-                f"{sum(point.fits for point in flown)} of {len(self.points)} controllers fit",
-                f"closest: {_values(best)}, IAE {digits(best.iae_m_s)} m s",
-            ]
+        if best is not None or fitting:
+            answer = [f"{fitting} of {len(self.points)} controllers fit", *self._closest()]
         return CommandResult(
             f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}",
             best is not None,
             answer,
             [
                 *([Picture(panels, CAPTION)] if self.points else []),
-                ResultTable(_HEADS, list(map(_row, flown)), (0, -1), (5,)),
+                ResultTable(_HEADS, list(map(_row, flown)), (0, -1), _WIDE),
                 *(
                     Sentence(f"{_values(point)} is refused: {point.refusal}")
                     for point in self.points
@@ -68,8 +72,31 @@ class SweepSummary(ReportedSummary):
             ],
         )
 
+    def _closest(self) -> list[str]:
+        """Return in words which point is closest, and which would be without regard to margins."""
+        best, closest, reference = self.closest_fit, _closest(self.points), self.reference
+        said = [] if best is None else [f"closest: {_values(best)}, IAE {digits(best.iae_m_s)} m s"]
+        if reference is None or closest is None:
+            return said
+        if reference.missing is not None:
+            return [*said, f"margins are not known: {reference.missing}"]
+        if best is None:
+            said = [f"none keeps the margins of {reference.whose}: each has {WORSE}"]
+        if not closest.reserve.enough:
+            gain, delay_ms = closest.reserve.cells
+            said.append(
+                f"closer, but with {WORSE} than with {reference.whose}: {_values(closest)}, IAE "
+                f"{digits(closest.iae_m_s)} m s, which tolerates {gain} times the gain or {delay_ms} ms"
+            )
+        return said
+
 
 def closest_fit(points: Sequence[Point]) -> Point | None:
+    """Return the closest fitting point of those that keep the margins of the reference."""
+    return _closest([point for point in points if point.reserve.enough])
+
+
+def _closest(points: Sequence[Point]) -> Point | None:
     """Return the fitting point that is not lost with the least IAE, of equal ones with the least flash."""
     fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
     return min(fitting, key=lambda point: (point.iae_m_s, point.flash_bytes), default=None)
@@ -94,10 +121,12 @@ def _values(point: Point) -> str:
 def _row(point: Point) -> tuple[str, ...]:
     sizes = (point.flash_bytes, point.ram_bytes, point.stack_bytes, point.instructions)
     verdict = "fits" if point.fits else "not shown to fit"
+    verdict += "" if point.reserve.enough else ", small margins"
     return (
         _values(point),
         *(f"{one:g}" for one in sizes),
         digits(point.time_ms),
         digits(point.iae_m_s),
+        *point.reserve.cells,
         verdict,
     )

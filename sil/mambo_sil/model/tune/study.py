@@ -25,6 +25,7 @@ from mambo_sil.experiment.campaign.campaign_flights import CRASHED, Row, fly_bat
 from mambo_sil.experiment.campaign.distributions import Distribution
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.inputs import Entrant
+from mambo_sil.experiment.margins.margin_reserve import Reserve
 from mambo_sil.model.tune.tuning_file import Tuning
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ DATABASE: Final = "study.db"
 IAE_ALLOWANCE: Final = 1.1
 """Bound on the IAE of the chosen point, relative to the least IAE found."""
 RULE: Final = "the least command variation with an IAE within 10 % of the least found"
-"""How the point is chosen; stands in controller.toml."""
+"""How the point is chosen of those that keep their margins; stands in controller.toml."""
 
 _NAME: Final = "tuned"
 _OWNER: Final = "folder"
@@ -62,6 +63,8 @@ class FinishedTrial:
     iae_m_s: float
     command_variation_rad: float
     crashed: int
+    margins: Reserve | None = None
+    """What is left of the margins of the reference, where it was measured."""
 
 
 @contextlib.contextmanager
@@ -190,9 +193,20 @@ def pareto_front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
     return front
 
 
-def choose(front: Sequence[FinishedTrial]) -> FinishedTrial:
-    """Return the point of a front, which is sorted by IAE, according to `RULE`."""
-    return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
+def choose(
+    trials: Sequence[FinishedTrial], keeps_margins: Callable[[FinishedTrial], bool] = lambda _: True
+) -> FinishedTrial | None:
+    """Return the trial according to `RULE` of those that keep their margins; None if none does.
+
+    Asks of as few trials as it needs.
+    """
+    ordered = sorted(trials, key=lambda one: (one.iae_m_s, one.command_variation_rad, one.number))
+    closest = next((index for index, one in enumerate(ordered) if keeps_margins(one)), None)
+    if closest is None:
+        return None
+    near = [one for one in ordered[closest:] if one.iae_m_s <= IAE_ALLOWANCE * ordered[closest].iae_m_s]
+    calm = sorted(near, key=lambda one: one.command_variation_rad)
+    return next(one for one in calm if keeps_margins(one))
 
 
 def propose(tuning: Tuning, study: "Study", owner: str) -> "FrozenTrial":

@@ -5,20 +5,19 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mambo_sil.model.tune.study import FinishedTrial, choose, pareto_front
+from mambo_sil.model.tune.study import FinishedTrial, pareto_front
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import COLUMN_INCHES, DOT, FLOWN, INK, SKY, VERMILION, style
 
 
 def draw_front(
-    trials: Sequence[FinishedTrial], base: Sequence[FinishedTrial], stem: Path
+    trials: Sequence[FinishedTrial], base: Sequence[FinishedTrial], best: FinishedTrial, stem: Path
 ) -> tuple[Path, Path]:
     """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg.
 
     A trial without any command variation is left out, as it has no place on a logarithmic axis.
     """
     front = pareto_front(trials)
-    best = choose(front)
     with style():
         figure = Figure(figsize=(COLUMN_INCHES, 2.8), layout="constrained")
         axes = figure.subplots()
