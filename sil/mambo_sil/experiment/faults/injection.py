@@ -149,10 +149,8 @@ def native_faulty(
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))
             record.memory_bytes = instances.shape[1]
-    kept = inner, histories, instances, saved
-    return Native(
-        engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept, inner.commands_thrust
-    )
+    kept = histories, instances, saved
+    return inner.wrapped(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept)
 
 
 def _fill_alteration(record: Any, alter: Alteration) -> None:
@@ -188,7 +186,5 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
         record.level, record.patience = pointer("char *", level), patient
         record.hover_m_s2, record.commands_thrust = hover_m_s2, inner.commands_thrust
-    kept = inner, memory, level
-    return Native(
-        engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept, inner.commands_thrust
-    )
+    kept = memory, level
+    return inner.wrapped(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept)

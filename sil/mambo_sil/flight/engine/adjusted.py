@@ -78,7 +78,7 @@ class AdjustedController:
         compiled = innermost(self.controller)
         assert isinstance(compiled, CompiledController)
         records = ffi.new("engine_adjusted_t[]", self._n)
-        kept: list[Any] = [inner, self._status]
+        kept: list[Any] = [self._status]
         for row in range(self._n):
             records[row].controller, records[row].memory = inner.step, inner.instance(row)
             own = [index for index, one in enumerate(self._adjustments) if one.row == row]
@@ -93,7 +93,6 @@ class AdjustedController:
                 kept.append(values)
             records[row].adjustments, records[row].count = due, len(own)
             kept.append(due)
-        size = ffi.sizeof("engine_adjusted_t")
-        return Native(
-            engine.engine_adjusted_step, records, size, tuple(kept), inner.commands_thrust, inner.has_preview
+        return inner.wrapped(
+            engine.engine_adjusted_step, records, ffi.sizeof("engine_adjusted_t"), tuple(kept)
         )

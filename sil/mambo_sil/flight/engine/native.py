@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -59,6 +59,10 @@ class Native:
     def instance(self, index: int) -> Any:
         """Return a pointer to the instance of flight `index`."""
         return ffi.cast("char *", self.instances) + index * self.stride
+
+    def wrapped(self, step: Any, instances: Any, stride: int, kept: tuple[Any, ...]) -> "Native":
+        """Return n wrappers around these controllers: they take the same targets and command the same."""
+        return replace(self, step=step, instances=instances, stride=stride, kept=(self, *kept))
 
 
 @runtime_checkable
