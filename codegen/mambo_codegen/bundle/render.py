@@ -97,7 +97,9 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update
     period, or wants a controller of another kind.
     """
-    target.refuse_preview(has_preview=settings.target.acceleration == "preview")
+    target.refuse_preview(
+        has_preview=settings.target.acceleration == "preview", is_double=settings.code.scalar == "float64"
+    )
     target.refuse_level(
         has_height=settings.height is not None, has_limits=method_of(settings).limiting is not None
     )
