@@ -1,7 +1,6 @@
 """What a program says of its target: a curve that can be sampled, a preview where somebody knows it."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,15 +8,9 @@ import pytest
 
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
-from mambo_codegen.errors import InvalidSettingsError
-from mambo_codegen.settings.controller_toml import to_toml
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import Circle, curve, preview, sample
-from mambo_sil.errors import FlightError, LogError
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.link.pilot import Pilot
-from mambo_sil.model.replay.logged_inputs import read_inputs
-from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support.height import CRAZYFLIE
 from tests.support.quadratic import settings_of
 
@@ -61,30 +54,11 @@ def test_a_missing_preview_and_another_shape_are_named() -> None:
         Controller(TOLD).step(DroneState(still, still, still), TargetState(still, still, still))
 
 
-@pytest.mark.parametrize("name", ["crazyflie", "fmu", "mambo", "px4"])
-def test_what_makes_its_own_targets_refuses_a_preview(name: str) -> None:
-    """Its set-points say what is now; the message says what to write."""
-    with pytest.raises(InvalidSettingsError, match=rf"must not be with --for {name}.*; write \"given\" or"):
-        render_target(TOLD, TARGETS[name], with_digest=False)
-
-
 def test_what_gets_its_targets_takes_it() -> None:
     """The firmware of a processor in the loop has a target of 27 numbers."""
     assert (
         "pil_assert_target_has_27_numbers" in render_target(TOLD, TARGETS["pil"], with_digest=False)["pil.c"]
     )
-
-
-def test_logs_pages_and_pilots_refuse_a_preview(tmp_path: Path) -> None:
-    """None of them knows what comes."""
-    path = tmp_path / "told.toml"
-    path.write_text(to_toml(TOLD), "utf-8")
-    with pytest.raises(LogError, match="cannot be replayed: no log has what came"):
-        read_inputs(tmp_path / "log.csv", {}, TOLD)
-    with pytest.raises(FlightError, match=r'must be "given" or "tracked": the target of the page'):
-        page_controllers([str(path)])
-    with pytest.raises(ArgumentError, match=r'must be "given" or "tracked": the targets of a pilot'):
-        Pilot.simulate(path, "crazyflie")
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,16 @@ def fly(flights: OptionFlights, options: Sequence[str] = (), expected: str | Non
     command(
         *("fly", SETTINGS, "--vehicle", flights.name, "--trajectory", flown.trajectory),
         *("--size-m", str(flown.size_m), "--rate-rad-s", str(flown.rate_rad_s)),
-        *("--yaw-rad", str(flown.yaw_rad), "--duration-s", str(flown.duration_s), "-o", "flown", *options),
+        *(
+            "--yaw-rad",
+            str(flown.yaw_rad),
+            "--duration-s",
+            str(flown.duration_s),
+            "--no-pictures",
+            "-o",
+            "flown",
+            *options,
+        ),
     )
     assert read_npz(Path("flown/trace.npz")).digest() == (expected or _flown(flights))
     return "="
@@ -72,6 +81,15 @@ def numpy(flights: OptionFlights) -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(VARIABLE, "numpy")
         return fly(flights, expected=flown)
+
+
+def flown_app(flights: OptionFlights) -> str:
+    """Fly the app of the Crazyflie on the desk."""
+    found = command(
+        "fly", SETTINGS, "--app", "crazyflie", "--duration-s", "2", "--no-pictures", "-o", "flown"
+    )
+    assert found["settings"] == flights.settings.digest
+    return "+"
 
 
 def campaign(flights: OptionFlights) -> str:
@@ -199,6 +217,7 @@ ALL: Final[dict[str, Callable[[OptionFlights], str]]] = {
     "numpy": numpy,
     "board": board,
     "port": port,
+    "app": flown_app,
     "campaign": campaign,
     "faults": faults,
     "margins": margins,

@@ -21,6 +21,7 @@ from mambo_sil.experiment.campaign.campaign_flights import DIGEST, fly_scenarios
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.scenario import flight_of
+from mambo_sil.link.pilot import Pilot
 from mambo_sil.model.replay.log_replay import replay_log
 from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support.option_flights import OptionFlights, Update
@@ -118,6 +119,12 @@ def rotorpy(flights: OptionFlights, folder: Path) -> str:
     return "="
 
 
+def pilot(flights: OptionFlights, folder: Path) -> str:
+    """Make a pilot, without a flight."""
+    Pilot.simulate(written(flights, folder), flights.name)
+    return "+"
+
+
 ALL: Final[dict[str, Consumer]] = {
     "fly": lambda flights, _: flights.in_engine(),
     "wrapped": lambda flights, _: flights.in_wrappers(),
@@ -128,6 +135,7 @@ ALL: Final[dict[str, Consumer]] = {
     "replay": replay,
     "playground": playground,
     "rotorpy": rotorpy,
+    "pilot": pilot,
 }
 
 

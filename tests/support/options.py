@@ -28,15 +28,17 @@ CONSUMERS: Final = (
     "replay",
     "playground",
     "rotorpy",
+    "pilot",  # of a simulated PX4
 )
 TARGETS: Final = ("arduino", "crazyflie", "espidf", "fmu", "mambo", "pil", "platformio", "px4")
 COMMANDS: Final = (
+    "port",  # fly --port, with a board behind a serial line
     "faults",
     "fly",
     "reference",  # fly --controller reference
     "numpy",  # fly, in NumPy
     "board",  # fly --on a board that is emulated
-    "port",  # fly --port, with a board behind a serial line
+    "app",  # fly --app, with the Crazyflie's app
     "campaign",
     "margins",
     "diff",
@@ -50,11 +52,13 @@ COMMANDS: Final = (
 """What the command line does besides."""
 
 REFUSALS: Final = {
-    "A": 'target.acceleration = "preview"',
-    "H": "[height]",
-    "L": "wants settings with [height] and [limits]",
+    "A": r'target\.acceleration = "preview" .*"given"',
+    "P": r'preview_m_s2 is missing; the settings have target\.acceleration = "preview"',
+    "H": r"be left out: the settings have \[height\]",
+    "N": r"the settings have no \[height\].* derive settings",
+    "L": r"wants settings with \[height\] and \[limits\].* derive them",
 }
-"""Words of the sentence with which a consumer refuses an option."""
+"""The sentence with which a consumer refuses an option, and says what to do."""
 
 Base = Values
 PAPER: Final[Base] = {}
@@ -109,13 +113,14 @@ class Option:
         return self.marks.split()[(CONSUMERS, TARGETS, COMMANDS).index(columns)][columns.index(name)]
 
 
-_BY_COMMAND: Final = " +=====+++++++=="
-_PAPER: Final = "=======+= +++++++L" + _BY_COMMAND
-_LEVEL: Final = "=======+= +++++++L" + _BY_COMMAND
-_SPACE: Final = "=====H=+= +++++++L" + _BY_COMMAND
-_LIMITED: Final = "=====H=+= ++++++++" + _BY_COMMAND
+_BY_COMMAND: Final = " =+====++++++++=="
+_PAPER: Final = "=======+=N +++++++L" + _BY_COMMAND
+_LEVEL: Final = "=======+=N +++++++L" + _BY_COMMAND
+_SPACE: Final = "=====H=+=+ +++++++L" + _BY_COMMAND
+_LIMITED: Final = "=====H=+=+ ++++++++" + _BY_COMMAND
 """Those of a controller of the height with limits, which PX4 wants."""
-_PREVIEW: Final = "=====HAAA +A+AA++A" + _BY_COMMAND
+_PREVIEW: Final = "=====HAAPA +A+AA++A =+====A+++++++=="
+_PREVIEW_64: Final = "=====HAAPA +A+AAA+A A+====A+++++++=="
 
 _LIMITS: Final[Values] = {
     "limits.speed_m_s": 1.5,
@@ -197,7 +202,7 @@ OPTIONS: Final[dict[str, Option]] = {
     ),
     "height, guard": Option(SPACE, {"guard.thrust_m_s2": 1.0, "guard.thrust_m_s3": 10.0}, _SPACE),
     "all, float32": Option(ALL, {"code.scalar": "float32"}, _PREVIEW),
-    "all, float64": Option(ALL, {"code.scalar": "float64"}, _PREVIEW),
+    "all, float64": Option(ALL, {"code.scalar": "float64"}, _PREVIEW_64),
     "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _PREVIEW),
 }
 """The table, a row an option; what a row sets that its base has too is what the option is about."""
