@@ -25,12 +25,28 @@ from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.engine.simulate import fly as fly_in_engine
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.traces import read_npz
+from tests.support.bundles import place
 from tests.support.command import unwrapped
 from tests.support.option_flights import OptionFlights
+from tests.support.px4 import px4_files
 from tests.support.serial_line import Faults, build_firmware, serial_line
+from tests.support.shell import shell
 from tests.support.tools import board_builder, require_module
 
 SETTINGS: Final = "controller.toml"
+STUBS: Final = Path(__file__).parents[1] / "targets"
+STRICT: Final = "-fsyntax-only -Wall -Wextra -Werror"
+GLUE: Final = {
+    "arduino": [
+        f"g++ -x c++ -include Arduino.h -I{STUBS}/arduino_stubs -Isrc",
+        "examples/Hover/Hover.ino",
+    ],
+    "fmu": ["gcc -std=c99 -Isources", "sources/fmi?.c", "sources/nmpc_fmu.c"],
+    "mambo": [f"gcc -std=gnu89 -I{STUBS}/mambo_stubs -Isrc", "src/nmpc_mambo.c"],
+    "pil": ["gcc -std=c99 -D_GNU_SOURCE", "pil*.c", "board_host.c"],
+    "px4": ["g++ -std=gnu++17 -Wno-missing-field-initializers -Wno-unused-parameter -Ipx4", "*.cpp"],
+}
+"""How the code around the controller is compiled, and its files; the Crazyflie's app is flown."""
 
 
 class RefusedError(Exception):
@@ -202,11 +218,18 @@ def margins(flights: OptionFlights) -> str:
 
 
 def target(flights: OptionFlights, name: str) -> str:
-    """Write the folder of a firmware target: its C is that of the bundle, which flies."""
-    files = render_target(flights.settings, TARGETS[name], with_digest=False)
-    controller = with_prefix("nmpc.c", flights.settings.code.prefix)
+    """Write the folder of a target: its C is that of the bundle, and the code around it compiles."""
+    prefix, settings = flights.settings.code.prefix, flights.settings
+    files = render_target(settings, TARGETS[name], with_digest=False)
+    controller = with_prefix("nmpc.c", prefix)
     found = files[f"{TARGETS[name].source_folder}{controller}"]
-    assert found == TARGETS[name].opening + render(flights.settings, with_digest=False)[controller]
+    assert found == TARGETS[name].opening + render(settings, with_digest=False)[controller]
+    folder = Path(name).absolute()
+    place(px4_files(settings) if name == "px4" else files, folder)
+    compiler, *patterns = GLUE.get(name, [""])
+    for pattern in patterns:
+        (source, *others) = sorted(folder.glob(with_prefix(pattern, prefix)))
+        shell(*compiler.split(), *STRICT.split(), source, *others, folder=folder)
     return "+"
 
 
