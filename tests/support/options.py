@@ -43,10 +43,10 @@ COMMANDS: Final = (
     "margins",
     "diff",
     "tune",
-    "sweep",
     "regress",
-    "footprint",
+    "sweep",
     "same-bits",
+    "footprint",
     "verify",
 )
 """What the command line does besides."""
@@ -113,14 +113,15 @@ class Option:
         return self.marks.split()[(CONSUMERS, TARGETS, COMMANDS).index(columns)][columns.index(name)]
 
 
-_BY_COMMAND: Final = " =+====++++++++=="
+# fly wrapped campaign told api height replay playground rotorpy pilot; targets; commands
+_BY_COMMAND: Final = " =+====+++++++=+="
 _PAPER: Final = "=======+=N +++++++L" + _BY_COMMAND
 _LEVEL: Final = "=======+=N +++++++L" + _BY_COMMAND
 _SPACE: Final = "=====H=+=+ +++++++L" + _BY_COMMAND
 _LIMITED: Final = "=====H=+=+ ++++++++" + _BY_COMMAND
 """Those of a controller of the height with limits, which PX4 wants."""
-_PREVIEW: Final = "=====HAAPA +A+AA++A =+====A+++++++=="
-_PREVIEW_64: Final = "=====HAAPA +A+AAA+A A+====A+++++++=="
+_PREVIEW: Final = "=====HAAPA +A+AA++A =+====A++++++=+="
+_PREVIEW_64: Final = "=====HAAPA +A+AAA+A A+====A++++++=+="
 
 _LIMITS: Final[Values] = {
     "limits.speed_m_s": 1.5,
