@@ -111,9 +111,9 @@ def without_limits(figure: str) -> float:
     return float(one[figure].partition(", ")[2])
 
 
-def in_simulator(drone: str, controller: str) -> str:
-    """Return the median RMS distance on the eight with noise in a simulator of others, in mm."""
-    return shown(statistics.median(figures("simulators")[drone][controller]["eight"]))
+def in_simulator(drone: str, controller: str, item: str = "simulators") -> str:
+    """Return the median RMS distance on the eight in a simulator of others, in mm, by default with noise."""
+    return shown(statistics.median(figures(item)[drone][controller]["eight"]))
 
 
 def in_firmware(curve: str, controller: str) -> str:
@@ -219,6 +219,12 @@ FIGURES = [
     ),
     Figure("README.md", r"in crazyflow (\S+) mm,", lambda: in_simulator(X500, PAGE)),
     Figure("README.md", r"in crazyflow \S+ mm, (\S+) mm", lambda: in_simulator(X500, "Mellinger, tuned")),
+    Figure("README.md", r"\(true state (\S+) mm,", lambda: in_simulator(X500, PAGE, "truth")),
+    Figure(
+        "README.md",
+        r"\(true state \S+ mm, (\S+) mm",
+        lambda: in_simulator(X500, "Mellinger, tuned", "truth"),
+    ),
     Figure("README.md", r"gym-pybullet-drones (\S+) mm,", lambda: in_simulator(PYBULLET, PAGE)),
     Figure("README.md", r"drones \S+ mm, (\S+) mm", lambda: in_simulator(PYBULLET, "DSLPIDControl, tuned")),
     Figure("docs/evidence/faults.md", r"worse than none \((\d+) m after 5 s", frozen),
