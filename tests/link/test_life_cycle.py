@@ -230,6 +230,7 @@ def test_a_link_with_a_long_delay_is_refused(trip_s: float, flies: bool) -> None
     """Of more than 120 ms each way, which half of what a question and its answer take says."""
     ground = Ground(life_cycle())
     ground.trip_s = trip_s
+    ground.tell(beat(), Echo(-1), Echo(0), Echo(10**18))
     ground.connect()
     ground.wait(0.6)
     assert (ground.life.phase is Phase.ARMING) is flies

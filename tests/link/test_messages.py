@@ -126,7 +126,6 @@ ORDERS: list[tuple[Order, Stack]] = [
     (SetRate(Stream.ODOMETRY, 50.0), PX4),
     (TakeOff(2.0), ARDUCOPTER),
     (AskParameter("MPC_THR_HOVER"), PX4),
-    (Ping(0), PX4),
     (Ping(12), ARDUCOPTER),
 ]
 
@@ -144,7 +143,6 @@ RECORDS: list[Record] = [
     OnGround(landed=True),
     Battery(0.42),
     Text("Preflight Fail"),
-    Echo(0),
     Echo(12),
 ]
 

@@ -72,8 +72,8 @@ class Preflight:
                 self._battery = record.share
             case EstimatedState():
                 self._estimates.append(record)
-            case Echo() if record.number < len(self._pings_s):
-                self._trips_s.append(now_s - self._pings_s[record.number])
+            case Echo() if 0 < record.number <= len(self._pings_s):  # others ask too
+                self._trips_s.append(now_s - self._pings_s[record.number - 1])
 
     def requests(self) -> list[Order]:
         """Return what to ask the autopilot for."""
@@ -84,7 +84,7 @@ class Preflight:
     def ping(self, now_s: float) -> Order:
         """Return what measures the delay of the link."""
         self._pings_s.append(now_s)
-        return Ping(len(self._pings_s) - 1)
+        return Ping(len(self._pings_s))
 
     @property
     def delay_s(self) -> float:

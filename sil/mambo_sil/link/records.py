@@ -213,7 +213,7 @@ class AskParameter:
 
 @dataclass(frozen=True)
 class Ping:
-    """Answer at once with the same number, which is not negative."""
+    """Answer at once with the same number, 1 or more."""
 
     number: int
 
