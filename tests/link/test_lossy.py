@@ -23,11 +23,14 @@ WIRES: Final = {
 """Share of the messages that are lost, and delay; each is up to 30 ms later still."""
 
 
-def flight(stack: Stack, wire: str, seed: int = 0) -> LossyFlight:
-    """Return a flight that has not begun."""
+def flight(stack: Stack, wire: str) -> LossyFlight:
+    """Return a flight that is about to arm; a link that is slow before that is refused."""
     lost, delay_s = WIRES[wire]
     life = LifeCycle(Steering(controller(), list[Update]().append), 1.0)
-    return LossyFlight(life, stack, lambda way: LossyWire(lost, delay_s, seed=2 * seed + way))
+    one = LossyFlight(life, stack, lambda way: LossyWire(lost, min(delay_s, 0.08), seed=way))
+    one.pass_until(lambda: life.phase is Phase.ARMING)
+    one.to_pilot.delay_s = one.to_autopilot.delay_s = delay_s
+    return one
 
 
 def told_to_arm(one: LossyFlight) -> None:
@@ -55,7 +58,6 @@ def does_not_arm(one: LossyFlight) -> None:
 def arms_at_the_last_moment(one: LossyFlight) -> None:
     """Arm when the pilot is about to give up."""
     one.autopilot.arms = False
-    one.pass_until(lambda: one.life.phase is Phase.ARMING)
     one.wait(14.9)
     one.autopilot.arms = True
 
