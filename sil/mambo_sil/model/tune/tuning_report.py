@@ -28,7 +28,7 @@ _HEADS: Final = ("", "trial", "IAE, m s", "command variation, rad", *MARGIN_HEAD
 
 
 @dataclass(frozen=True)
-class Judged:
+class Selection:
     """Finished trials by what they achieved, with the margins of those that were asked for.
 
     base:         the trial with the base's settings; None while another machine flies it.
@@ -43,7 +43,7 @@ class Judged:
     keeps_margins: bool
 
 
-def judge_trials(tuning: Tuning, trials: Sequence[FinishedTrial]) -> Judged:
+def judge_trials(tuning: Tuning, trials: Sequence[FinishedTrial]) -> Selection:
     """Choose one of the trials of a study; raises BuildError, CacheError.
 
     Margins are measured of the base, of the front, and of trials that the choice asks for.
@@ -66,7 +66,7 @@ def judge_trials(tuning: Tuning, trials: Sequence[FinishedTrial]) -> Judged:
     assert chosen is not None  # a study has a trial
     front = pareto_front(trials)
     front += [] if chosen in front else [chosen]
-    return Judged(
+    return Selection(
         reference,
         next((with_margins(one) for one in find_base(tuning, trials)), None),
         with_margins(chosen),
@@ -137,7 +137,7 @@ def about_margins(reference: MarginReference, *, keeps: bool) -> str:
     return f"; MARGINS NOT KEPT: every trial has {WORSE} than with {reference.whose}"
 
 
-def summarise(tuning: Tuning, trials: Sequence[FinishedTrial], judged: Judged) -> TuneSummary:
+def summarise(tuning: Tuning, trials: Sequence[FinishedTrial], judged: Selection) -> TuneSummary:
     """Return the record of finished trials; values are rounded as in the controller.toml of a trial."""
     return TuneSummary(
         study=study_name(tuning),
@@ -181,7 +181,7 @@ def _rounded(trial: FinishedTrial) -> FinishedTrial:
     return replace(trial, values={path: round_value(value) for path, value in trial.values.items()})
 
 
-def front_csv(judged: Judged) -> str:
+def front_csv(judged: Selection) -> str:
     """Return the front as CSV, one line per trial; `chosen` is 1 for the chosen one."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -196,7 +196,7 @@ def front_csv(judged: Judged) -> str:
     return text.getvalue()
 
 
-def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial], judged: Judged) -> str:
+def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial], judged: Selection) -> str:
     """Return the controller.toml of the chosen trial; its head names study, trial and result."""
     best, flight = judged.chosen, tuning.file.flight
     rule = f"{RULE}{about_margins(judged.reference, keeps=judged.keeps_margins)}"
