@@ -30,15 +30,22 @@ def find_obstacle(path: Path) -> str | None:
     return None if stat.S_ISREG(mode) else _KINDS[stat.S_IFMT(mode)]
 
 
-def guess_name(path: Path) -> str:
-    """Return " (did you mean NAME?)" with a file of a similar name beside `path`; "" if one is there."""
+def guess_name(path: Path, folder: Path | None = None) -> str:
+    """Return " (did you mean NAME?)" with a file of a similar name beside `path`; "" if one is there.
+
+    folder: what the name is relative to, if that is not the current folder.
+    """
     try:
         beside = [] if os.path.lexists(path) else sorted(path.parent.iterdir())
     except (OSError, ValueError):  # no folder, too long a name
         return ""
     by_stem = {one.stem: one for one in sorted(beside, key=lambda one: one.suffix == path.suffix)}
     near = difflib.get_close_matches(path.stem, by_stem, n=1, cutoff=0.75)
-    return f" (did you mean {echo(str(by_stem[near[0]]))}?)" if near else ""
+    if not near:
+        return ""
+    found = by_stem[near[0]]
+    shown = found.relative_to(folder) if folder is not None and found.is_relative_to(folder) else found
+    return f" (did you mean {echo(str(shown))}?)"
 
 
 def read_plain_file(path: Path, most_bytes: int) -> bytes:

@@ -28,7 +28,7 @@ def _crazyflie() -> None:
 @pytest.mark.usefixtures("_crazyflie")
 def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) -> None:
     """PNG, SVG, HTML and the summary, which stdout repeats; a hostile name is text on the page."""
-    (tmp_path / HOSTILE).write_text("")
+    (tmp_path / HOSTILE).write_text("[horizon]\ncontrol = 2\n")
     said, _ = run("footprint", HOSTILE, "--board", "crazyflie", "--json", "-o", "out")
     out = tmp_path / "out"
     names = {"footprint.png", "footprint.svg", "footprint.html", "summary.json"}

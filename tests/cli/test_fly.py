@@ -248,7 +248,7 @@ def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pyte
     """Neither a backend that does not exist nor LaTeX, nor a name that reads like a formula."""
     monkeypatch.setenv("MPLBACKEND", "no-such-backend")
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
-    (tmp_path / "$x_\u65e5$.toml").write_text("")
+    (tmp_path / "$x_\u65e5$.toml").write_text("[horizon]\ncontrol = 2\n")
     options = ["--controller", "reference", "--duration-s", "0.1"]
     done = command("fly", "$x_\u65e5$.toml", *options, folder=tmp_path)
     assert (done.returncode, done.stderr.count("\n")) == (0, 1), done.stderr

@@ -114,7 +114,7 @@ def test_a_misspelt_file_of_a_campaign_is_looked_for_beside_it(tmp_path: Path) -
     """Its names are relative to its own folder; a file like no other gets no guess."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "controller.toml").touch()
-    for name, guess in (("contoller.toml", " (did you mean mine/controller.toml?)"), ("other.toml", "")):
+    for name, guess in (("contoller.toml", " (did you mean controller.toml?)"), ("other.toml", "")):
         (tmp_path / "mine" / "campaign.toml").write_text(f'controllers = ["{name}"]\n')
         talk = run("campaign", "mine/campaign.toml", code=2)[1]
         assert talk.endswith(f"to start from{guess}\n"), talk

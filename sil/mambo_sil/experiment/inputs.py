@@ -80,7 +80,7 @@ def _loaded(
     try:
         return load(named if named in shipped or not path.exists() else str(path))
     except MamboNmpcError as error:
-        guess = "" if "(did you mean" in str(error) else guess_name(path)
+        guess = "" if "(did you mean" in str(error) else guess_name(path, folder)
         raise InvalidSettingsError(
             tuple(f"{place}: {line}" for line in f"{error}{guess}".splitlines())
         ) from None

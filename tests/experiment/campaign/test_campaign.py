@@ -292,8 +292,8 @@ def test_an_error_names_key_value_and_rule(text: str, tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
     (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
     for name in ("a b", "calm", "Calm", "calm_seen"):
-        (tmp_path / f"{name}.toml").write_text("")
-    (tmp_path / "pd-feedforward.toml").write_text("")
+        (tmp_path / f"{name}.toml").write_text("[horizon]\ncontrol = 1\n")
+    (tmp_path / "pd-feedforward.toml").write_text("[horizon]\ncontrol = 1\n")
     (fault,) = faults(tmp_path, text)
     assert BAD[text] in fault
 
@@ -370,7 +370,8 @@ def test_a_file_names_its_drone(tmp_path: Path) -> None:
     assert campaign_file.read(written(tmp_path, '[flight]\nvehicle = "my.toml"\n')).drone.name == "my"
     assert faults(tmp_path, '[flight]\nvehicle = "my"\n') == [
         "flight.vehicle: my is neither a shipped vehicle nor a file; vehicles are "
-        f"{', '.join(VEHICLES.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
+        f"{', '.join(VEHICLES.names())}, and `mambo-nmpc vehicles NAME` prints one to start from "
+        "(did you mean my.toml?)"
     ]
     assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
         'flight.sensors = "mambo" must be "true" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'

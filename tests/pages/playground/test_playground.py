@@ -166,7 +166,7 @@ def test_a_file_is_called_by_its_own_name_as_text(tmp_path: Path) -> None:
     """It may be called anything; the page does not tell where it was."""
     demand_tools()
     Path("folder").mkdir()
-    Path("folder", "<img src=x>.toml").write_text("", "utf-8")
+    Path("folder", "<img src=x>.toml").write_text("[horizon]\ncontrol = 2\n", "utf-8")
     run(str(tmp_path / "folder" / "<img src=x>.toml"))
     page = Path("play.html").read_text("utf-8")
     assert "<img" not in page
