@@ -262,6 +262,7 @@ def test_the_choice_is_among_trials_that_keep_their_margins() -> None:
     assert choose(trials, lambda _: False) is None
 
 
+@pytest.mark.long
 def test_the_closest_trial_is_not_chosen_without_its_margins() -> None:
     """A response time on the edge, which is the closest, stands in the front with what it tolerates."""
     tuning = tuning_file.default()
