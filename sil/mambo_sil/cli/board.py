@@ -164,8 +164,8 @@ def sweep(
             reference=reference,
         )
         summary.write(folder)
-    if fit and not as_json:
-        summary = summary.model_copy(update={"points": [] if best is None else [best]})
+    if fit and best is not None and not as_json:
+        summary = summary.model_copy(update={"points": [best]})
     show_result(summary, output, SWEEP_FILES, as_json=as_json)
     if fit and best is None:
         raise typer.Exit(1)

@@ -102,13 +102,16 @@ def test_a_closer_point_with_small_margins_is_named() -> None:
             [
                 "closest: horizon.prediction 10, horizon.control 2, IAE 2 m s",
                 "closer, but with a loop more than 20 % worse than with preset mambo: horizon.prediction 5, "
-                "horizon.control 2, IAE 1 m s, which tolerates 1.50 times the gain or 42.0 ms",
+                "horizon.control 2, IAE 1 m s, tolerates 1.50 times the gain or 42.0 ms more delay",
             ],
         ),
         (
             [small],
             replace(UNKNOWN, whose="preset mambo", missing=None),
-            ["none keeps the margins of preset mambo: each has a loop more than 20 % worse", "closer, but "],
+            [
+                "none keeps the margins of preset mambo: each has a loop more than 20 % worse",
+                "the closest of these: horizon.prediction 5, ",
+            ],
         ),
         ([small], UNKNOWN, ["margins are not known: not linear"]),
         ([calm], replace(UNKNOWN, missing=None), ["closest: horizon.prediction 10, "]),

@@ -80,15 +80,17 @@ class SweepSummary(ReportedSummary):
             return said
         if reference.missing is not None:
             return [*said, f"margins are not known: {reference.missing}"]
+        if closest.reserve.enough:
+            return said
+        begin = f"closer, but with {WORSE} than with {reference.whose}"
         if best is None:
             said = [f"none keeps the margins of {reference.whose}: each has {WORSE}"]
-        if not closest.reserve.enough:
-            gain, delay_ms = closest.reserve.cells
-            said.append(
-                f"closer, but with {WORSE} than with {reference.whose}: {_values(closest)}, IAE "
-                f"{digits(closest.iae_m_s)} m s, which tolerates {gain} times the gain or {delay_ms} ms"
-            )
-        return said
+            begin = "the closest of these"
+        gain, delay_ms = closest.reserve.cells
+        figures = (
+            f"IAE {digits(closest.iae_m_s)} m s, tolerates {gain} times the gain or {delay_ms} ms more delay"
+        )
+        return [*said, f"{begin}: {_values(closest)}, {figures}"]
 
 
 def closest_fit(points: Sequence[Point]) -> Point | None:
