@@ -10,14 +10,9 @@ from typing import Any, Final
 import jinja2
 
 from mambo_codegen import __version__, boards
-from mambo_codegen.bundle.digest import (
-    TICKS,
-    TICKS_PER_INPUT,
-    episode_count,
-    input_scales,
-    kept_digest,
-    scale_constants,
-)
+from mambo_codegen.bundle.digest import episode_count, kept_digest, start_up_test
+from mambo_codegen.bundle.draws import input_scales, scale_constants
+from mambo_codegen.bundle.episodes import TICKS, TICKS_PER_INPUT, lost_inputs
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -28,7 +23,6 @@ from mambo_codegen.bundle.flags import (
 from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import products, term
-from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -238,13 +232,15 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "yaw_limit_rad": YAW_LIMIT_RAD,
             "turn_rad": TURN_RAD,
             "turns_per_rad": TURNS_PER_RAD,
-            "vectors": self_test(settings),
+            "start_up": start_up_test(settings),
             "episodes": episode_count(method),
             "ticks": TICKS,
             "held": TICKS_PER_INPUT,
             "self_test_steps": TICKS * episode_count(method),
             "self_test_digest": kept_digest(method) if with_digest else None,
             "spread": (scales := input_scales(method)),
+            "lost": lost_inputs(method),
+            "estimate_numbers": method.reference_controller().last_estimate.shape[1],
             "scale_constants": scale_constants(method, scales),
             "boards": [
                 {

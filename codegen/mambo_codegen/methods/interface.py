@@ -63,6 +63,14 @@ class ReferenceController(Protocol):
         """What follows from the limits (n, k), in the numbers of the C; k is 0 without limits."""
 
     @property
+    def last_estimate(self) -> Real:
+        """All numbers of nmpc_estimate_t (n, k), in the numbers of the C; k is 0 where there is none."""
+
+    @property
+    def has_estimate(self) -> NDArray[np.bool_]:
+        """Whether the estimate is valid (n,)."""
+
+    @property
     def outcome(self) -> Mapping[str, NDArray[Any]]:
         """What the last call left, in the numbers of the C."""
 
@@ -106,7 +114,8 @@ class Method(Constants):
     step_type:   the class of its steps.
     sub_blocks:  the chapters of nmpc.c in the order of a control step, with a word on each.
     setter:      the C function, less its prefix, that sets what only this method has.
-    digested:    the results of a step that the self-test digest covers, in its order, as far as there are.
+    digested:    what a step leaves that the self-test digest covers behind status and flags, in its order, as
+                 far as there is.
     iterates:    whether it searches the moves by iterations over a horizon.
     unnamed:     sections and keys that the settings' digest leaves out at their defaults: what came later.
     """

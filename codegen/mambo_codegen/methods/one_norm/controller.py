@@ -230,6 +230,16 @@ class OneNormController:
         return np.concatenate([none, *self._limits.stored(self.memory.limits, has_command=False)], axis=1)
 
     @property
+    def last_estimate(self) -> Real:
+        """No numbers (n, 0): nothing is estimated."""
+        return np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
+
+    @property
+    def has_estimate(self) -> NDArray[np.bool_]:
+        """Return that there is no estimate (n,)."""
+        return np.zeros(len(self.memory.command_rad), np.bool_)
+
+    @property
     def outcome(self) -> dict[str, NDArray[Any]]:
         """What the last call left, in the numbers of the C."""
         memory = self.memory

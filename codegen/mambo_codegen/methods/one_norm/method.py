@@ -38,7 +38,7 @@ class OneNorm(OneNormConstants, Method):
     }
     setter: ClassVar[str] = "set_weights"
     digested: ClassVar[tuple[str, ...]] = (
-        "status",
+        "missed",
         "iterations",
         "converged",
         "command_rad",

@@ -24,6 +24,8 @@ class QuadraticArithmetic(Arithmetic):
         constant, period_s = self.numbers.constant, constants.settings.horizon.update_period_s
         self._update_period_s, self._steepest = constant(period_s, "step"), constant(STEEPEST_RAD, "angle")
         self._most_slope = constant(MOST_SLOPE, "factor")
+        self._steps_per_s = constant(constants.observer.steps_per_s, "per_step")
+        self._steps2_per_s2 = constant(constants.observer.steps2_per_s2, "per_step2")
 
     def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         """Return a b - c d of sines and cosines."""
@@ -36,6 +38,14 @@ class QuadraticArithmetic(Arithmetic):
     def speed_product(self, velocity_m_s: Real) -> Real:
         """Return T_s * velocity, m/step."""
         return self._nearest(self._update_period_s * velocity_m_s, "speed_product")
+
+    def per_step_product(self, velocity_m_step: Real) -> Real:
+        """Return velocity / T_s, m/s."""
+        return self._nearest(self._steps_per_s * velocity_m_step, "per_step_product")
+
+    def per_step2_product(self, acceleration_m_step2: Real) -> Real:
+        """Return acceleration / T_s^2, m/s^2."""
+        return self._nearest(self._steps2_per_s2 * acceleration_m_step2, "per_step2_product")
 
     def drag_product(self, drag_1_step: Any, velocity_m_step: Real) -> Real:
         """Return drag * velocity, m/step^2."""

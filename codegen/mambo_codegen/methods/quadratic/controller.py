@@ -226,6 +226,25 @@ class QuadraticController:
         }
 
     @property
+    def last_estimate(self) -> Real:
+        """All numbers of nmpc_estimate_t (n, k), in their order and in the numbers of the C."""
+        memory, products = self.memory, self.parts.products
+        estimate, learnt = memory.estimate, self.parts.tilt_gain
+        columns = [
+            estimate.position_m,
+            products.per_step_product(estimate.velocity_m_step),
+            products.per_step2_product(estimate.disturbance_m_step2),
+            *self._height.estimate(memory.height),
+            *([memory.tilt_gain.gain] if learnt else []),
+        ]
+        return np.concatenate(columns, axis=1)
+
+    @property
+    def has_estimate(self) -> NDArray[np.bool_]:
+        """Whether the estimate is valid (n,)."""
+        return self.parts.has_estimate(self.memory)
+
+    @property
     def stored_limits(self) -> Real:
         """All numbers of nmpc_bounds_t (n, k), in their order; k is 0 without limits."""
         columns = [np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)]

@@ -423,3 +423,12 @@ class HeightAxis:
         columns += [] if self._budget is None else [state.commanded_m_s2, state.budget_m_s2]
         stored = [column[:, None] for column in columns]
         return stored if self._tracker is None else [*stored, *self._tracker.stored(state.target)]
+
+    def estimate(self, state: HeightState) -> list[NDArray[Any]]:
+        """Return the columns (n, 1) of nmpc_estimate_t: height, climb, and what is learnt of the thrust."""
+        products = self._products
+        columns = [state.height_m, products.per_step_product(state.velocity_m_step)]
+        columns += [state.gain] if self._found.learns_gain else []
+        if self._found.learns_acceleration:
+            columns.append(products.per_step2_product(state.disturbance_m_step2))
+        return [column[:, None] for column in columns]

@@ -54,10 +54,7 @@ class Quadratic(QuadraticConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_command"
-    digested: ClassVar[tuple[str, ...]] = (
-        *("status", "missed", "saturated", "stored"),
-        *("command_rad", "thrust_m_s2"),
-    )
+    digested: ClassVar[tuple[str, ...]] = ("missed", "command_rad", "thrust_m_s2", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = (
         "target",

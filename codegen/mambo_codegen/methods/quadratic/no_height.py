@@ -93,3 +93,8 @@ class NoHeight:
         """Return no columns: there is no nmpc_height_t."""
         del state
         return []
+
+    def estimate(self, state: HeightState) -> list[Real]:
+        """Return no columns: nmpc_estimate_t has no height."""
+        del state
+        return []

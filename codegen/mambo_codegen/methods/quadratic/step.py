@@ -153,6 +153,10 @@ class ControlStep:
             tilt_gain=memory.tilt_gain,
         )
 
+    def has_estimate(self, memory: QuadraticMemory) -> NDArray[np.bool_]:
+        """Return whether there is an estimate (n,): not before the first good state and after an outage."""
+        return memory.missed < self._no_estimate
+
     def shift(self, memory: QuadraticMemory, jump: FrameShift) -> QuadraticMemory:
         """Return the memory after jumps of the frame."""
         moved = replace(

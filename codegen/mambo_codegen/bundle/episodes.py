@@ -1,0 +1,226 @@
+"""Episodes of the self-test: the inputs of their control steps, and the other calls between them."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.bundle.draws import Draws, InputScales, Words, input_scales
+from mambo_codegen.methods import Method
+from mambo_codegen.methods.shared.inputs import Rows
+from mambo_codegen.methods.shared.math import Real
+from mambo_codegen.numbers.representation import PREVIEW_TIMES, THRUST
+
+TICKS: Final = 100
+"""Steps of an episode."""
+TICKS_PER_INPUT: Final = 4
+"""Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
+
+_TURN: Final = 16
+"""The other calls come in turn: each input has the one of its number modulo this."""
+_FIRST_LOST: Final = 2
+_MOST_LOST: Final = 21
+_BRAKING_TICKS: Final = 20
+"""Steps of an outage in which a controller brakes that flies on no more by its estimate."""
+
+
+@dataclass(frozen=True)
+class OtherCall:
+    """A call of n controllers between two steps.
+
+    function: of the reference controller.
+    values:   (n, k) its arguments, in SI units.
+    is_made:  (n,) which of the controllers it is made for.
+    """
+
+    function: str
+    values: Real
+    is_made: Rows
+
+
+@dataclass(frozen=True)
+class EpisodeStep:
+    """A control step of n controllers, and the calls before it.
+
+    state, target, thrust: as in `ReferenceController.step`.
+    is_new:                whether the input is new; then there are calls before.
+    headings:              (n, 3) arguments of nmpc_slew_heading, in SI units.
+    call:                  one of a function that changes the controller; None if there is none.
+    """
+
+    state: Real
+    target: Real
+    thrust: Real | None
+    is_new: bool
+    headings: Real
+    call: OtherCall | None
+
+
+@dataclass(frozen=True)
+class _Input:
+    """Inputs of n controllers, and changes of the targets from step to step, in numbers of the C."""
+
+    state: Real
+    target: Real
+    thrust: Real
+    change: Real
+
+
+def lost_inputs(method: Method) -> int:
+    """Return how many inputs in a row have no good state in an outage; 0 for a method that holds on."""
+    steps = method.outage_steps
+    return 0 if steps is None else min(_MOST_LOST, -(-(steps + _BRAKING_TICKS) // TICKS_PER_INPUT))
+
+
+class Episodes:
+    """n episodes, which run side by side: that outweighs NumPy's overhead for each operation."""
+
+    def __init__(self, method: Method, episodes: Words) -> None:
+        """`episodes` (n,) are their numbers."""
+        self._method, self._numbers = method, method.numbers
+        self._scales: InputScales = input_scales(method)
+        self._draws = Draws(episodes, method.numbers)
+        self._lost = lost_inputs(method)
+        self._is_lost = (episodes % 8 == 7) & (self._lost > 0)
+
+    def steps(self) -> Iterator[EpisodeStep]:
+        """Yield the TICKS steps."""
+        method = self._method
+        for index in range(TICKS // TICKS_PER_INPUT):
+            given = self._next_input(index)
+            headings, call = self._next_headings(), self._next_call(index)
+            for tick in range(TICKS_PER_INPUT):
+                if tick == TICKS_PER_INPUT - 1:
+                    given = self._spoilt(given)
+                yield EpisodeStep(
+                    self._numbers.to_si(given.state, *method.state),
+                    self._numbers.to_si(given.target, *method.target),
+                    None if method.has_height else self._numbers.to_si(given.thrust, *THRUST),
+                    tick == 0,
+                    headings,
+                    call if tick == 0 else None,
+                )
+                given = replace(given, target=given.target + given.change)
+
+    def _next_input(self, index: int) -> _Input:
+        """Draw the next inputs.
+
+        The target's velocity changes for a tracker that measures the acceleration by it. With a height one
+        drone in eight touches the floor.
+        """
+        method, numbers, limits, scales = self._method, self._numbers, self._method.limits, self._scales
+        choice = self._draws.next()
+        size = choice & 3
+        draw = self._draw
+
+        def error(sizes: tuple[float, ...], quantity: str) -> Real:
+            return self._draws.draw(np.array([numbers.constant(one, quantity) for one in sizes])[size])
+
+        target = [draw(scales.target_position_m, "position") for _ in range(2)]
+        target += [draw(scales.target_velocity_m_s, "velocity") for _ in range(2)]
+        state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
+        state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
+        state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
+        state += [draw(scales.yaw_rad, "yaw")]
+        thrust = np.full_like(state[0], limits.thrust_least)
+        if not method.has_height:
+            thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_m_s2, "thrust")
+            thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+        change = [np.zeros_like(thrust)] * len(method.target)
+        is_given = method.settings.target.gives_acceleration
+        has_motion, quantity = method.tracker is not None or is_given, "thrust" if is_given else "velocity"
+        if has_motion:
+            motion = [draw(scales.target_motion, quantity) for _ in range(2)]
+            if is_given:
+                target += motion
+            else:
+                change[2:4] = motion
+        if method.has_height:
+            target += [draw(scales.target_position_m, "position"), draw(scales.target_velocity_m_s, "velocity")]
+            state += [target[-2] + error(scales.error_position_m, "position")]
+            state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
+            state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
+            vertical = [draw(scales.climb_motion, quantity)] if has_motion else []
+            if len(method.target) > len(target):
+                target += vertical
+            else:
+                change[-1:] = vertical or change[-1:]
+        axes = scales.target_motion, scales.target_motion, scales.climb_motion
+        target += [draw(scale, quantity) for scale in axes * PREVIEW_TIMES * method.has_preview]
+        if _FIRST_LOST <= index < _FIRST_LOST + self._lost:
+            state[0] = np.where(self._is_lost, self._draws.beyond(self._is_lost), state[0])
+        return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
+
+    def _spoilt(self, given: _Input) -> _Input:
+        """Return inputs of which one in four is out of range."""
+        spoil, last = self._draws.spoil, 9 if self._method.has_height else 7
+        state = np.column_stack([spoil(given.state[:, :last]), given.state[:, last:]])
+        target = spoil(given.target)
+        thrust = given.thrust if self._method.has_height else spoil(given.thrust[:, None])[:, 0]
+        return replace(given, state=state, target=target, thrust=thrust)
+
+    def _next_headings(self) -> Real:
+        scales = self._scales
+        columns = [self._draw(scales.heading_rad, "yaw") for _ in range(2)]
+        columns += [self._share(scales.turn_rad, "yaw")]
+        return self._arguments(columns, ("yaw",) * 3)
+
+    def _next_call(self, index: int) -> OtherCall | None:
+        """Return the other call before input number `index`; None if there is none."""
+        method, everyone = self._method, np.ones_like(self._is_lost)
+        calls: dict[int, tuple[str, Callable[[], Real]]] = {
+            1: ("shift", lambda: self._shift(turns=index & 8 == 0)),
+            2: (method.setter, self._weights if method.weight_limits else self._command),
+        }
+        if method.limiting is not None:
+            calls[0] = "set_limits", self._limits
+        if method.has_height:
+            calls[3] = "set_thrust", lambda: self._command()[:, 2:]
+        if method.guard is not None:
+            calls[4] = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
+        turn = index % _TURN
+        if turn == 5:
+            return OtherCall("reset", self._command(), ~self._is_lost)
+        name, arguments = calls.get(turn % 8 if turn < 13 else turn, ("", None))
+        return OtherCall(name, arguments(), everyone) if arguments else None
+
+    def _command(self) -> Real:
+        scales = self._scales
+        columns = [self._draw(scales.attitude_rad, "angle") for _ in range(2)]
+        columns += [self._share(scales.thrust_m_s2, "thrust")] if self._method.has_height else []
+        return self._arguments(columns, self._method.command)
+
+    def _weights(self) -> Real:
+        quantities = self._method.setter_quantities
+        columns = [self._share(*one) for one in zip(self._scales.weights, quantities, strict=True)]
+        return self._arguments(columns, quantities)
+
+    def _shift(self, *, turns: bool) -> Real:
+        scales, axes = self._scales, 3 if self._method.has_height else 2
+        columns = []
+        for _ in range(axes):
+            columns.append(self._draw(scales.target_position_m, "position"))
+            columns.append(self._draw(scales.target_velocity_m_s, "velocity"))
+        heading = self._draw(scales.yaw_rad, "yaw") if turns else np.zeros_like(columns[0])
+        return self._arguments([*columns[::2], *columns[1::2], heading], self._method.shift)
+
+    def _limits(self) -> Real:
+        limiting, numbers = self._method.limiting, self._numbers
+        assert limiting is not None, "asked for with limits only"
+        choice = self._draws.next()
+        defaults = numbers.quantize([limiting.limits], limiting.quantities).astype(numbers.computed)[0]
+        columns = []
+        for k, one in enumerate(zip(self._scales.limits, limiting.quantities, strict=True)):
+            columns.append(np.where((choice >> k) & 1 == 1, self._share(*one), defaults[k]))
+        return self._arguments(columns, limiting.quantities)
+
+    def _arguments(self, columns: list[Real], quantities: tuple[str, ...]) -> Real:
+        """Return arguments of a call, one of which may be out of range, in SI units."""
+        return self._numbers.to_si(self._draws.spoil(np.stack(columns, axis=1)), *quantities)
+
+    def _draw(self, scale: float, quantity: str) -> Real:
+        return self._draws.draw(self._numbers.constant(scale, quantity))
+
+    def _share(self, scale: float, quantity: str) -> Real:
+        return self._draws.share(self._numbers.constant(scale, quantity))
