@@ -6,6 +6,7 @@ ones (`draws.py`). The C (`nmpc_self_test.c.j2`) runs the episodes one after the
 in parallel arrays when the C is generated.
 """
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,17 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.bundle.draws import Words, fold, input_scales, tiny_m
-from mambo_codegen.bundle.episodes import TICKS, TICKS_PER_INPUT, Episodes, EpisodeStep, OtherCall
+from mambo_codegen.bundle.episodes import (
+    CALLS_IN_TURN,
+    TICKS,
+    TICKS_PER_INPUT,
+    WITH_NULLS,
+    Episodes,
+    EpisodeStep,
+    OtherCall,
+    null_calls,
+)
 from mambo_codegen.kept import keep
 from mambo_codegen.methods import Method, ReferenceController, method_of
 from mambo_codegen.methods.shared.heading import slew_heading
-from mambo_codegen.methods.shared.inputs import Status, choose
+from mambo_codegen.methods.shared.inputs import Rows, Status, choose
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.settings.model import Settings
 
 START_UP_STEPS: Final = 1 + (8 * TICKS_PER_INPUT)
 """Steps of the self-test at start-up: a tiny error, and the first inputs of an episode, with each function."""
 
+_FLAGS: Final = 64
+"""More than all flags of a step together, and than a status."""
 _CANDIDATES: Final = 64
 """The start-up test is one of so many episodes."""
 _MOST_EPISODES: Final = 1000
@@ -36,6 +48,9 @@ _LEAST_WORK: Final = 20
 
 StepInputs = tuple[Real, Real, Real | None]
 """States, targets and thrusts of one step of n controllers, as in `ReferenceController.step`."""
+
+Command = tuple[Real, Real | None]
+"""Roll and pitch (n, 2), and with a height the thrust (n,), in numbers of the C."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +101,13 @@ def start_up_test(settings: Settings) -> StartUpTest:
     numbers to zero fails.
     """
     method = method_of(settings)
-    run = _Run(method, _CANDIDATES)
+    run, episodes = _Run(method, _CANDIDATES), Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32))
     run.make_tiny()
-    digests = [run.digests]
-    for step, _ in zip(
-        Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32)).steps(),
-        range(START_UP_STEPS - 1),
-        strict=False,
-    ):
-        run.make(step)
+    digests, ways = [run.digests], list[Words]()
+    for step in itertools.islice(episodes.steps(), START_UP_STEPS - 1):
+        ways += run.make(step)
         digests.append(run.digests)
-    best = int(np.argmax([len(ways) for ways in run.ways]))
+    best = int(np.argmax([len(set(one)) for one in np.array(ways).T.tolist()]))
     return StartUpTest(best, tuple(int(one[best]) for one in digests))
 
 
@@ -104,13 +115,12 @@ class _Run:
     """n reference controllers in their episodes.
 
     digests: (n,) of all results so far.
-    ways:    in which the calls of each ended: with which status, and the steps with which flags.
     """
 
     def __init__(self, method: Method, n: int) -> None:
         self._method, self._controller = method, method.reference_controller(n)
         self.digests: Words = np.zeros(n, np.uint32)
-        self.ways: list[set[tuple[object, ...]]] = [set() for _ in range(n)]
+        self._level = self._command()
 
     def make_tiny(self) -> None:
         """Make a step of drones almost at their targets."""
@@ -120,13 +130,27 @@ class _Run:
         thrust = None if method.has_height else np.full(n, input_scales(method).hover_m_s2)
         self._step(state, target, thrust)
 
-    def make(self, step: EpisodeStep) -> None:
-        """Make the calls and the step."""
-        if step.is_new:
+    def make(self, step: EpisodeStep) -> list[Words]:
+        """Make the calls and the step; return a number for each way (n,) in which one of them can end."""
+        ways = []
+        if step.index is not None:
             self._ask(step.headings)
-            status = self._call(step.call) if step.call else np.zeros_like(self.digests)
+            turn = step.index % CALLS_IN_TURN
+            if turn == WITH_NULLS:
+                self._refuse_nulls(step.calls)
+            status = self._call(step.call, step.calls) if step.call else np.zeros_like(self.digests)
+            ways.append((_FLAGS * (1 + turn)) + status)
             self._fold(status)
-        self._step(step.state, step.target, step.thrust)
+            self._fold_controller()
+        return [*ways, self._step(step.state, step.target, step.thrust)]
+
+    def _refuse_nulls(self, is_made: Rows) -> None:
+        """Make the calls with null pointers: a step without a controller commands what a new one holds."""
+        before = self.digests
+        self._fold_command(self._level)
+        self._fold_command(self._command())
+        self._fold(np.full_like(self.digests, null_calls(self._method)))
+        self.digests = np.where(is_made, self.digests, before)
 
     def _ask(self, headings: Real) -> None:
         """Make the calls that change nothing."""
@@ -136,43 +160,52 @@ class _Run:
         if self._controller.last_estimate.shape[1]:
             self._fold(self._controller.has_estimate)
 
-    def _call(self, call: OtherCall) -> NDArray[Any]:
+    def _call(self, call: OtherCall, is_made: Rows) -> NDArray[Any]:
         """Make another call, and return its status (n,)."""
         controller, before, values = self._controller, self._controller.memory, call.values
         if values.shape[1] == 1:
             values = values[:, 0]
         made = getattr(controller, call.function)(values)
-        controller.memory = choose(call.is_made, controller.memory, before)
-        status: NDArray[Any] = np.where(call.is_made, made, Status.OK)
-        for ways, one in zip(self.ways, status.tolist(), strict=True):
-            ways.add((call.function, one))
+        controller.memory = choose(is_made, controller.memory, before)
+        status: NDArray[Any] = np.where(is_made, made, Status.OK)
         return status
 
-    def _step(self, state: Real, target: Real, thrust: Real | None) -> None:
+    def _step(self, state: Real, target: Real, thrust: Real | None) -> Words:
         status = self._controller.step(state, target, thrust).status
-        left = dict(self._controller.outcome)
-        saturated, active = left.pop("saturated"), left.pop("active", None)
         self._fold(status)
+        self._fold_command(self._command())
+        return (_FLAGS * CALLS_IN_TURN) + (_FLAGS * status) + self._fold_controller()
+
+    def _command(self) -> Command:
+        left = self._controller.outcome
+        return left["command_rad"], left.get("thrust_m_s2")
+
+    def _fold_command(self, command: Command) -> None:
+        for values, quantity in zip(command, ("angle", "thrust"), strict=True):
+            if values is not None:
+                self._fold_numbers(values, quantity)
+
+    def _fold_controller(self) -> NDArray[Any]:
+        """Fold in what a call has left, and return flags (n,): the limits that act, 8 for saturation."""
+        left, method = self._controller.outcome, self._method
+        saturated = left["saturated"]
+        active = left.get("active", 0) + (8 * saturated)
         self._fold(saturated)
-        if active is not None:
-            self._fold(active + (8 * saturated))
-        quantities = {one.name: one.quantities for one in self._method.results}
-        for name in filter(left.__contains__, self._method.digested):
-            values = left[name]
+        if method.has_limits:
+            self._fold(active)
+        quantities = {one.name: one.quantities for one in method.results}
+        for name in filter(left.__contains__, method.digested):
             if quantities[name]:
-                self._fold_numbers(values, quantities[name][0])
+                self._fold_numbers(left[name], quantities[name][0])
             else:
-                self._fold(values)
-        flags = zip(status.tolist(), saturated.tolist(), np.broadcast_to(
-            0 if active is None else active, status.shape).tolist(), strict=True)
-        for ways, one in zip(self.ways, flags, strict=True):
-            ways.add(one)
+                self._fold(left[name])
+        return active
 
     def _fold(self, values: NDArray[Any]) -> None:
         self.digests = fold(self.digests, values.astype(np.uint32))
 
     def _fold_numbers(self, values: Real, quantity: str) -> None:
         """Fold in numbers of the C (n, ...); of 64 bits the upper word comes first."""
-        rows = np.ascontiguousarray(values.reshape(len(self.digests), -1)).astype(self._method.numbers.type_of(quantity))
+        rows = values.reshape(len(self.digests), -1).astype(self._method.numbers.type_of(quantity))
         for word in rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T:
             self.digests = fold(self.digests, word)

@@ -149,20 +149,27 @@ def tiny_m(method: Method) -> float:
 
 
 class Draws:
-    """n random number generators: Marsaglia's xorshift (Journal of Statistical Software 8(14), 2003)."""
+    """n random number generators: Marsaglia's xorshift (Journal of Statistical Software 8(14), 2003).
+
+    last: (n,) the numbers that they drew last, which are their states.
+    """
 
     def __init__(self, episodes: Words, numbers: Representation) -> None:
-        self._state = fold(np.zeros_like(episodes), episodes + np.uint32(1))
+        self.last = fold(np.zeros_like(episodes), episodes + np.uint32(1))
         self._numbers = numbers
 
     def next(self) -> Words:
         """Return the next 32 bits of every generator."""
-        number = self._state
+        number = self.last
         number = number ^ (number << np.uint32(13))
         number = number ^ (number >> np.uint32(17))
         number = number ^ (number << np.uint32(5))
-        self._state = number
+        self.last = number
         return number
+
+    def restore(self, rows: Rows, before: Words) -> None:
+        """Put the generators of `rows` (n,) back to the numbers that they drew last."""
+        self.last = np.where(rows, before, self.last)
 
     def draw(self, scale: Real) -> Real:
         """Return the upper 24 of the next 32 bits as a signed integer times `scale`, rounded once."""

@@ -17,12 +17,14 @@ TICKS: Final = 100
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
 
-_TURN: Final = 16
+CALLS_IN_TURN: Final = 16
 """The other calls come in turn: each input has the one of its number modulo this."""
-_FIRST_LOST: Final = 2
-_MOST_LOST: Final = 21
-_BRAKING_TICKS: Final = 20
-"""Steps of an outage in which a controller brakes that flies on no more by its estimate."""
+WITH_NULLS: Final = 6
+"""The turn of calls with null pointers."""
+FIRST_LOST: Final = 1
+_MOST_LOST: Final = 22
+"""With TICKS_PER_INPUT so many steps that the usual outage ends, and the drone comes to rest."""
+_FEWEST_LOST: Final = 1
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,10 @@ class OtherCall:
 
     function: of the reference controller.
     values:   (n, k) its arguments, in SI units.
-    is_made:  (n,) which of the controllers it is made for.
     """
 
     function: str
     values: Real
-    is_made: Rows
 
 
 @dataclass(frozen=True)
@@ -44,16 +44,18 @@ class EpisodeStep:
     """A control step of n controllers, and the calls before it.
 
     state, target, thrust: as in `ReferenceController.step`.
-    is_new:                whether the input is new; then there are calls before.
+    index:                 number of the input if it is new; then there are calls before. Else None.
     headings:              (n, 3) arguments of nmpc_slew_heading, in SI units.
+    calls:                 (n,) whether other functions are called that change a controller.
     call:                  one of a function that changes the controller; None if there is none.
     """
 
     state: Real
     target: Real
     thrust: Real | None
-    is_new: bool
+    index: int | None
     headings: Real
+    calls: Rows
     call: OtherCall | None
 
 
@@ -68,9 +70,14 @@ class _Input:
 
 
 def lost_inputs(method: Method) -> int:
-    """Return how many inputs in a row have no good state in an outage; 0 for a method that holds on."""
-    steps = method.outage_steps
-    return 0 if steps is None else min(_MOST_LOST, -(-(steps + _BRAKING_TICKS) // TICKS_PER_INPUT))
+    """Return how many inputs in a row have no good state in an outage; few for a method that holds on."""
+    return _MOST_LOST if method.outage_steps else _FEWEST_LOST
+
+
+def null_calls(method: Method) -> int:
+    """Return how many calls with a null pointer the C makes."""
+    own = 3 if method.setter == "set_command" else 1
+    return 9 + own + method.has_limits + method.has_height + (method.guard is not None)
 
 
 class Episodes:
@@ -82,7 +89,7 @@ class Episodes:
         self._scales: InputScales = input_scales(method)
         self._draws = Draws(episodes, method.numbers)
         self._lost = lost_inputs(method)
-        self._is_lost = (episodes % 8 == 7) & (self._lost > 0)
+        self._is_lost = episodes % 8 == 7
 
     def steps(self) -> Iterator[EpisodeStep]:
         """Yield the TICKS steps."""
@@ -97,8 +104,9 @@ class Episodes:
                     self._numbers.to_si(given.state, *method.state),
                     self._numbers.to_si(given.target, *method.target),
                     None if method.has_height else self._numbers.to_si(given.thrust, *THRUST),
-                    tick == 0,
+                    index if tick == 0 else None,
                     headings,
+                    ~self._is_lost,
                     call if tick == 0 else None,
                 )
                 given = replace(given, target=given.target + given.change)
@@ -111,14 +119,17 @@ class Episodes:
         """
         method, numbers, limits, scales = self._method, self._numbers, self._method.limits, self._scales
         choice = self._draws.next()
-        size = choice & 3
-        draw = self._draw
+        draw, rests = self._draw, self._is_lost & (index < FIRST_LOST + self._lost)
+        size = np.where(rests, 3, choice & 3)
+
+        def moving(scale: float, quantity: str) -> Real:
+            return self._draws.draw(np.where(rests, 0, numbers.constant(scale, quantity)))
 
         def error(sizes: tuple[float, ...], quantity: str) -> Real:
             return self._draws.draw(np.array([numbers.constant(one, quantity) for one in sizes])[size])
 
-        target = [draw(scales.target_position_m, "position") for _ in range(2)]
-        target += [draw(scales.target_velocity_m_s, "velocity") for _ in range(2)]
+        target = [moving(scales.target_position_m, "position") for _ in range(2)]
+        target += [moving(scales.target_velocity_m_s, "velocity") for _ in range(2)]
         state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
         state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
         state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
@@ -131,25 +142,26 @@ class Episodes:
         is_given = method.settings.target.gives_acceleration
         has_motion, quantity = method.tracker is not None or is_given, "thrust" if is_given else "velocity"
         if has_motion:
-            motion = [draw(scales.target_motion, quantity) for _ in range(2)]
+            motion = [(draw if is_given else moving)(scales.target_motion, quantity) for _ in range(2)]
             if is_given:
                 target += motion
             else:
                 change[2:4] = motion
         if method.has_height:
-            target += [draw(scales.target_position_m, "position"), draw(scales.target_velocity_m_s, "velocity")]
+            target += [moving(scales.target_position_m, "position")]
+            target += [moving(scales.target_velocity_m_s, "velocity")]
             state += [target[-2] + error(scales.error_position_m, "position")]
             state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
             state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
-            vertical = [draw(scales.climb_motion, quantity)] if has_motion else []
+            vertical = [(draw if is_given else moving)(scales.climb_motion, quantity)] if has_motion else []
             if len(method.target) > len(target):
                 target += vertical
             else:
                 change[-1:] = vertical or change[-1:]
         axes = scales.target_motion, scales.target_motion, scales.climb_motion
         target += [draw(scale, quantity) for scale in axes * PREVIEW_TIMES * method.has_preview]
-        if _FIRST_LOST <= index < _FIRST_LOST + self._lost:
-            state[0] = np.where(self._is_lost, self._draws.beyond(self._is_lost), state[0])
+        if index >= FIRST_LOST:
+            state[0] = np.where(rests, self._draws.beyond(rests), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
 
     def _spoilt(self, given: _Input) -> _Input:
@@ -168,9 +180,10 @@ class Episodes:
 
     def _next_call(self, index: int) -> OtherCall | None:
         """Return the other call before input number `index`; None if there is none."""
-        method, everyone = self._method, np.ones_like(self._is_lost)
+        method = self._method
         calls: dict[int, tuple[str, Callable[[], Real]]] = {
             1: ("shift", lambda: self._shift(turns=index & 8 == 0)),
+            5: ("reset", self._command),
             2: (method.setter, self._weights if method.weight_limits else self._command),
         }
         if method.limiting is not None:
@@ -179,11 +192,13 @@ class Episodes:
             calls[3] = "set_thrust", lambda: self._command()[:, 2:]
         if method.guard is not None:
             calls[4] = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
-        turn = index % _TURN
-        if turn == 5:
-            return OtherCall("reset", self._command(), ~self._is_lost)
+        turn, before = index % CALLS_IN_TURN, self._draws.last
         name, arguments = calls.get(turn % 8 if turn < 13 else turn, ("", None))
-        return OtherCall(name, arguments(), everyone) if arguments else None
+        if arguments is None or (name == "reset" and turn > 8):
+            return None
+        values = arguments()
+        self._draws.restore(self._is_lost, before)
+        return OtherCall(name, values)
 
     def _command(self) -> Real:
         scales = self._scales

@@ -12,7 +12,7 @@ import jinja2
 from mambo_codegen import __version__, boards
 from mambo_codegen.bundle.digest import episode_count, kept_digest, start_up_test
 from mambo_codegen.bundle.draws import input_scales, scale_constants
-from mambo_codegen.bundle.episodes import TICKS, TICKS_PER_INPUT, lost_inputs
+from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS, TICKS_PER_INPUT, lost_inputs
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -239,6 +239,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "self_test_steps": TICKS * episode_count(method),
             "self_test_digest": kept_digest(method) if with_digest else None,
             "spread": (scales := input_scales(method)),
+            "first_lost": FIRST_LOST,
             "lost": lost_inputs(method),
             "estimate_numbers": method.reference_controller().last_estimate.shape[1],
             "scale_constants": scale_constants(method, scales),

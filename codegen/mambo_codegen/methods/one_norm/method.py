@@ -41,7 +41,6 @@ class OneNorm(OneNormConstants, Method):
         "missed",
         "iterations",
         "converged",
-        "command_rad",
         "cost",
         "gradient",
         "plan_rad",

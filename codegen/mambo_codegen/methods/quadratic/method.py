@@ -54,7 +54,7 @@ class Quadratic(QuadraticConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_command"
-    digested: ClassVar[tuple[str, ...]] = ("missed", "command_rad", "thrust_m_s2", "stored")
+    digested: ClassVar[tuple[str, ...]] = ("missed", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = (
         "target",
