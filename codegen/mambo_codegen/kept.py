@@ -16,7 +16,14 @@ from typing import Any, Final
 
 from mambo_codegen.user_cache import read_cached, write_cached
 
-SOURCES: Final = ("bundle/digest.py", "bundle/draws.py", "bundle/episodes.py", "methods", "numbers", "settings")
+SOURCES: Final = (
+    "bundle/digest.py",
+    "bundle/draws.py",
+    "bundle/episodes.py",
+    "methods",
+    "numbers",
+    "settings",
+)
 """Files and folders of this package whose source determines the results."""
 
 SHIPPED: Final = "data/kept.json"

@@ -1,20 +1,23 @@
-"""The self-test names the first step with a wrong output; it notices a wrong constant, sign or comparison."""
+"""The self-test names the first step with a wrong output; it notices a broken line of any function."""
 
 import re
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.schemata import can_share, refused_numbers, with_mutants
 from tests.support.bundles import place
+from tests.support.height import CRAZYFLIE as HEIGHT
 from tests.support.one_norm import ONE_NORM
-from tests.support.quadratic import EVERYTHING
+from tests.support.quadratic import EVERYTHING, settings_of
 from tests.support.tools import require
 
 SELF_TEST = "nmpc_self_test.c"
@@ -25,9 +28,56 @@ RENAMED = ("-Dnmpc_step=wrong_step", "-Dnmpc_last_cost=wrong_last_cost")
 OUTPUTS = 6
 """Status, two commands, cost, two gradients: the outputs that wrong_outputs.c makes wrong, one at a time."""
 LIMIT_S = 20
-_NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?f")
+_NUMBER = re.compile(r"\d+\.\d+(?:e-?\d+)?f")
 _TABLE = re.compile(r"^static const nmpc_real_t (\w+)(?:\[\w+\])+ = \{(.*?)\};$", re.MULTILINE | re.DOTALL)
-TABLES = {"tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios"}
+TABLES = {
+    *("tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios", "thrust_row"),
+    *("thrust_lagged_row", "height_rows"),
+}
+CRAZYFLIE = settings_of(
+    HEIGHT
+    | {
+        "target.acceleration": "tracked",
+        "observer.age_s": 0.01,
+        "model.drag_1_s": 0.2,
+        "limits.speed_m_s": 5.0,
+        "guard.tilt_rad_s": 5.0,
+        "guard.position_noise": 0.03,
+        "guard.target_noise_m_s2": 0.3,
+    }
+)
+"""Settings of every function of nmpc.h."""
+BREAKS = {
+    "a limit above its range": ("between(limits->speed_m_s, NMPC", "between(limits->tilt_rad, NMPC"),
+    "walls change places": ("(limits->fence_min_m[axis] < limits->fence_max_m[axis])", "(limits->fence_min_m[axis] > limits->fence_max_m[axis])"),
+    "the fence's centre lies on a wall": ("bounds->centre_m[axis] = NMPC_HALF * (min_m + max_m)", "bounds->centre_m[axis] = NMPC_HALF * (min_m + min_m)"),
+    "the knee is 3 % off": ("const nmpc_real_t knee_m = NMPC_KNEE_S2", "const nmpc_real_t knee_m = 1.03f * NMPC_KNEE_S2"),
+    "no descent limit": ("    bounds->down_m = NMPC_REACH", "    bounds->up_m = NMPC_REACH"),
+    "a wall does not hold a target": ("            active = NMPC_LIMIT_FENCE;\n        }\n    }\n    return active;\n}\n\n/* Cut", "        }\n    }\n    return active;\n}\n\n/* Cut"),
+    "no braking before a wall": ("most_m_s = braking_speed(braking_square(bounds, excess_m));", "most_m_s = braking_speed(bounds->braking_m_s2);"),
+    "the wall behind": ("(towards < (nmpc_real_t)0) ? (nmpc_real_t)-1", "(towards > (nmpc_real_t)0) ? (nmpc_real_t)-1"),
+    "a heading turns the long way": ("change_rad = (nmpc_sum_t)wanted_rad - previous_rad;", "change_rad = (nmpc_sum_t)previous_rad - wanted_rad;"),
+    "a heading beyond its range": ("        next_rad = next_rad + turn_rad;", "        next_rad = next_rad - turn_rad;"),
+    "a heading turns at once": ("        change_rad = -most_change_rad;", "        change_rad = change_rad;"),
+    "a command set changes no pitch": ("    self->command_rad[1] = pitch_rad;\n    return NMPC_OK;", "    return NMPC_OK;"),
+    "a thrust set is not limited": ("height->thrust_m_s2 = confine(thrust_m_s2, NMPC_THRUST_MIN_M_S2, NMPC_THRUST_MAX_M_S2);\n    height->command_m_step2", "height->thrust_m_s2 = thrust_m_s2;\n    height->command_m_step2"),
+    "a bad thrust is set": ("if (is_good_thrust(thrust_m_s2) == 0) {", "if (is_good_thrust(thrust_m_s2) != 0) {"),
+    "a shift does not move the height": ("    height_shift(&self->height, position_change_m[2], velocity_change_m_s[2]);\n", ""),
+    "a shift turns the axes the other way": ("(sine_before * cosine) + (cosine_before * sine)", "(sine_before * cosine) - (cosine_before * sine)"),
+    "a shift forgets the drag": ("+ (NMPC_DRAG_1_STEP * change_m_step)", "- (NMPC_DRAG_1_STEP * change_m_step)"),
+    "a bad shift is made": ("        || (within(velocity_change_m_s[2], NMPC_VELOCITY_RANGE_M_S) == 0)\n", ""),
+    "a reset keeps the tilt": ("        attitude->tilt_m_step2[axis] = attitude->command_m_step2[axis];\n", ""),
+    "a reset keeps the budget": ("    self->budget_rad[1] = NMPC_TILT_BUDGET_RAD;\n", ""),
+    "a reset is not clamped": ("clamp(command->pitch_rad, self->bounds.tilt_rad), command->thrust", "command->pitch_rad, command->thrust"),
+    "coarse gains for a measured position": ("(is_measured != 0) ? 0U : 1U", "(is_measured != 0) ? 1U : 0U"),
+    "an outage ends at once": ("        if (missed < NMPC_NO_ESTIMATE) {\n            missed = missed + 1U;", "        if (missed < NMPC_NO_ESTIMATE) {\n            missed = missed + 2U;"),
+    "no rest after an outage": ("        *missed = NMPC_AT_REST;\n", ""),
+    "an estimate without its unit": ("NMPC_STEPS_PER_S * self->observer.velocity_m_step[axis]", "NMPC_STEPS2_PER_S2 * self->observer.velocity_m_step[axis]"),
+    "no estimate is valid": ("estimate->is_valid = has_estimate(self)", "estimate->is_valid = 0"),
+    "a null target makes a step": ("if ((state != NULL) && (target != NULL)) {", "if (state != NULL) {"),
+    "a new controller commands a tilt": ("command->pitch_rad = (nmpc_real_t)0;", "command->pitch_rad = (nmpc_real_t)1;"),
+}  # fmt: skip
+"""The one place in nmpc.c that reads so, and what it reads instead."""
 
 
 class Bench:
@@ -95,103 +145,86 @@ def test_every_fault_of_the_comparisons_is_noticed(scalar: str, tmp_path: Path) 
     assert [mutant.wrong_line for mutant in found if bench.passes(mutant)] == []
 
 
-@pytest.fixture(scope="module")
-def files() -> dict[str, str]:
-    """Render the bundle once."""
-    return render(EVERYTHING)
+class Broken:
+    """A bundle with many broken lines of nmpc.c in one program."""
 
-
-class SelfTest:
-    """Builds the program whose result says whether a bundle's self-test notices."""
-
-    def __init__(self, files: dict[str, str], folder: Path) -> None:
-        (digest,) = re.findall(r"#define NMPC_SELF_TEST_DIGEST (\w+)", "\n".join(files.values()))
-        self._folder = place(files, folder)
+    def __init__(self, settings: Settings, folder: Path) -> None:
+        files = render(settings)
+        self.text = files[CONTROLLER]
+        self._folder = place(files, folder / "broken")
         self._gcc = require("gcc", "gcc")
-        self._sources = sorted(path for path in files if re.fullmatch(r"[^/]*\.c", path))
-        (folder / "run.c").write_text(
-            '#include "nmpc.h"\n#include "nmpc_self_test.h"\n'
-            "int main(void) { static nmpc_t self; unsigned long digest = 0; int i;\n"
-            "    if (nmpc_self_test(&self) != 0) { return 1; }\n"
-            "    for (i = 0; i < NMPC_SELF_TEST_EPISODES; i++) {\n"
-            "        digest = nmpc_self_test_episode(&self, i, digest);\n    }\n"
-            f"    return (digest == {digest}) ? 0 : 2; }}\n",
-            "utf-8",
+
+    def unnoticed(self, lines: Sequence[Mutant], *, at_start_up: bool = False) -> list[str]:
+        """Return which broken lines the self-test lets pass, or the one at start-up."""
+        numbered = dict(enumerate(lines, 1))
+        (self._folder / CONTROLLER).write_text(with_mutants(self.text, numbered), "utf-8")
+        program = Path(__file__).with_name("broken_lines.c")
+        flags = ["-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L", "-w", "-O1", "-I."]
+        line = [
+            self._gcc,
+            *flags,
+            "-Dalways_inline=unused",
+            CONTROLLER,
+            SELF_TEST,
+            str(program),
+            "-o",
+            "broken",
+        ]
+        done = subprocess.run(line, cwd=self._folder, check=False, capture_output=True, text=True)
+        assert done.returncode == 0, [lines[number - 1].wrong_line for number in refused_numbers(done.stderr)]
+        run = subprocess.run(
+            ["./broken", *map(str, numbered)], cwd=self._folder, check=True, capture_output=True, text=True
         )
-        self._objects = {source: self._compile(source, "right") for source in [*self._sources, "run.c"]}
-
-    def _compile(self, source: str, folder: str) -> str:
-        """Compile a source and return its object; not optimised, which has the same bits in less time."""
-        name = f"{folder}/{Path(source).stem}.o"
-        (self._folder / folder).mkdir(exist_ok=True)
-        flags = [*COMPILE_FLAGS, "-O0", "-w", "-c", source, "-o", name]
-        subprocess.run([self._gcc, *flags], cwd=self._folder, check=True, capture_output=True)
-        return name
-
-    def result(self, changed: dict[str, str]) -> int:
-        """Return 0 if the self-test and its digest pass with the `changed` files."""
-        before = {path: (self._folder / path).read_text("utf-8") for path in changed}
-        place(changed, self._folder)
-        headers = any(path.endswith(".h") for path in changed)
-        rebuilt = self._sources if headers else list(changed)
-        objects = self._objects | {source: self._compile(source, "wrong") for source in rebuilt}
-        line = [self._gcc, *objects.values(), "-o", "run"]
-        subprocess.run(line, cwd=self._folder, check=True, capture_output=True)
-        code = subprocess.run(["./run"], cwd=self._folder, check=False, timeout=60).returncode
-        place(before, self._folder)
-        return code
+        results = [tuple(map(int, one.split())) for one in run.stdout.splitlines()]
+        assert [number for number, _ in results] == list(numbered)
+        passes = {0, 2} if at_start_up else {0}
+        return [numbered[number].wrong_line for number, result in results if result in passes]
 
 
-@pytest.mark.long
-def test_the_self_test_notices_every_constant_of_every_table(files: dict[str, str], tmp_path: Path) -> None:
-    """Each number of the rows and ratios, and of the attitude model, larger by a millionth."""
-    bench = SelfTest(files, tmp_path)
-    assert bench.result({}) == 0
-    unnoticed, count = [], 0
-    text = files[CONTROLLER]
-    tables = [table for table in _TABLE.finditer(text) if table[1] in TABLES]
-    for table in tables:
-        for number in _NUMBER.finditer(text, *table.span(2)):
-            if float(number[0][:-1]) == 0:
-                continue
-            count += 1
-            larger = f"({number[0]} * 1.000001f)"
-            changed = text[: number.start()] + larger + text[number.end() :]
-            if bench.result({CONTROLLER: changed}) == 0:
-                unnoticed.append(f"{table[1]}: {number[0]}")
-    assert {table[1] for table in tables} == TABLES
-    assert count == 2 * ((2 * 8) + 1 + 4 + 4 + 2)
-    assert unnoticed == []
+def change(text: str, start: int, right: str, wrong: str, name: str) -> Mutant:
+    """Return the fault that makes `right` at `start` read `wrong`."""
+    assert text.startswith(right, start)
+    return Mutant(CONTROLLER, start, start + len(right), wrong, (CONTROLLER, right, name), name)
 
 
-@pytest.mark.long
-def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
-    files: dict[str, str], tmp_path: Path
-) -> None:
-    """Each plus made a minus and the other way round, from the attitude model to the interface.
-
-    The self-test makes steps only: it does not set a command in place of the last one, turn a heading or
-    shift the frame.
-    """
-    bench = SelfTest(files, tmp_path)
-    unnoticed, count = [], 0
-    text = files[CONTROLLER]
-    start = text.index("/* ---- Attitude")
-    others = [
-        range(found.start(), text.index("\n}\n", found.start()))
-        for found in re.finditer(
-            r"^.* (attitude_change_command|nmpc_set_command|nmpc_slew_heading|\w+_shift|\w+er_turn)\(",
-            text,
-            re.MULTILINE,
-        )
+def test_the_self_test_notices_a_broken_line_of_every_function(tmp_path: Path) -> None:
+    """What sets limits, shifts the frame, takes over, turns a heading or ends an outage."""
+    broken = Broken(CRAZYFLIE, tmp_path)
+    assert {name: broken.text.count(right) for name, (right, _) in BREAKS.items()} == dict.fromkeys(BREAKS, 1)
+    lines = [
+        change(broken.text, broken.text.index(right), right, wrong, name)
+        for name, (right, wrong) in BREAKS.items()
     ]
-    for mutant in mutants(CONTROLLER, text):
-        if {text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} != {"+", "-"}:
-            continue
-        if mutant.start < start or any(mutant.start in other for other in others):
-            continue
-        count += 1
-        if bench.result({CONTROLLER: mutant.apply(text)}) == 0:
-            unnoticed.append(mutant.wrong_line)
-    assert count > 30
-    assert unnoticed == []
+    assert broken.unnoticed(lines) == []
+
+
+def test_the_self_test_at_start_up_uses_every_number_of_every_table(tmp_path: Path) -> None:
+    """Each number of the rows and ratios, of attitude, thrust and solution, 3 % larger."""
+    broken = Broken(CRAZYFLIE, tmp_path)
+    tables = [table for table in _TABLE.finditer(broken.text) if table[1] in TABLES]
+    lines = [
+        change(broken.text, number.start(), number[0], f"({number[0]} * 1.03f)", f"{table[1]}: {number[0]}")
+        for table in tables
+        for number in _NUMBER.finditer(broken.text, *table.span(2))
+        if float(number[0][:-1]) != 0
+    ]
+    assert {table[1] for table in tables} == TABLES
+    assert len(lines) == (2 * ((2 * 8) + 1 + 4 + 4 + 2)) + 3 + 2 + (2 * 7)
+    assert broken.unnoticed(lines, at_start_up=True) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("settings", [CRAZYFLIE, EVERYTHING], ids=["height", "plane"])
+def test_the_self_test_notices_a_wrong_sign_anywhere(settings: Settings, tmp_path: Path) -> None:
+    """Each plus made a minus and the other way round, from the attitude model to the interface."""
+    broken = Broken(settings, tmp_path)
+    start = broken.text.index("/* ---- Attitude")
+    lines = [
+        mutant
+        for mutant in mutants(CONTROLLER, broken.text)
+        if {broken.text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} == {"+", "-"}
+        and mutant.start > start
+        and can_share(broken.text, mutant)
+    ]
+    assert len(lines) > 60
+    assert broken.unnoticed(lines) == []

@@ -24,6 +24,9 @@ nmpc_status_t wrong_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
 {
     const nmpc_status_t status = nmpc_step(self, state, target, thrust_acceleration_m_s2, command);
 
+    if ((self == NULL) || (state == NULL) || (target == NULL) || (command == NULL)) {
+        return status;
+    }
     steps++;
     command->roll_rad += (nmpc_real_t)is_wrong(ROLL);
     command->pitch_rad += (nmpc_real_t)is_wrong(PITCH);

@@ -6,8 +6,7 @@ ones (`draws.py`). The C (`nmpc_self_test.c.j2`) runs the episodes one after the
 in parallel arrays when the C is generated.
 """
 
-import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from mambo_codegen.bundle.draws import Words, fold, input_scales, tiny_m
 from mambo_codegen.bundle.episodes import (
     CALLS_IN_TURN,
-    TICKS,
     TICKS_PER_INPUT,
     WITH_NULLS,
     Episodes,
@@ -27,14 +25,16 @@ from mambo_codegen.bundle.episodes import (
     null_calls,
 )
 from mambo_codegen.kept import keep
-from mambo_codegen.methods import Method, ReferenceController, method_of
+from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.methods.shared.inputs import Rows, Status, choose
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.settings.model import Settings
 
+TICKS: Final = 100
+"""Steps of an episode."""
 START_UP_STEPS: Final = 1 + (8 * TICKS_PER_INPUT)
-"""Steps of the self-test at start-up: a tiny error, and the first inputs of an episode, with each function."""
+"""Steps of the self-test at start-up: one with a tiny error, and those of an episode up to each function."""
 
 _FLAGS: Final = 64
 """More than all flags of a step together, and than a status."""
@@ -49,8 +49,8 @@ _LEAST_WORK: Final = 20
 StepInputs = tuple[Real, Real, Real | None]
 """States, targets and thrusts of one step of n controllers, as in `ReferenceController.step`."""
 
-Command = tuple[Real, Real | None]
-"""Roll and pitch (n, 2), and with a height the thrust (n,), in numbers of the C."""
+Outcome = Mapping[str, NDArray[Any]]
+"""What calls of n controllers have left, as in `ReferenceController.outcome`."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def self_test_digest(method: Method, count: int) -> int:
     digest = np.zeros(1, np.uint32)
     episodes = np.arange(count, dtype=np.uint32)
     run = _Run(method, count)
-    for step in Episodes(method, episodes).steps():
+    for step in Episodes(method, episodes).steps(TICKS):
         run.make(step)
     for word in run.digests:
         digest = fold(digest, word)
@@ -89,7 +89,7 @@ def self_test_digest(method: Method, count: int) -> int:
 
 def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
     """Yield the inputs of each of TICKS steps; `episodes` (n,) are the indices of the episodes."""
-    for step in Episodes(method, episodes).steps():
+    for step in Episodes(method, episodes).steps(TICKS):
         yield step.state, step.target, step.thrust
 
 
@@ -104,7 +104,7 @@ def start_up_test(settings: Settings) -> StartUpTest:
     run, episodes = _Run(method, _CANDIDATES), Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32))
     run.make_tiny()
     digests, ways = [run.digests], list[Words]()
-    for step in itertools.islice(episodes.steps(), START_UP_STEPS - 1):
+    for step in episodes.steps(START_UP_STEPS - 1):
         ways += run.make(step)
         digests.append(run.digests)
     best = int(np.argmax([len(set(one)) for one in np.array(ways).T.tolist()]))
@@ -120,7 +120,8 @@ class _Run:
     def __init__(self, method: Method, n: int) -> None:
         self._method, self._controller = method, method.reference_controller(n)
         self.digests: Words = np.zeros(n, np.uint32)
-        self._level = self._command()
+        self._fresh = self._controller.outcome
+        self._quantities = {one.name: one.quantities for one in method.results}
 
     def make_tiny(self) -> None:
         """Make a step of drones almost at their targets."""
@@ -141,14 +142,14 @@ class _Run:
             status = self._call(step.call, step.calls) if step.call else np.zeros_like(self.digests)
             ways.append((_FLAGS * (1 + turn)) + status)
             self._fold(status)
-            self._fold_controller()
+            self._fold_controller(self._controller.outcome)
         return [*ways, self._step(step.state, step.target, step.thrust)]
 
     def _refuse_nulls(self, is_made: Rows) -> None:
         """Make the calls with null pointers: a step without a controller commands what a new one holds."""
         before = self.digests
-        self._fold_command(self._level)
-        self._fold_command(self._command())
+        self._fold_command(self._fresh)
+        self._fold_command(self._controller.outcome)
         self._fold(np.full_like(self.digests, null_calls(self._method)))
         self.digests = np.where(is_made, self.digests, before)
 
@@ -156,8 +157,9 @@ class _Run:
         """Make the calls that change nothing."""
         slewed = slew_heading(self._method, *headings.T)[:, None]
         self._fold_numbers(self._method.numbers.quantize(slewed, ("yaw",)), "yaw")
-        self._fold_numbers(self._controller.last_estimate, "position")
-        if self._controller.last_estimate.shape[1]:
+        estimate = self._controller.last_estimate
+        if estimate.size:
+            self._fold_numbers(estimate, "position")
             self._fold(self._controller.has_estimate)
 
     def _call(self, call: OtherCall, is_made: Rows) -> NDArray[Any]:
@@ -173,30 +175,28 @@ class _Run:
     def _step(self, state: Real, target: Real, thrust: Real | None) -> Words:
         status = self._controller.step(state, target, thrust).status
         self._fold(status)
-        self._fold_command(self._command())
-        return (_FLAGS * CALLS_IN_TURN) + (_FLAGS * status) + self._fold_controller()
-
-    def _command(self) -> Command:
         left = self._controller.outcome
-        return left["command_rad"], left.get("thrust_m_s2")
+        self._fold_command(left)
+        flags = self._fold_controller(left)
+        ways: Words = ((_FLAGS * (1 + CALLS_IN_TURN)) + (_FLAGS * status) + flags).astype(np.uint32)
+        return ways
 
-    def _fold_command(self, command: Command) -> None:
-        for values, quantity in zip(command, ("angle", "thrust"), strict=True):
-            if values is not None:
-                self._fold_numbers(values, quantity)
+    def _fold_command(self, left: Outcome) -> None:
+        """Fold in the last command."""
+        self._fold_numbers(left["command_rad"], "angle")
+        if "thrust_m_s2" in left:
+            self._fold_numbers(left["thrust_m_s2"], "thrust")
 
-    def _fold_controller(self) -> NDArray[Any]:
+    def _fold_controller(self, left: Outcome) -> NDArray[Any]:
         """Fold in what a call has left, and return flags (n,): the limits that act, 8 for saturation."""
-        left, method = self._controller.outcome, self._method
         saturated = left["saturated"]
-        active = left.get("active", 0) + (8 * saturated)
+        active: NDArray[Any] = left.get("active", 0) + (8 * saturated)
         self._fold(saturated)
-        if method.has_limits:
+        if self._method.has_limits:
             self._fold(active)
-        quantities = {one.name: one.quantities for one in method.results}
-        for name in filter(left.__contains__, method.digested):
-            if quantities[name]:
-                self._fold_numbers(left[name], quantities[name][0])
+        for name in filter(left.__contains__, self._method.digested):
+            if self._quantities[name]:
+                self._fold_numbers(left[name], self._quantities[name][0])
             else:
                 self._fold(left[name])
         return active

@@ -1,4 +1,4 @@
-"""Pseudo-random numbers of the self-test, which C and NumPy compute from the same integers, and their scales."""
+"""Pseudo-random numbers of the self-test, and their scales: C and NumPy have the same integers."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -24,8 +24,8 @@ _MULTIPLIER: Final = 2654435761
 _LARGE: Final = -1e9
 """Out of every range, as NaN is."""
 _LARGEST_TURN_RAD: Final = 4.0
-_MOST_SPEED_M_S: Final = 5.0
-"""Of the limits that are drawn: the errors are at most 10 m/s."""
+_MOST_SPEED_M_S: Final = 2.0
+"""Of the limits that are drawn: a drone that is slow can be far enough from a near wall."""
 
 Words = NDArray[np.uint32]
 
@@ -187,7 +187,7 @@ class Draws:
         return spoilt
 
     def beyond(self, is_first: Rows) -> Any:
-        """Return numbers out of range (n,): NaN or a large one; in fixed point about the largest of either sign."""
+        """Return numbers out of range (n,): NaN or a large one; in fixed point one of either sign."""
         if self._numbers.formats is not None:
             return np.where(is_first, LARGEST, 1 - LARGEST)
         scalar = self._numbers.scalar

@@ -12,8 +12,6 @@ from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.numbers.representation import PREVIEW_TIMES, THRUST
 
-TICKS: Final = 100
-"""Steps of an episode."""
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
 
@@ -91,10 +89,10 @@ class Episodes:
         self._lost = lost_inputs(method)
         self._is_lost = episodes % 8 == 7
 
-    def steps(self) -> Iterator[EpisodeStep]:
-        """Yield the TICKS steps."""
+    def steps(self, ticks: int) -> Iterator[EpisodeStep]:
+        """Yield the first `ticks` steps, a multiple of TICKS_PER_INPUT."""
         method = self._method
-        for index in range(TICKS // TICKS_PER_INPUT):
+        for index in range(ticks // TICKS_PER_INPUT):
             given = self._next_input(index)
             headings, call = self._next_headings(), self._next_call(index)
             for tick in range(TICKS_PER_INPUT):

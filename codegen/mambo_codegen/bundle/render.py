@@ -10,9 +10,9 @@ from typing import Any, Final
 import jinja2
 
 from mambo_codegen import __version__, boards
-from mambo_codegen.bundle.digest import episode_count, kept_digest, start_up_test
+from mambo_codegen.bundle.digest import TICKS, episode_count, kept_digest, start_up_test
 from mambo_codegen.bundle.draws import input_scales, scale_constants
-from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS, TICKS_PER_INPUT, lost_inputs
+from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS_PER_INPUT, lost_inputs
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
