@@ -53,7 +53,7 @@ BREAKS = {
     "the fence's centre lies on a wall": ("bounds->centre_m[axis] = NMPC_HALF * (min_m + max_m)", "bounds->centre_m[axis] = NMPC_HALF * (min_m + min_m)"),
     "the knee is 3 % off": ("const nmpc_real_t knee_m = NMPC_KNEE_S2", "const nmpc_real_t knee_m = 1.03f * NMPC_KNEE_S2"),
     "no descent limit": ("    bounds->down_m = NMPC_REACH", "    bounds->up_m = NMPC_REACH"),
-    "a wall does not hold a target": ("            active = NMPC_LIMIT_FENCE;\n        }\n    }\n    return active;\n}\n\n/* Cut", "        }\n    }\n    return active;\n}\n\n/* Cut"),
+    "no speed towards a wall": ("limits_half_width(bounds, axis);\n        const nmpc_real_t place_m = limited", "bounds->margin_m;\n        const nmpc_real_t place_m = limited"),
     "no braking before a wall": ("most_m_s = braking_speed(braking_square(bounds, excess_m));", "most_m_s = braking_speed(bounds->braking_m_s2);"),
     "the wall behind": ("(towards < (nmpc_real_t)0) ? (nmpc_real_t)-1", "(towards > (nmpc_real_t)0) ? (nmpc_real_t)-1"),
     "a heading turns the long way": ("change_rad = (nmpc_sum_t)wanted_rad - previous_rad;", "change_rad = (nmpc_sum_t)previous_rad - wanted_rad;"),

@@ -28,16 +28,21 @@ from mambo_codegen.kept import keep
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.methods.shared.inputs import Rows, Status, choose
+from mambo_codegen.methods.shared.limits import ActiveLimit
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.settings.model import Settings
 
 TICKS: Final = 100
 """Steps of an episode."""
-START_UP_STEPS: Final = 1 + (8 * TICKS_PER_INPUT)
+START_UP_STEPS: Final = 1 + (10 * TICKS_PER_INPUT)
 """Steps of the self-test at start-up: one with a tiny error, and those of an episode up to each function."""
 
 _FLAGS: Final = 64
 """More than all flags of a step together, and than a status."""
+_AIMED_ELSEWHERE: Final = int(ActiveLimit.SPEED | ActiveLimit.BRAKING | ActiveLimit.FENCE)
+"""Limits with which no position error counts."""
+_OFTEN: Final = 3
+"""So many moves of a row are enough: a guard may hide some."""
 _CANDIDATES: Final = 64
 """The start-up test is one of so many episodes."""
 _MOST_EPISODES: Final = 1000
@@ -95,7 +100,7 @@ def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
 
 @lru_cache(maxsize=64)
 def start_up_test(settings: Settings) -> StartUpTest:
-    """Return the self-test at start-up: of some episodes the first one that ends in the most ways.
+    """Return the self-test at start-up: of some episodes the first with the most rows and ways to end.
 
     Its first step has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails.
@@ -103,11 +108,13 @@ def start_up_test(settings: Settings) -> StartUpTest:
     method = method_of(settings)
     run, episodes = _Run(method, _CANDIDATES), Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32))
     run.make_tiny()
-    digests, ways = [run.digests], list[Words]()
+    digests, ways = [run.digests], list[NDArray[Any]]()
     for step in episodes.steps(START_UP_STEPS - 1):
         ways += run.make(step)
         digests.append(run.digests)
-    best = int(np.argmax([len(set(one)) for one in np.array(ways).T.tolist()]))
+    kinds = [len(set(one)) for one in np.array(ways).T.tolist()]
+    rows = np.minimum(run.rows, _OFTEN)
+    best = int(np.argmax((_FLAGS * np.sum(rows, axis=1)) + kinds))
     return StartUpTest(best, tuple(int(one[best]) for one in digests))
 
 
@@ -115,11 +122,13 @@ class _Run:
     """n reference controllers in their episodes.
 
     digests: (n,) of all results so far.
+    rows:    (n, k) how many moves each row of the law has decided so far.
     """
 
     def __init__(self, method: Method, n: int) -> None:
         self._method, self._controller = method, method.reference_controller(n)
         self.digests: Words = np.zeros(n, np.uint32)
+        self.rows: NDArray[Any] = np.zeros((n, 1), np.int64)
         self._fresh = self._controller.outcome
         self._quantities = {one.name: one.quantities for one in method.results}
 
@@ -131,7 +140,7 @@ class _Run:
         thrust = None if method.has_height else np.full(n, input_scales(method).hover_m_s2)
         self._step(state, target, thrust)
 
-    def make(self, step: EpisodeStep) -> list[Words]:
+    def make(self, step: EpisodeStep) -> list[NDArray[Any]]:
         """Make the calls and the step; return a number for each way (n,) in which one of them can end."""
         ways = []
         if step.index is not None:
@@ -172,13 +181,15 @@ class _Run:
         status: NDArray[Any] = np.where(is_made, made, Status.OK)
         return status
 
-    def _step(self, state: Real, target: Real, thrust: Real | None) -> Words:
+    def _step(self, state: Real, target: Real, thrust: Real | None) -> NDArray[Any]:
         status = self._controller.step(state, target, thrust).status
         self._fold(status)
         left = self._controller.outcome
         self._fold_command(left)
         flags = self._fold_controller(left)
-        ways: Words = ((_FLAGS * (1 + CALLS_IN_TURN)) + (_FLAGS * status) + flags).astype(np.uint32)
+        ways: NDArray[Any] = (_FLAGS * (1 + CALLS_IN_TURN)) + (_FLAGS * status) + flags
+        follows = (status == Status.OK) & (flags & _AIMED_ELSEWHERE == 0)
+        self.rows = self.rows + (self._controller.deciding & follows[:, None])
         return ways
 
     def _fold_command(self, left: Outcome) -> None:

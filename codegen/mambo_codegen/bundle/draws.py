@@ -21,7 +21,7 @@ _UNIT: Final = 1 << _UNIT_BITS
 """Random numbers are integers in -_UNIT.._UNIT - 1, which every scalar type represents exactly."""
 _MULTIPLIER: Final = 2654435761
 """The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
-_LARGE: Final = -1e9
+_LARGE: Final = 1e9
 """Out of every range, as NaN is."""
 _LARGEST_TURN_RAD: Final = 4.0
 _MOST_SPEED_M_S: Final = 2.0
@@ -65,7 +65,7 @@ def input_scales(method: Method) -> InputScales:
     settings = method.settings
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
-    near = 0.25, 0.025, 0.0025
+    near = 0.5, 0.05, 0.0025
     fixed, most_m_s2 = settings.code.scalar == "fixed", settings.ranges.thrust_acceleration_max_m_s2
     hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
@@ -104,13 +104,16 @@ def input_scales(method: Method) -> InputScales:
 
 
 def _limits_scales(limits: LimitsConstants | None, wall_m: float) -> tuple[float, ...]:
-    """Return the largest limits that are drawn, in the order of nmpc_limits_t; none without limits."""
+    """Return the largest limits that are drawn, in the order of nmpc_limits_t; none without limits.
+
+    Along y and in height the least may be drawn above the largest, which is refused.
+    """
     if limits is None:
         return ()
     speed_m_s, braking_m_s2, *_ = limits.limits.tolist()
     tilt_rad, vertical = float(limits.limits[6]), limits.limits[9:].tolist()
-    walls = (-wall_m, -wall_m, wall_m, wall_m)
-    height = (-wall_m, wall_m, *vertical) if vertical else ()
+    walls = (-wall_m, wall_m, wall_m, wall_m)
+    height = (wall_m, wall_m, *vertical) if vertical else ()
     return (min(speed_m_s, _MOST_SPEED_M_S), braking_m_s2, *walls, tilt_rad, *height)
 
 
@@ -183,15 +186,16 @@ class Draws:
         """Return numbers (n, k) with each of the k out of range in one of 64 cases."""
         choice = self.next()
         which = (choice & 63)[:, None] == np.arange(numbers.shape[1])
-        spoilt: Real = np.where(which, self.beyond((choice >> 6) & 1 == 0)[:, None], numbers)
+        spoilt: Real = np.where(which, self.beyond(choice >> 6)[:, None], numbers)
         return spoilt
 
-    def beyond(self, is_first: Rows) -> Any:
-        """Return numbers out of range (n,): NaN or a large one; in fixed point one of either sign."""
+    def beyond(self, choice: Words) -> Any:
+        """Return numbers out of range (n,): NaN or a large one of either sign, by the lowest bits."""
+        sign = np.where(choice & 2 == 0, 1, -1)
         if self._numbers.formats is not None:
-            return np.where(is_first, LARGEST, 1 - LARGEST)
+            return sign * (LARGEST - 1)
         scalar = self._numbers.scalar
-        return np.where(is_first, scalar(np.nan), scalar(_LARGE))
+        return np.where(choice & 1 == 0, scalar(np.nan), (sign * _LARGE).astype(scalar))
 
     def _scaled(self, whole: NDArray[np.int32], scale: Real) -> Real:
         integers = whole.astype(self._numbers.computed)

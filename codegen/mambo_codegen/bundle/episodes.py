@@ -88,6 +88,8 @@ class Episodes:
         self._draws = Draws(episodes, method.numbers)
         self._lost = lost_inputs(method)
         self._is_lost = episodes % 8 == 7
+        self._aim: Real = np.zeros(0)
+        """Place and velocity of the targets along each axis when their input began (k, n)."""
 
     def steps(self, ticks: int) -> Iterator[EpisodeStep]:
         """Yield the first `ticks` steps, a multiple of TICKS_PER_INPUT."""
@@ -126,8 +128,19 @@ class Episodes:
         def error(sizes: tuple[float, ...], quantity: str) -> Real:
             return self._draws.draw(np.array([numbers.constant(one, quantity) for one in sizes])[size])
 
-        target = [moving(scales.target_position_m, "position") for _ in range(2)]
-        target += [moving(scales.target_velocity_m_s, "velocity") for _ in range(2)]
+        jumps, axes = (size == 0) | (index == 0), 3 if method.has_height else 2
+        aim = np.stack(
+            [
+                moving(*one)
+                for _ in range(axes)
+                for one in (
+                    (scales.target_position_m, "position"),
+                    (scales.target_velocity_m_s, "velocity"),
+                )
+            ]
+        )
+        self._aim = np.where(jumps, aim, self._aim if index else aim)
+        target = [*self._aim[0:4:2], *self._aim[1:4:2]]
         state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
         state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
         state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
@@ -146,8 +159,7 @@ class Episodes:
             else:
                 change[2:4] = motion
         if method.has_height:
-            target += [moving(scales.target_position_m, "position")]
-            target += [moving(scales.target_velocity_m_s, "velocity")]
+            target += [*self._aim[4:]]
             state += [target[-2] + error(scales.error_position_m, "position")]
             state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
             state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
@@ -156,10 +168,10 @@ class Episodes:
                 target += vertical
             else:
                 change[-1:] = vertical or change[-1:]
-        axes = scales.target_motion, scales.target_motion, scales.climb_motion
-        target += [draw(scale, quantity) for scale in axes * PREVIEW_TIMES * method.has_preview]
+        motions = scales.target_motion, scales.target_motion, scales.climb_motion
+        target += [draw(scale, quantity) for scale in motions * PREVIEW_TIMES * method.has_preview]
         if index >= FIRST_LOST:
-            state[0] = np.where(rests, self._draws.beyond(rests), state[0])
+            state[0] = np.where(rests, self._draws.beyond(np.uint32(0)), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
 
     def _spoilt(self, given: _Input) -> _Input:

@@ -67,6 +67,10 @@ class ReferenceController(Protocol):
         """All numbers of nmpc_estimate_t (n, k), in the numbers of the C; k is 0 where there is none."""
 
     @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """Which rows of its law decided the last moves (n, k); k is 0 where the moves are searched."""
+
+    @property
     def has_estimate(self) -> NDArray[np.bool_]:
         """Whether the estimate is valid (n,)."""
 

@@ -235,6 +235,11 @@ class OneNormController:
         return np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
 
     @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """No rows (n, 0): the moves are searched."""
+        return np.zeros((len(self.memory.command_rad), 0), np.bool_)
+
+    @property
     def has_estimate(self) -> NDArray[np.bool_]:
         """Return that there is no estimate (n,)."""
         return np.zeros(len(self.memory.command_rad), np.bool_)

@@ -240,6 +240,12 @@ class QuadraticController:
         return np.concatenate(columns, axis=1)
 
     @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """Which rows of the law decided the last moves (n, k), in place of a limit."""
+        plane, height = self.parts.optimizer.deciding, self._height.deciding
+        return np.concatenate([plane, np.broadcast_to(height, (len(plane), height.shape[1]))], axis=1)
+
+    @property
     def has_estimate(self) -> NDArray[np.bool_]:
         """Whether the estimate is valid (n,)."""
         return self.parts.has_estimate(self.memory)

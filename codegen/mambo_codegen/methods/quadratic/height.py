@@ -106,6 +106,8 @@ class HeightAxis:
             for row in found.rows
         ]
         self._ratio = constant(found.ratio, "ratio")
+        self.deciding: Rows = np.zeros((0, 2), np.bool_)
+        """Of the last moves (n, 2): whether no limit decided, and whether the second row did."""
         self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
         self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)
         self._least_cosine = constant(LEAST_COSINE, "sine")
@@ -407,12 +409,13 @@ class HeightAxis:
             for gain, value in zip(row[1:], state[1:], strict=True):
                 total = total + (gain * value)
             moves.append(products.row_sum(total))
-        if len(moves) == 1:
-            return products.move_acceleration(confine(moves[0], least, most))
-        first, second = moves
-        beyond = confine(second, least, most) - second
-        best = first - products.ratio_product(self._ratio, beyond)
-        return products.move_acceleration(confine(best, least, most))
+        best, beyond = moves[0], np.zeros_like(moves[0])
+        if len(moves) > 1:
+            beyond = confine(moves[1], least, most) - moves[1]
+            best = best - products.ratio_product(self._ratio, beyond)
+        move = confine(best, least, most)
+        self.deciding = np.stack([move == best, (move == best) & (beyond != 0)], axis=1)
+        return products.move_acceleration(move)
 
     def stored(self, state: HeightState) -> list[NDArray[Any]]:
         """Return the columns (n, 1) of nmpc_height_t, in the order of `stored_quantities`."""

@@ -13,6 +13,7 @@ class NoHeight:
 
     def __init__(self, constants: QuadraticConstants) -> None:
         self._computed = constants.numbers.computed
+        self.deciding: Rows = np.zeros((1, 0), np.bool_)
 
     def hover(self, n: int) -> Real:
         """Return level commands (n, 2)."""

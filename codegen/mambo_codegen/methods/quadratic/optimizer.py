@@ -5,6 +5,7 @@ import numpy as np
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.law import law_states
+from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real, clamp
 
 
@@ -30,6 +31,8 @@ class QuadraticOptimizer:
             ]
         )
         self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
+        self.deciding: Rows = np.zeros((0, 4), np.bool_)
+        """Of the last moves (n, 4): whether no limit decided each, and whether the second row did."""
 
     def minimize(self, state: Real, limit: Real | None = None) -> Real:
         """Return the first free move (n, 2), right and forward, from states (n, 2, k) of `law_states`.
@@ -38,12 +41,15 @@ class QuadraticOptimizer:
         """
         limit = self._limit if limit is None else limit
         moves = [self._row_product(self._rows[:, move], state) for move in range(self._rows.shape[1])]
-        if len(moves) == 1:
-            return clamp(moves[0], limit)
-        first, second = moves
-        limited = clamp(second, limit)
-        best = first - self._products.ratio_product(self._ratios, limited - second)
-        return clamp(np.where(limited == second, first, best), limit)
+        first, limited = moves[0], moves[-1]
+        best = first
+        if len(moves) > 1:
+            limited = clamp(moves[1], limit)
+            best = first - self._products.ratio_product(self._ratios, limited - moves[1])
+            best = np.where(limited == moves[1], first, best)
+        move = clamp(best, limit)
+        self.deciding = np.concatenate([move == best, (move == best) & (limited != moves[-1])], axis=1)
+        return move
 
     def _row_product(self, rows: Real, state: Real) -> Real:
         total = rows[:, 0] * state[:, :, 0]
