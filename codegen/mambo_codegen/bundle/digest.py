@@ -164,7 +164,8 @@ class _Run:
 
     def _ask(self, headings: Real) -> None:
         """Make the calls that change nothing."""
-        slewed = slew_heading(self._method, *headings.T)[:, None]
+        with np.errstate(all="ignore"):
+            slewed = slew_heading(self._method, *headings.T)[:, None]
         self._fold_numbers(self._method.numbers.quantize(slewed, ("yaw",)), "yaw")
         estimate = self._controller.last_estimate
         if estimate.size:
@@ -176,7 +177,8 @@ class _Run:
         controller, before, values = self._controller, self._controller.memory, call.values
         if values.shape[1] == 1:
             values = values[:, 0]
-        made = getattr(controller, call.function)(values)
+        with np.errstate(all="ignore"):  # what is refused is computed too
+            made = getattr(controller, call.function)(values)
         controller.memory = choose(is_made, controller.memory, before)
         status: NDArray[Any] = np.where(is_made, made, Status.OK)
         return status

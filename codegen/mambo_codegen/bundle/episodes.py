@@ -192,7 +192,7 @@ class Episodes:
         """Return the other call before input number `index`; None if there is none."""
         method = self._method
         calls: dict[int, tuple[str, Callable[[], Real]]] = {
-            1: ("shift", lambda: self._shift(turns=index & 8 == 0)),
+            1: ("shift", lambda: self._shift(turns=index & 8 != 0)),
             5: ("reset", self._command),
             2: (method.setter, self._weights if method.weight_limits else self._command),
         }
