@@ -10,6 +10,7 @@ import math
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -20,6 +21,7 @@ from mambo_codegen.plain_file import guess_name, read_plain_file
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.columns import KNOWN, Column, choose_columns
+from mambo_sil.model.identify.resolution import read_resolution
 from mambo_sil.model.identify.signals import COMMANDS, OPTIONAL, REQUIRED, TIME, FlightLog, Signal
 
 LARGEST_FILE_BYTES: Final = 100_000_000
@@ -47,13 +49,16 @@ def read_csv(
     chosen: Mapping[str, Column],
     signals: Mapping[str, Sequence[Column]] = KNOWN,
     longest_period_s: float = LONGEST_PERIOD_S,
+    binary: str = ".ulg or .bin",
 ) -> FlightLog:
     """Read the log at `path`; `chosen` has the columns that the user named, `signals` the known ones of each.
+
+    `binary` names the other files that the command reads.
 
     Raises LogError, all faults; also for angles that come less often than every `longest_period_s`.
     """
     name = echo(str(path))
-    rows = _rows(read_text(path))
+    rows = _rows(_read_text(path, binary))
     header = [column.strip() for column in next(rows, (0, []))[1]]
     if not any(header):
         raise LogError((f"{name}: is empty; the first line must name the columns",))
@@ -68,7 +73,7 @@ def read_csv(
     return demand_one_clock(log, columns[TIME].text, _FASTER, longest_period_s)
 
 
-def read_text(path: Path) -> str:
+def _read_text(path: Path, binary: str) -> str:
     """Return the text of a log; raises LogError for a file that cannot be read."""
     name = echo(str(path))
     try:
@@ -86,7 +91,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise LogError(
-            (f"{name}: line {line}: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg or .bin",)
+            (f"{name}: line {line}: is not UTF-8; save the log as CSV in UTF-8, or name a {binary}",)
         ) from None
 
 
@@ -169,7 +174,9 @@ def _log(
             continue
         if (lost := int(timed.sum() - there.sum())) and signal in REQUIRED:
             remarks.append(f"{name}: {lost} of {timed.sum()} rows have no {echo(column.name)}")
-        signals[signal] = Signal(time_s[there], column.factor * values[signal][there], column.text)
+        value = values[signal][there]
+        resolution = read_resolution(value, abs(column.factor))
+        signals[signal] = Signal(time_s[there], column.factor * value, column.text, resolution)
     if faults:
         raise LogError(tuple(faults))
     return FlightLog(name, signals, tuple(remarks))
@@ -250,7 +257,7 @@ def demand_one_clock(
                 f"{log.name}: {rate}: whether it was held in between is not known, so the intervals of lag "
                 f"and dead time are wider by {250.0 * period_s:.0f} ms; {fix}"
             )
-        signals[name] = Signal(signal.time_s[fresh], signal.value[fresh], signal.column)
+        signals[name] = replace(signal, time_s=signal.time_s[fresh], value=signal.value[fresh])
     if faults:
         raise LogError(tuple(faults))
     return FlightLog(log.name, signals, tuple(remarks))

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.identify.resolution import Resolution
 
 DEGREE: Final = math.pi / 180.0
 
@@ -74,6 +75,8 @@ class Signal:
     time_s: FloatArray
     value: FloatArray
     column: str
+    resolution: Resolution | None = None
+    """How the column is rounded; None for all digits."""
 
 
 def stamped(time_us: FloatArray, values: FloatArray, column: str) -> Signal:

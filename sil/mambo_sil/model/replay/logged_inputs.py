@@ -1,6 +1,6 @@
 """Read a flight log for a replay: what it says of each update of the controller, with lost rows filled."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.model.identify.columns import KNOWN, Column
+from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.identify.csv_log import read_csv
+from mambo_sil.model.identify.resolution import Resolution
 from mambo_sil.model.identify.signals import (
     COMMANDS,
-    DEGREE,
     GROUNDED,
-    HEIGHT,
     JUMP,
     JUMPS,
     LEVELLED,
@@ -31,85 +30,28 @@ from mambo_sil.model.identify.signals import (
     TARGET_ACCELERATION,
     THRUST,
     UPDATE,
-    UPDATES,
     YAW,
     FlightLog,
 )
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
+from mambo_sil.model.replay.logged_columns import (
+    APP_GROUP,
+    ASKED,
+    HEIGHT_STATE,
+    SIGNALS,
+    STATE,
+    TARGET_HEIGHT,
+)
+from mambo_sil.model.replay.update_clock import UpdateClock, read_clock
 
-STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
-HEIGHT_STATE: Final = (HEIGHT, "vz_m_s")
-"""What a controller of the height reads besides; z points down, the signals of its target up."""
-TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
-_ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
-"""Signals that are read only where the controller needs them."""
-APP_GROUP: Final = "nmpc."
-"""The group of the app's logs, if the prefix of its names is that by default."""
-_APP: Final = {
-    "x_m": Column("nmpc.x"),
-    "y_m": Column("nmpc.y", -1.0),
-    "vx_m_s": Column("nmpc.vx"),
-    "vy_m_s": Column("nmpc.vy", -1.0),
-    "roll_rad": Column("nmpc.inRoll"),
-    "pitch_rad": Column("nmpc.inPitch"),
-    "yaw_rad": Column("nmpc.inYaw", -1.0),
-    "target_x_m": Column("nmpc.targetX"),
-    "target_y_m": Column("nmpc.targetY", -1.0),
-    "target_vx_m_s": Column("nmpc.targetVx"),
-    "target_vy_m_s": Column("nmpc.targetVy", -1.0),
-    "target_ax_m_s2": Column("nmpc.targetAx"),
-    "target_ay_m_s2": Column("nmpc.targetAy", -1.0),
-    HEIGHT: Column("nmpc.z", -1.0),
-    "vz_m_s": Column("nmpc.vz", -1.0),
-    "target_height_m": Column("nmpc.targetZ"),
-    "target_climb_m_s": Column("nmpc.targetVz"),
-    "target_climb_acceleration_m_s2": Column("nmpc.targetAz"),
-    "roll_command_rad": Column("nmpc.outRoll"),
-    "pitch_command_rad": Column("nmpc.outPitch"),
-    TAKE_OVERS: Column("nmpc.takeOvers"),
-    UPDATE: Column("nmpc.step"),
-    START_THRUST: Column("nmpc.startThrust"),
-    GROUNDED: Column("nmpc.grounded"),
-    LEVELLED: Column("nmpc.level"),
-}
-"""What the app of the Crazyflie logs of each step."""
-_OTHER: Final[dict[str, tuple[Column, ...]]] = {
-    **KNOWN,
-    "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
-    "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
-    "target_vx_m_s": (Column("target_vx_m_s"), Column("ctrltarget.vx")),
-    "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
-    "target_ax_m_s2": (Column("target_ax_m_s2"), Column("ctrltarget.ax")),
-    "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
-    "vz_m_s": (Column("seen_vz_m_s"), Column("vz_m_s"), Column("stateEstimate.vz", -1.0)),
-    "target_height_m": (Column("target_height_m"), Column("ctrltarget.z")),
-    "target_climb_m_s": (Column("target_climb_m_s"), Column("ctrltarget.vz")),
-    "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
-    "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
-    "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
-    **{
-        name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, GROUNDED, LEVELLED, JUMPS, *JUMP)
-    },
-}
-SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
-    name: (
-        *(column for column in columns if "." not in column.name),
-        *((_APP[name],) if name in _APP else ()),
-        *(column for column in columns if "." in column.name and column != _APP.get(name)),
-    )
-    for name, columns in _OTHER.items()
-}
-"""Known columns of each signal, the first one that a file has is read: of trace.csv, of the app's
-steps, and of the Crazyflie, whose y has the other sign. The commands are the controller's own."""
-
+ULOG, _DATAFLASH = ".ulg", ".bin"
 LONGEST_FILLED_S: Final = 0.25
 """Longest gap of a log that is filled; behind a longer one the controller begins anew."""
-_SAME_PERIOD: Final = 0.1
-"""Share by which a log's period may differ from a multiple of the update period: its rows are updates."""
-_MOST_BETWEEN: Final = 2
-"""Largest such multiple."""
 _FLOOR_M, _CLIMB_M = 0.05, 0.3
 """Heights over the lowest that may be the floor, and what a log must climb for them to be it."""
+_ELSEWHERE_M, _UNUSUAL = 0.1, 20.0
+"""Distance from where the velocity brought the drone that means another flight, and how many times the
+median one it must be."""
 _OF_ROWS: Final = 0.5
 _SOON_S: Final = 1e-9
 """Time by which a sample may be late and still be of an update at that time: what rounding may cost."""
@@ -129,6 +71,9 @@ class LoggedInputs:
     """Measured state (k, 7), or with a height (k, 10)."""
     target: FloatArray
     thrust_m_s2: FloatArray
+    """Thrust over mass (k,): commanded with a height, else what the controller is given."""
+    has_thrust: bool
+    """Whether the log has the commanded thrust, and the settings command one."""
     start_rad: FloatArray
     """Roll and pitch (k, 2) at which the controller begins: of the log, or as measured."""
     start_m_s2: FloatArray
@@ -138,7 +83,9 @@ class LoggedInputs:
     levelled: NDArray[np.bool_]
     """Whether its caller flew level instead (k,)."""
     begins: NDArray[np.bool_]
-    """Whether the controller begins anew (k,): at a take-over or behind a long gap."""
+    """Whether the controller begins anew (k,): at a take-over, behind a long gap, or where it restarts."""
+    restarts: NDArray[np.bool_]
+    """Whether another flight begins (k,): the count of the updates does, or the drone is elsewhere."""
     jump: FloatArray
     """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
     gaps: int
@@ -147,11 +94,20 @@ class LoggedInputs:
     """Whether the drone may lie on the floor (k,), which a controller of the height is told, not the log."""
     is_exact: bool
     """Whether inputs and commands of an update are of one row, or of the same count of updates."""
-    command_rad: FloatArray
-    """Roll and pitch (k, 2)."""
+    command: FloatArray
+    """Roll and pitch (k, 2), and the thrust over mass (k, 3) where `has_thrust`."""
     resampled: bool
     """Whether the rows of the log are not the updates: inputs are interpolated, commands held."""
+    names: tuple[str, ...]
+    """Signals of the columns of state, target and command, in this order."""
+    resolutions: Mapping[str, Resolution]
+    """How signals are rounded, by name; one with all digits is left out."""
     remarks: tuple[str, ...]
+
+    @property
+    def command_rad(self) -> FloatArray:
+        """Roll and pitch (k, 2)."""
+        return self.command[:, :2]
 
 
 def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -> LoggedInputs:
@@ -170,29 +126,34 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     measured = (*STATE, *HEIGHT_STATE) if commands_thrust else STATE
     log = _read(path, columns, (*measured, *wanted), settings.code.prefix)
     period_s = settings.horizon.update_period_s
-    time_s, at = _updates(log, period_s)
+    clock = read_clock(log, period_s)
+    time_s = clock.time_s
     if len(time_s) < 2:
         raise LogError((f"{log.name}: has no two updates of {period_s:g} s",))
-    needed = (*measured, *wanted, *COMMANDS)
-    if at is None:
-        found = _interpolated(log, needed[:-2], time_s)
-        found = np.column_stack([found, _held(log, COMMANDS, time_s)])
+    has_thrust = commands_thrust and _has_commanded_thrust(log, path)
+    inputs, commands = (*measured, *wanted), (*COMMANDS, THRUST) if has_thrust else COMMANDS
+    needed = (*inputs, *commands)
+    if clock.resampled:
+        found = np.column_stack([_interpolated(log, inputs, time_s), _held(log, commands, time_s)])
     else:
-        found = np.stack([_placed(log, name, at, len(time_s)) for name in needed], axis=1)
+        found = np.stack([_placed(log, name, clock) for name in needed], axis=1)
     is_logged: NDArray[np.bool_] = np.isfinite(np.sum(found, axis=1))
     if is_logged.sum() < 2:
         raise LogError((f"{log.name}: has no two updates with all inputs and commands",))
     filled = np.stack([_filled(name, found[:, k]) for k, name in enumerate(needed)], axis=1)
-    state, target, command_rad = np.split(filled, [len(measured), len(measured) + len(wanted)], axis=1)
+    state, target, command = np.split(filled, [len(measured), len(inputs)], axis=1)
     if commands_thrust:
         own = -state[:, len(STATE) :]
         state = np.column_stack([state[:, : len(STATE)], own, _held_or(log, GROUNDED, time_s, 0.0)])
-    thrust_m_s2 = _held_or(log, THRUST, time_s, GRAVITY_M_S2)
+    thrust_m_s2 = command[:, 2] if has_thrust else _held_or(log, THRUST, time_s, GRAVITY_M_S2)
     starts = [_held_or(log, name, time_s, state[:, 4 + axis]) for axis, name in enumerate(START_TILTS)]
     start_m_s2 = _held_or(log, START_THRUST, time_s, thrust_m_s2)
     levelled = commands_thrust & (_held_or(log, LEVELLED, time_s, 0.0) != 0.0)
     behind = _behind_gaps(is_logged, round(LONGEST_FILLED_S / period_s))
+    jump = _jumps(log, time_s)
     begins = _take_overs(log, time_s) | behind
+    restarts = clock.restarts | _elsewhere(state, is_logged & ~jump.any(axis=1), time_s)
+    begins |= restarts
     begins |= np.diff(time_s, prepend=time_s[0]) > _PAUSE_UPDATES * period_s
     return LoggedInputs(
         name=log.name,
@@ -201,19 +162,25 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         state=state,
         target=target,
         thrust_m_s2=thrust_m_s2,
+        has_thrust=has_thrust,
         start_rad=np.stack(starts, axis=1),
         start_m_s2=start_m_s2,
         shift=np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1),
         levelled=levelled,
         begins=begins,
-        jump=_jumps(log, time_s),
+        restarts=restarts,
+        jump=jump,
         gaps=int(behind.sum()),
         may_lie=_near_floor(state[:, -3])
         if commands_thrust and GROUNDED not in log.signals
         else np.zeros_like(begins),
-        is_exact=at is not None and _is_of_rows(log, needed),
-        command_rad=command_rad,
-        resampled=at is None,
+        is_exact=not clock.resampled and _is_of_rows(log, needed),
+        command=command,
+        resampled=clock.resampled,
+        names=needed,
+        resolutions={
+            name: signal.resolution for name, signal in log.signals.items() if signal.resolution is not None
+        },
         remarks=log.remarks,
     )
 
@@ -225,15 +192,22 @@ def _own(name: str, prefix: str) -> str:
 
 def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], prefix: str) -> FlightLog:
     """Return the log, which has the signals `wanted`; raises LogError."""
-    is_ulog = path.suffix.lower() == ".ulg"
+    is_ulog = path.suffix.lower() == ULOG
     if is_ulog and columns:
         raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
+    if path.suffix.lower() == _DATAFLASH:
+        raise LogError(
+            (
+                f"{echo(str(path))}: is a DataFlash log, which lacks the inputs of the controller's steps; "
+                "replay the flight.csv of pilot",
+            )
+        )
     known = {
         name: tuple(replace(one, name=_own(one.name, prefix)) for one in each)
         for name, each in SIGNALS.items()
-        if name in wanted or name not in _ASKED
+        if name in wanted or name not in ASKED
     }
-    log = read_ulog(path) if is_ulog else read_csv(path, columns, known)
+    log = read_ulog(path) if is_ulog else read_csv(path, columns, known, ULOG)
     missing = [name for name in wanted if name not in log.signals]
     if missing and is_ulog:
         raise LogError(
@@ -250,45 +224,16 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
     return log
 
 
-def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, Callable[[FloatArray], IntArray] | None]:
-    """Return the times of the updates, and what finds the number of an update by its time.
-
-    That is None if the rows of the commands are not the updates.
-    """
-    row_s = log.signals[COMMANDS[0]].time_s
-    between = float(np.median(np.diff(row_s))) / period_s
-    nearest = round(between)
-    if not 1 <= nearest <= _MOST_BETWEEN or abs(between - nearest) > _SAME_PERIOD * nearest:
-        begin_s = max(log.signals[name].time_s[0] for name in (*COMMANDS, *STATE, *TARGET))
-        end_s = min(log.signals[name].time_s[-1] for name in (*COMMANDS, *STATE, *TARGET))
-        return begin_s + period_s * np.arange(1 + max(int((end_s - begin_s) / period_s), -1)), None
-    if UPDATE in log.signals:
-        counted = log.signals[UPDATE]
-        counts = np.append(0, np.cumsum(np.diff(counted.value) % UPDATES)).astype(np.int64)
-        first = np.diff(counts, prepend=-1) > 0
-
-        def counted_at(time_s: FloatArray) -> IntArray:
-            """Return the numbers of the updates counted last before times, -1 before the first."""
-            place = np.searchsorted(counted.time_s, time_s, side="right") - 1
-            return np.where(place < 0, -1, counts[place])
-
-        return np.interp(np.arange(counts[-1] + 1), counts[first], counted.time_s[first]), counted_at
-    number = np.append(0.0, np.cumsum(np.maximum(np.round(np.diff(row_s) / period_s), 1.0)))
-
-    def at(time_s: FloatArray) -> IntArray:
-        """Return the numbers of the updates nearest to times."""
-        inside = np.interp(time_s, row_s, number)
-        beyond = np.minimum(time_s - row_s[0], 0.0) + np.maximum(time_s - row_s[-1], 0.0)
-        return np.asarray(np.round(inside + beyond / period_s), np.int64)
-
-    return np.interp(np.arange(number[-1] + 1.0), number, row_s), at
+def _has_commanded_thrust(log: FlightLog, path: Path) -> bool:
+    """Return whether `THRUST` is the command: always in a table, in a ULog only of our own flight mode."""
+    return THRUST in log.signals and (path.suffix.lower() != ULOG or START_THRUST in log.signals)
 
 
-def _placed(log: FlightLog, name: str, at: Callable[[FloatArray], IntArray], count: int) -> FloatArray:
-    """Return a signal at the updates (count,), NaN where the log has none."""
-    signal, found = log.signals[name], np.full(count, np.nan)
-    number = at(signal.time_s)
-    inside = (number >= 0) & (number < count)
+def _placed(log: FlightLog, name: str, clock: UpdateClock) -> FloatArray:
+    """Return a signal at the updates (k,), NaN where the log has none."""
+    signal, found = log.signals[name], np.full(len(clock.time_s), np.nan)
+    number = clock.update_of(signal.time_s)
+    inside = (number >= 0) & (number < len(found))
     found[number[inside]] = signal.value[inside]
     return found
 
@@ -320,6 +265,19 @@ def _take_overs(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
         return np.zeros(len(time_s), bool)
     begins: NDArray[np.bool_] = np.diff(_held(log, (TAKE_OVERS,), time_s)[:, 0], prepend=np.nan) != 0.0
     return begins
+
+
+def _elsewhere(state: FloatArray, is_told: NDArray[np.bool_], time_s: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the drone is elsewhere than its velocity brought it (k,), as where a flight is appended.
+
+    `is_told` says where the state is logged, and no jump of the estimate is.
+    """
+    passed_s = np.diff(time_s)
+    moved = np.diff(state[:, :2], axis=0) - state[:-1, 2:4] * passed_s[:, np.newaxis]
+    off_m = np.append(0.0, np.hypot(*moved.T))
+    pair = is_told & np.append(False, is_told[:-1])
+    usual_m = float(np.median(off_m[pair])) if pair.any() else 0.0
+    return np.asarray(pair & (off_m > max(_ELSEWHERE_M, _UNUSUAL * usual_m)))
 
 
 def _jumps(log: FlightLog, time_s: FloatArray) -> FloatArray:

@@ -22,22 +22,23 @@ def replay_panel(curves: Path) -> Markup:
     with style():
         return inline(
             _figure(read_curves(curves)),
-            "Roll and pitch command over time: of the log and of the replay, and their difference",
+            "Commands over time: of the log and of the replay, and their difference",
         )
 
 
 def _figure(table: FloatArray) -> Figure:
     """Draw the table of `read_curves`: a column an axis."""
-    figure = Figure(figsize=(2.2 * COLUMN_INCHES, 4.2), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(2, 1))
-    time_s, logged_rad, replayed_rad = table[:, 0] - table[0, 0], table[:, 1:3], table[:, 3:]
+    axes = table.shape[1] // 2
+    figure = Figure(figsize=((0.2 + axes) * COLUMN_INCHES, 4.2), layout="constrained")
+    panels = figure.subplots(2, axes, sharex=True, squeeze=False, height_ratios=(2, 1))
+    time_s, logged, replayed = table[:, 0] - table[0, 0], table[:, 1 : 1 + axes], table[:, 1 + axes :]
     for axis, (commands, differences) in enumerate(panels.T):
-        commands.plot(time_s, logged_rad[:, axis], color=COMMAND, linewidth=BROAD, label="logged")
-        commands.plot(time_s, replayed_rad[:, axis], color=FLOWN, linewidth=THIN, label="replayed")
-        commands.set_title(f"{AXES[axis]} command", loc="left")
-        differences.plot(time_s, replayed_rad[:, axis] - logged_rad[:, axis], color=FLOWN, linewidth=THIN)
+        commands.plot(time_s, logged[:, axis], color=COMMAND, linewidth=BROAD, label="logged")
+        commands.plot(time_s, replayed[:, axis], color=FLOWN, linewidth=THIN, label="replayed")
+        commands.set_title(f"{AXES[axis].name} command, {AXES[axis].unit}", loc="left")
+        differences.plot(time_s, replayed[:, axis] - logged[:, axis], color=FLOWN, linewidth=THIN)
         differences.set_xlabel("time, s")
-    panels[0, 0].set_ylabel("command, rad")
-    panels[1, 0].set_ylabel("difference, rad")
-    panels[0, 1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.1)
+    panels[0, 0].set_ylabel("command")
+    panels[1, 0].set_ylabel("difference")
+    panels[0, -1].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.1)
     return figure

@@ -7,8 +7,9 @@ import numpy as np
 from markupsafe import Markup
 
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.identify.signals import TILTS
 from mambo_sil.model.replay.log_replay import AXES, SETTLING_S, LogReplay
-from mambo_sil.model.replay.replay_verdict import SAME, ReplayVerdict, errors_of, judge
+from mambo_sil.model.replay.replay_verdict import ReplayVerdict, errors_of, judge
 from mambo_sil.results.blocks import CommandResult, Facts, Picture, ResultTable, Sentence
 from mambo_sil.results.summary import Number, ReportedSummary
 
@@ -20,7 +21,7 @@ CAPTION: Final = (
 
 
 class LogReplaySummary(ReportedSummary):
-    """A replay of a log; what is by axis has roll and pitch."""
+    """A replay of a log."""
 
     command = "replay"
 
@@ -40,17 +41,24 @@ class LogReplaySummary(ReportedSummary):
     """Gaps that are too long to fill: behind each the controller begins anew."""
     judged: int
     """Steps `SETTLING_S` or more after a beginning of the controller; what follows is of these."""
-    miss: tuple[Number, Number]
-    """Change of the error over the change of the logged command: half of the motion has less."""
-    error_rad: tuple[Number, Number]
-    """Error: half of the motion has less."""
-    rms_rad: tuple[Number, Number]
-    largest_rad: tuple[Number, Number]
-    largest_s: tuple[Number, Number]
+    axes: list[str]
+    """What is compared: roll, pitch and, where the log has it and the settings command it, thrust."""
+    lacks_thrust: bool
+    """Whether the controller commands a thrust that the log does not have."""
+    worst: list[Number]
+    """Largest median error of a second, rad or m/s^2; what follows is by axis, too."""
+    tolerated: list[Number]
+    """What is allowed in that second."""
+    from_s: list[Number]
+    until_s: list[Number]
+    """From when to when the axis is too far off, or the worst second; since the beginning of the log."""
+    rms: list[Number]
+    largest: list[Number]
+    largest_s: list[Number]
     """Time since the beginning of the log of the largest error."""
     verdict: ReplayVerdict
-    missing: str
-    """What is missing for a verdict."""
+    reason: str
+    """Why."""
     remarks: list[str]
 
     @property
@@ -82,11 +90,11 @@ class LogReplaySummary(ReportedSummary):
 def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogReplaySummary:
     """Compare logged and replayed commands."""
     time_s = replay.time_s - replay.time_s[0]
-    difference_rad = replay.replayed_rad - replay.logged_rad
-    unequal = np.flatnonzero((difference_rad != 0.0).any(axis=1))
+    difference = replay.replayed - replay.logged
+    unequal = np.flatnonzero((difference != 0.0).any(axis=1))
     axes = errors_of(replay)
-    verdict, missing = judge(replay, axes)
-    rms_rad, largest_rad, largest_s = _of(difference_rad[replay.settled], time_s[replay.settled])
+    verdict, reason = judge(replay, axes)
+    rms, largest, largest_s = _sizes(difference[replay.settled], time_s[replay.settled])
     return LogReplaySummary(
         log=log,
         source=source,
@@ -99,48 +107,43 @@ def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogRep
         lost=replay.lost,
         gaps=replay.gaps,
         judged=int(replay.settled.sum()),
-        miss=(axes[0].miss, axes[1].miss),
-        error_rad=(axes[0].error_rad, axes[1].error_rad),
-        rms_rad=rms_rad,
-        largest_rad=largest_rad,
+        axes=[one.axis.name for one in axes],
+        lacks_thrust=replay.settings.height is not None and len(axes) == len(TILTS),
+        worst=[one.worst for one in axes],
+        tolerated=[one.tolerated for one in axes],
+        from_s=[one.from_s for one in axes],
+        until_s=[one.until_s for one in axes],
+        rms=rms,
+        largest=largest,
         largest_s=largest_s,
         verdict=verdict,
-        missing=missing,
+        reason=reason,
         remarks=list(replay.remarks),
     )
 
 
-Pair = tuple[float, float]
-
-
-def _of(difference_rad: FloatArray, time_s: FloatArray) -> tuple[Pair, Pair, Pair]:
-    """Return the rms of differences (k, 2), the largest ones and their times; NaN without any."""
+def _sizes(difference: FloatArray, time_s: FloatArray) -> tuple[list[float], list[float], list[float]]:
+    """Return the rms of differences (k, axes), the largest ones and their times; NaN without any."""
+    columns = range(difference.shape[1])
     if not len(time_s):
-        nothing = (np.nan, np.nan)
+        nothing = [np.nan for _ in columns]
         return nothing, nothing, nothing
-    rms_rad, largest = (
-        np.sqrt((difference_rad * difference_rad).mean(axis=0)),
-        np.abs(difference_rad).argmax(0),
-    )
-    return (
-        (float(rms_rad[0]), float(rms_rad[1])),
-        (float(difference_rad[largest[0], 0]), float(difference_rad[largest[1], 1])),
-        (float(time_s[largest[0]]), float(time_s[largest[1]])),
-    )
+    places = np.abs(difference).argmax(axis=0)
+    rms = np.sqrt((difference * difference).mean(axis=0))
+    return rms.tolist(), [float(difference[places[k], k]) for k in columns], time_s[places].tolist()
 
 
 def _finding(summary: LogReplaySummary) -> str:
     """Say in one line whether the log is one of this controller."""
-    miss = f"{100.0 * max(summary.miss):.2g} % of the logged command's motion"
     match summary.verdict:
         case ReplayVerdict.CANNOT_TELL:
-            return f"CANNOT TELL whether it was this controller: {summary.missing}"
+            return f"CANNOT TELL whether it was this controller: {summary.reason}"
         case ReplayVerdict.NO:
-            limit = f"more than the {100.0 * SAME:g} % allowed"
-            return f"NOT THIS CONTROLLER, or not its inputs: it misses {miss}, {limit}"
+            return f"NOT THIS CONTROLLER, or not its inputs: {summary.reason}"
+    which = "of roll and pitch, without the thrust, " if summary.lacks_thrust else "of the log "
     if summary.equal_steps == summary.steps:
-        return f"all {summary.steps} commands of the log are those of this controller, bit for bit"
-    return f"the commands of the log are those of this controller: it misses {miss}"
+        return f"all {summary.steps} commands {which}are those of this controller, bit for bit"
+    return f"the commands {which}are those of this controller: {summary.reason}"
 
 
 def _rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
@@ -155,20 +158,14 @@ def _rows(summary: LogReplaySummary) -> list[tuple[str, str]]:
     if summary.lost:
         behind = f"; it begins anew behind {summary.gaps} long gaps" if summary.gaps else ""
         lines.append(("lost", f"{summary.lost} of {summary.lost + summary.steps} updates{behind}"))
-    for axis, miss, error_rad, rms_rad, largest_rad, at_s in zip(
-        AXES,
-        summary.miss,
-        summary.error_rad,
-        summary.rms_rad,
-        summary.largest_rad,
-        summary.largest_s,
-        strict=True,
-    ):
+    for k, name in enumerate(summary.axes):
+        unit = AXES[k].unit
         lines.append(
             (
-                axis,
-                f"misses {100.0 * miss:.2g} % of the motion; difference {error_rad:.2g} rad in the middle, "
-                f"{rms_rad:.2g} rad rms, {largest_rad:.2g} rad at {at_s:.2f} s",
+                name,
+                f"worst second {summary.worst[k]:.2g} {unit}, allowed {summary.tolerated[k]:.2g}; "
+                f"{summary.rms[k]:.2g} {unit} rms, {summary.largest[k]:.2g} {unit} at "
+                f"{summary.largest_s[k]:.2f} s",
             )
         )
     if summary.resampled:

@@ -1,0 +1,132 @@
+"""What the replayed commands may be off because a log rounds its columns and has lost rows.
+
+The log is replayed with inputs and commands that may have been: drawn within the rounding of each column, and
+on lost rows within the spread of what is interpolated.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.model.identify.resolution import LEAST_VALUES, Resolution
+from mambo_sil.model.identify.signals import COMMANDS, THRUST
+from mambo_sil.model.replay.logged_inputs import LoggedInputs
+from mambo_sil.model.replay.lost_inputs import ESTIMATED, Block, spread_of
+from mambo_sil.model.replay.replay_step import begin, command_of, step
+
+DRAWS: Final = 12
+"""Flights that are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class InputErrors:
+    """Errors of the commands of a replay, by what the log does not have.
+
+    drawn: of `DRAWS` flights that the log may be of, (draws, k, axes).
+    alone: those that the rounding of one column makes, by its signal, (k, axes).
+    """
+
+    drawn: FloatArray
+    alone: Mapping[str, FloatArray]
+    resolutions: Mapping[str, Resolution]
+
+    def at(self, there: NDArray[np.bool_]) -> "InputErrors":
+        """Return the errors at some of the updates (k,)."""
+        alone = {name: errors[there] for name, errors in self.alone.items()}
+        return InputErrors(self.drawn[:, there], alone, self.resolutions)
+
+
+def input_errors(
+    inputs: LoggedInputs, state: FloatArray, settings: Settings, blocks: Sequence[Block]
+) -> InputErrors | None:
+    """Return what a replay may be off; None for a log with all rows and all digits.
+
+    `state` (k, m) has what is estimated of lost rows.
+    """
+    values = np.column_stack([_measured(inputs, state), inputs.target, inputs.command])
+    resolutions = _resolutions(inputs, values)
+    is_lost = bool((~inputs.is_logged).any())
+    if not resolutions and not is_lost:
+        return None
+    spread = spread_of(values, inputs.is_logged)
+    spread[:, len(values[0]) - inputs.command.shape[1] :] = 0.0
+    if settings.cost.norm == "quadratic":
+        spread[:, :ESTIMATED] = 0.0  # estimated by the commands
+    columns = [k for k, name in enumerate(inputs.names) if name in resolutions]
+    batch = CompiledController(settings, 1 + DRAWS + len(columns))
+    errors = np.zeros((batch.n - 1, *inputs.command.shape))
+    generator = np.random.default_rng(0)
+    for first, end, _ in blocks:
+        noise = np.zeros((batch.n, end - first, values.shape[1]))
+        noise[1 : DRAWS + 1] = spread[first:end] * generator.normal(size=(DRAWS, *spread[first:end].shape))
+        for number, column in enumerate(columns):
+            drawn = _drawn(values[first:end, column], resolutions[inputs.names[column]], generator)
+            noise[1 : DRAWS + 1, :, column] += drawn[:DRAWS]
+            noise[1 + DRAWS + number, :, column] = drawn[DRAWS]
+        if inputs.begins[first]:
+            begin(batch, inputs, first)
+        errors[:, first:end] = _replay(batch, inputs, state, range(first, end), noise)
+    alone = {inputs.names[column]: errors[DRAWS + number] for number, column in enumerate(columns)}
+    return InputErrors(errors[:DRAWS], alone, resolutions)
+
+
+def _replay(
+    batch: CompiledController, inputs: LoggedInputs, state: FloatArray, updates: range, noise: FloatArray
+) -> FloatArray:
+    """Step through `updates` with `noise` (n, k, columns), which the first has none of.
+
+    Returns by what the commands of the others would be off (n - 1, k, axes).
+    """
+    measured, wanted = _measured(inputs, state).shape[1], inputs.target.shape[1]
+    sent = measured + wanted
+    states = np.zeros((batch.n, state.shape[1]))
+    errors = noise[1:, :, sent:].copy()
+    for number, k in enumerate(updates):
+        now = noise[:, number]
+        states[:] = state[k]
+        states[:, :measured] += now[:, :measured]
+        others = (inputs.target[k] + now[:, measured:sent], inputs.command[k] + now[:, sent:])
+        command = command_of(step(batch, inputs, k, states, others), inputs)
+        errors[:, number] += command[0] - command[1:]
+    return errors
+
+
+def _measured(inputs: LoggedInputs, state: FloatArray) -> FloatArray:
+    """Return the columns of a state that a log has; of whether the drone lies it has 0 and 1."""
+    return state[:, : len(inputs.names) - inputs.target.shape[1] - inputs.command.shape[1]]
+
+
+def _resolutions(inputs: LoggedInputs, values: FloatArray) -> dict[str, Resolution]:
+    """Return how the columns of `values` (k, columns) are rounded.
+
+    A target with too few values to see it is rounded as the coarsest other input.
+    """
+    found = {name: inputs.resolutions[name] for name in inputs.names if name in inputs.resolutions}
+    others = [one for name, one in found.items() if name not in (*COMMANDS, THRUST)]
+    if not others:
+        return found
+    coarsest = max(others, key=lambda one: float(one.spacing(np.ones(1))[0]))
+    few = [
+        name
+        for name, column in zip(inputs.names, values.T, strict=True)
+        if name not in found and name.startswith("target") and len(np.unique(column)) < LEAST_VALUES
+    ]
+    return found | dict.fromkeys(few, coarsest)
+
+
+def _drawn(values: FloatArray, resolution: Resolution, generator: np.random.Generator) -> FloatArray:
+    """Return by what `DRAWS` + 1 flights may differ from rounded values (k,): (draws, k).
+
+    Equal values in a row differ by the same; zeros all the time are zeros.
+    """
+    if not values.any():
+        return np.zeros((DRAWS + 1, len(values)))
+    place = np.cumsum(np.diff(values, prepend=values[0]) != 0.0)
+    share = generator.uniform(-0.5, 0.5, (DRAWS + 1, int(place[-1]) + 1))
+    return np.asarray(share[:, place] * resolution.spacing(values))

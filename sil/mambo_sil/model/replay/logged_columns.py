@@ -1,0 +1,84 @@
+"""The columns of a flight log that a replay reads, by signal."""
+
+from typing import Final
+
+from mambo_sil.model.identify.columns import KNOWN, Column
+from mambo_sil.model.identify.signals import (
+    DEGREE,
+    GROUNDED,
+    HEIGHT,
+    JUMP,
+    JUMPS,
+    LEVELLED,
+    START_THRUST,
+    TAKE_OVERS,
+    TARGET_ACCELERATION,
+    THRUST,
+    UPDATE,
+)
+
+STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
+HEIGHT_STATE: Final = (HEIGHT, "vz_m_s")
+"""What a controller of the height reads besides; z points down, the signals of its target up."""
+TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
+ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
+"""Signals that are read only where the controller needs them."""
+APP_GROUP: Final = "nmpc."
+"""The group of the app's logs, if the prefix of its names is that by default."""
+_APP: Final = {
+    "x_m": Column("nmpc.x"),
+    "y_m": Column("nmpc.y", -1.0),
+    "vx_m_s": Column("nmpc.vx"),
+    "vy_m_s": Column("nmpc.vy", -1.0),
+    "roll_rad": Column("nmpc.inRoll"),
+    "pitch_rad": Column("nmpc.inPitch"),
+    "yaw_rad": Column("nmpc.inYaw", -1.0),
+    "target_x_m": Column("nmpc.targetX"),
+    "target_y_m": Column("nmpc.targetY", -1.0),
+    "target_vx_m_s": Column("nmpc.targetVx"),
+    "target_vy_m_s": Column("nmpc.targetVy", -1.0),
+    "target_ax_m_s2": Column("nmpc.targetAx"),
+    "target_ay_m_s2": Column("nmpc.targetAy", -1.0),
+    HEIGHT: Column("nmpc.z", -1.0),
+    "vz_m_s": Column("nmpc.vz", -1.0),
+    "target_height_m": Column("nmpc.targetZ"),
+    "target_climb_m_s": Column("nmpc.targetVz"),
+    "target_climb_acceleration_m_s2": Column("nmpc.targetAz"),
+    "roll_command_rad": Column("nmpc.outRoll"),
+    "pitch_command_rad": Column("nmpc.outPitch"),
+    THRUST: Column("nmpc.outThrust"),
+    TAKE_OVERS: Column("nmpc.takeOvers"),
+    UPDATE: Column("nmpc.step"),
+    START_THRUST: Column("nmpc.startThrust"),
+    GROUNDED: Column("nmpc.grounded"),
+    LEVELLED: Column("nmpc.level"),
+}
+"""What the app of the Crazyflie logs of each step."""
+_OTHER: Final[dict[str, tuple[Column, ...]]] = {
+    **KNOWN,
+    "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
+    "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
+    "target_vx_m_s": (Column("target_vx_m_s"), Column("ctrltarget.vx")),
+    "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
+    "target_ax_m_s2": (Column("target_ax_m_s2"), Column("ctrltarget.ax")),
+    "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
+    "vz_m_s": (Column("seen_vz_m_s"), Column("vz_m_s"), Column("stateEstimate.vz", -1.0)),
+    "target_height_m": (Column("target_height_m"), Column("ctrltarget.z")),
+    "target_climb_m_s": (Column("target_climb_m_s"), Column("ctrltarget.vz")),
+    "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
+    "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
+    "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
+    **{
+        name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, GROUNDED, LEVELLED, JUMPS, *JUMP)
+    },
+}
+SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
+    name: (
+        *(column for column in columns if "." not in column.name),
+        *((_APP[name],) if name in _APP else ()),
+        *(column for column in columns if "." in column.name and column != _APP.get(name)),
+    )
+    for name, columns in _OTHER.items()
+}
+"""Known columns of each signal, the first one that a file has is read: of trace.csv, of the app's
+steps, and of the Crazyflie, whose y has the other sign. The commands are the controller's own."""
