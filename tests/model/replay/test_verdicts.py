@@ -152,7 +152,7 @@ def test_a_short_log_tells_nothing(hover: Table) -> None:
     """It must be settled first."""
     summary = judged(sent(hover[:300], lambda commands: np.round(commands, 6)))
     assert (summary.verdict, summary.judged) == (ReplayVerdict.CANNOT_TELL, 99)
-    assert "99 updates can be judged" in summary.missing
+    assert "99 updates can be judged" in summary.reason
 
 
 @pytest.mark.parametrize("bits", [24, 32])

@@ -9,8 +9,8 @@ from mambo_sil.drone.plant.arrays import FloatArray
 
 MOST_DIGITS: Final = 7
 """Decimals or digits beyond which a column has all digits: single precision has no more."""
-LEAST_VALUES: Final = 20
-"""Distinct values without which nothing can be read: a target at rest has few digits in every log."""
+LEAST_CHANGES: Final = 20
+"""Changes of a value without which nothing can be read: a target at rest has few digits in every log."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,17 @@ class Resolution:
         return np.asarray(self.unit * np.spacing(size.astype(np.float16)).astype(np.float64))
 
 
+def hardly_changes(values: FloatArray) -> bool:
+    """Return whether values (k,) change too rarely to see how they are rounded."""
+    return bool(np.count_nonzero(np.diff(values)) < LEAST_CHANGES)
+
+
 def read_resolution(values: FloatArray, unit: float = 1.0) -> Resolution | None:
     """Return how the finite values (k,) of a column are rounded, the coarsest that all of them show.
 
-    None for a column with all digits, or with too few values to see.
+    None for a column with all digits, or that hardly changes.
     """
-    if len(np.unique(values)) < LEAST_VALUES:
+    if hardly_changes(values):
         return None
     found = []
     decimals = next((d for d in range(MOST_DIGITS) if (np.round(values, d) == values).all()), None)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.model.identify.resolution import LEAST_VALUES, Resolution
+from mambo_sil.model.identify.resolution import Resolution, hardly_changes
 from mambo_sil.model.identify.signals import COMMANDS, THRUST
 from mambo_sil.model.replay.logged_inputs import LoggedInputs
 from mambo_sil.model.replay.lost_inputs import ESTIMATED, Block, spread_of
@@ -105,7 +105,7 @@ def _measured(inputs: LoggedInputs, state: FloatArray) -> FloatArray:
 def _resolutions(inputs: LoggedInputs, values: FloatArray) -> dict[str, Resolution]:
     """Return how the columns of `values` (k, columns) are rounded.
 
-    A target with too few values to see it is rounded as the coarsest other input.
+    An input that hardly changes is rounded as the coarsest other one.
     """
     found = {name: inputs.resolutions[name] for name in inputs.names if name in inputs.resolutions}
     others = [one for name, one in found.items() if name not in (*COMMANDS, THRUST)]
@@ -115,7 +115,7 @@ def _resolutions(inputs: LoggedInputs, values: FloatArray) -> dict[str, Resoluti
     few = [
         name
         for name, column in zip(inputs.names, values.T, strict=True)
-        if name not in found and name.startswith("target") and len(np.unique(column)) < LEAST_VALUES
+        if name not in found and name not in (*COMMANDS, THRUST) and hardly_changes(column)
     ]
     return found | dict.fromkeys(few, coarsest)
 

@@ -53,7 +53,10 @@ class LogReplay:
     settled: NDArray[np.bool_]
     """Whether the controller has not begun anew in the last `SETTLING_S` (k,)."""
     known_s: FloatArray
-    """Time (k,) since the last update that the log has lost, or at which the controller began anew."""
+    """Time (k,) since the last update that the log has lost, or at which the controller began in a state that
+    it does not have; infinite before there is one."""
+    from_start: bool
+    """Whether the log begins with the controller: at its first update, or at time 0."""
     update_period_s: float
     lost: int
     """Updates that the log has lost."""
@@ -122,13 +125,15 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     begins, is_filled = _begins(inputs), np.zeros(len(there), bool)
     for first, end, _ in blocks:
         is_filled[first:end] = ~there[first:end]
+    is_equal = (replayed == inputs.command).all(axis=1)
     return LogReplay(
         time_s=inputs.time_s[there],
         logged=inputs.command[there],
         replayed=replayed[there],
         status=status[there],
         settled=(_since_s(inputs.time_s, begins | inputs.may_lie) >= SETTLING_S)[there],
-        known_s=_since_s(inputs.time_s, begins | inputs.may_lie | is_filled)[there],
+        known_s=_since_s(inputs.time_s, (begins & ~is_equal) | inputs.may_lie | is_filled)[there],
+        from_start=inputs.from_start,
         update_period_s=settings.horizon.update_period_s,
         lost=int((~there).sum()),
         filled=int(is_filled.sum()),

@@ -88,6 +88,8 @@ class LoggedInputs:
     """Whether another flight begins (k,): the count of the updates does, or the drone is elsewhere."""
     jump: FloatArray
     """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
+    from_start: bool
+    """Whether the log begins with the controller: at its first update, or at time 0."""
     gaps: int
     """Gaps that are too long to fill."""
     may_lie: NDArray[np.bool_]
@@ -170,6 +172,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         begins=begins,
         restarts=restarts,
         jump=jump,
+        from_start=_is_from_start(log),
         gaps=int(behind.sum()),
         may_lie=_near_floor(state[:, -3])
         if commands_thrust and GROUNDED not in log.signals
@@ -227,6 +230,13 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
 def _has_commanded_thrust(log: FlightLog, path: Path) -> bool:
     """Return whether `THRUST` is the command: always in a table, in a ULog only of our own flight mode."""
     return THRUST in log.signals and (path.suffix.lower() != ULOG or START_THRUST in log.signals)
+
+
+def _is_from_start(log: FlightLog) -> bool:
+    """Return whether a log begins with the controller, by its count of the updates or its clock."""
+    if UPDATE in log.signals:
+        return bool(log.signals[UPDATE].value[0] <= 1.0)
+    return bool(log.signals[COMMANDS[0]].time_s[0] <= 0.0)
 
 
 def _placed(log: FlightLog, name: str, clock: UpdateClock) -> FloatArray:

@@ -29,10 +29,11 @@ class Tolerance:
 
     def at(self, axis: int, known_s: FloatArray) -> FloatArray:
         """Return the tolerance (n,) of an axis at times (n,) since something was not in the log."""
-        return np.asarray(self.known[axis] + self.unknown[axis] * np.exp(-known_s / self.fades_s))
+        left = np.where(np.isinf(known_s), 0.0, np.exp(-np.minimum(known_s, 1e6) / self.fades_s))
+        return np.asarray(self.known[axis] + self.unknown[axis] * left)
 
 
-QUADRATIC: Final = Tolerance((8e-6, 8e-6, 2e-4), (4e-4, 4e-4, 0.1), 1.0)
+QUADRATIC: Final = Tolerance((8e-6, 8e-6, 2e-4), (4e-4, 4e-4, 0.1), 3.0)
 """Right logs: 0 where all is known; at most .046 mrad and .04 mm/s^2 two seconds behind a beginning in
 flight; .13 mrad and .05 m/s^2 between lost rows. Of faults the least are a velocity noise, a drag or a delay
 that is off by 10 to 20 %: .015, .02 and .09 mrad in a hover; in curves a gain off by 2 %: .6 mrad."""
@@ -104,11 +105,6 @@ class AxisErrors:
     def moves(self) -> bool:
         """Whether the command of a tilt moves enough to say something."""
         return self.is_tilt and self.spread > CALM_RAD
-
-    @property
-    def is_off(self) -> bool:
-        """Whether a second is farther off than tolerated."""
-        return self.worst > self.tolerated
 
     def text(self, value: float) -> str:
         """Return a value of the command in words."""
@@ -227,6 +223,11 @@ class Evidence:
         )
 
     @property
+    def is_off(self) -> bool:
+        """Whether a second is farther off than tolerated."""
+        return any(one.worst > one.tolerated for one in self.axes)
+
+    @property
     def is_far(self) -> bool:
         """Whether commands are far off, whichever inputs a step read."""
         return any(one.moves and one.worst >= FAR * one.spread for one in self.axes)
@@ -302,6 +303,17 @@ def _blur(evidence: Evidence) -> str:
     return f"{column} has {resolution.text}, log {resolution.finer(one.expected / most)}"
 
 
+def _begins_otherwise(evidence: Evidence) -> bool:
+    """Return whether a 1-norm's log that lacks nothing begins with another command.
+
+    Such a controller is known by its bits alone.
+    """
+    replay = evidence.replay
+    lacks = replay.filled or replay.gaps or replay.input_errors is not None or not replay.is_exact
+    is_other = bool((replay.replayed[0] != replay.logged[0]).any())
+    return replay.settings.cost.norm != "quadratic" and replay.from_start and not lacks and is_other
+
+
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
 BRANCHES: Final[tuple[Branch, ...]] = (
     (ReplayVerdict.YES, lambda e: e.is_equal and e.moves, lambda _: "no bit differs"),
@@ -312,9 +324,10 @@ BRANCHES: Final[tuple[Branch, ...]] = (
     ),
     (
         ReplayVerdict.NO,
-        lambda e: e.is_far if e.is_rare or not e.replay.is_exact else any(one.is_off for one in e.axes),
+        lambda e: e.is_far if e.is_rare or not e.replay.is_exact else e.is_off,
         _off,
     ),
+    (ReplayVerdict.NO, _begins_otherwise, lambda _: "its first command is another one"),
     (
         ReplayVerdict.CANNOT_TELL,
         lambda e: e.is_rare,
@@ -327,7 +340,7 @@ BRANCHES: Final[tuple[Branch, ...]] = (
     ),
     (
         ReplayVerdict.CANNOT_TELL,
-        lambda e: not e.replay.is_exact,
+        lambda e: e.is_off,  # of a log that is not exact: exact ones were judged above
         lambda _: "which inputs a step read is not in its row: log those of the step",
     ),
     (ReplayVerdict.CANNOT_TELL, lambda e: e.blurred is not None, _blur),
