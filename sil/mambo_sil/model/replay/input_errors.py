@@ -25,6 +25,17 @@ DRAWS: Final = 12
 
 
 @dataclass(frozen=True, eq=False)
+class Filled:
+    """The states (k, m) of a log, and what the commands leave of their first numbers (k, 4).
+
+    None where the lost ones are interpolated.
+    """
+
+    state: FloatArray
+    left: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
 class InputErrors:
     """Errors of the commands of a replay, by what the log does not have.
 
@@ -43,12 +54,10 @@ class InputErrors:
 
 
 def input_errors(
-    inputs: LoggedInputs, state: FloatArray, settings: Settings, blocks: Sequence[Block]
+    inputs: LoggedInputs, filled: Filled, settings: Settings, blocks: Sequence[Block]
 ) -> InputErrors | None:
-    """Return what a replay may be off; None for a log with all rows and all digits.
-
-    `state` (k, m) has what is estimated of lost rows.
-    """
+    """Return what a replay may be off; None for a log with all rows and all digits."""
+    state = filled.state
     values = np.column_stack([_measured(inputs, state), inputs.target, inputs.command])
     resolutions = _resolutions(inputs, values)
     is_lost = bool((~inputs.is_logged).any())
@@ -56,8 +65,8 @@ def input_errors(
         return None
     spread = spread_of(values, inputs.is_logged)
     spread[:, len(values[0]) - inputs.command.shape[1] :] = 0.0
-    if settings.cost.norm == "quadratic":
-        spread[:, :ESTIMATED] = 0.0  # estimated by the commands
+    if filled.left is not None:
+        spread[:, :ESTIMATED] = filled.left
     columns = [k for k, name in enumerate(inputs.names) if name in resolutions]
     batch = CompiledController(settings, 1 + DRAWS + len(columns))
     errors = np.zeros((batch.n - 1, *inputs.command.shape))

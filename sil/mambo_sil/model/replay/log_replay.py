@@ -15,7 +15,7 @@ from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.errors import ResultsError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.columns import Column
-from mambo_sil.model.replay.input_errors import InputErrors, input_errors
+from mambo_sil.model.replay.input_errors import Filled, InputErrors, input_errors
 from mambo_sil.model.replay.logged_inputs import LoggedInputs, read_inputs
 from mambo_sil.model.replay.lost_inputs import LostInputs, blocks_of
 from mambo_sil.model.replay.replay_step import begin, command_of, step
@@ -51,10 +51,11 @@ class LogReplay:
     status: IntArray
     """Status of each update (k,)."""
     settled: NDArray[np.bool_]
-    """Whether the controller has not begun anew in the last `SETTLING_S` (k,)."""
-    known_s: FloatArray
-    """Time (k,) since the last update that the log has lost, or at which the controller began in a state that
-    it does not have; infinite before there is one."""
+    """Whether the controller has not begun in the last `SETTLING_S`, or with the command of the log (k,)."""
+    begun_s: FloatArray
+    """Time (k,) since the controller began in a state that the log does not have, infinite before it did."""
+    complete_s: FloatArray
+    """Time (k,) since the last update that the log has lost, likewise."""
     from_start: bool
     """Whether the log begins with the controller: at its first update, or at time 0."""
     update_period_s: float
@@ -121,18 +122,20 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         for k in range(first, end):
             done = step(controller, inputs, k, state[k : k + 1])
             replayed[k], status[k] = command_of(done, inputs)[0], done.status[0]
-    errors = input_errors(inputs, state, settings, blocks)
-    begins, is_filled = _begins(inputs), np.zeros(len(there), bool)
+    filled = Filled(state, None if lost is None else lost.left)
+    errors = input_errors(inputs, filled, settings, blocks)
+    is_filled = np.zeros(len(there), bool)
     for first, end, _ in blocks:
         is_filled[first:end] = ~there[first:end]
-    is_equal = (replayed == inputs.command).all(axis=1)
+    begun_s = _since_s(inputs.time_s, _begins_unknown(inputs, replayed))
     return LogReplay(
         time_s=inputs.time_s[there],
         logged=inputs.command[there],
         replayed=replayed[there],
         status=status[there],
-        settled=(_since_s(inputs.time_s, begins | inputs.may_lie) >= SETTLING_S)[there],
-        known_s=_since_s(inputs.time_s, (begins & ~is_equal) | inputs.may_lie | is_filled)[there],
+        settled=(begun_s >= SETTLING_S)[there],
+        begun_s=begun_s[there],
+        complete_s=_since_s(inputs.time_s, is_filled)[there],
         from_start=inputs.from_start,
         update_period_s=settings.horizon.update_period_s,
         lost=int((~there).sum()),
@@ -146,11 +149,16 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     )
 
 
-def _begins(inputs: LoggedInputs) -> NDArray[np.bool_]:
-    """Return whether the controller begins at an update (k,), also at the first that the log has."""
+def _begins_unknown(inputs: LoggedInputs, replayed: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the controller begins at an update (k,) in a state that the log does not have.
+
+    It has it where the count of the updates begins, or where the first command is that of the log.
+    """
+    first = np.flatnonzero(inputs.is_logged)[0]
     begins = inputs.begins.copy()
-    begins[np.flatnonzero(inputs.is_logged)[0]] = True
-    return begins
+    begins[first] = not inputs.is_counted_from_start
+    is_known = (replayed == inputs.command).all(axis=1) & inputs.command_rad.any(axis=1)
+    return np.asarray(begins & ~is_known | inputs.may_lie)
 
 
 def _since_s(time_s: FloatArray, happens: NDArray[np.bool_]) -> FloatArray:

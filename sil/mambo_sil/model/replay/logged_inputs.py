@@ -90,6 +90,8 @@ class LoggedInputs:
     """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
     from_start: bool
     """Whether the log begins with the controller: at its first update, or at time 0."""
+    is_counted_from_start: bool
+    """Whether it begins at the first update by its count."""
     gaps: int
     """Gaps that are too long to fill."""
     may_lie: NDArray[np.bool_]
@@ -173,6 +175,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         restarts=restarts,
         jump=jump,
         from_start=_is_from_start(log),
+        is_counted_from_start=UPDATE in log.signals and _is_from_start(log),
         gaps=int(behind.sum()),
         may_lie=_near_floor(state[:, -3])
         if commands_thrust and GROUNDED not in log.signals

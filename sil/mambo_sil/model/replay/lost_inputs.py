@@ -40,6 +40,8 @@ class LostInputs:
         self._batch = CompiledController(settings, 1 + ESTIMATED * most)
         spread = spread_of(inputs.state[:, :ESTIMATED], inputs.is_logged)
         self._deviation = np.maximum(spread, _LEAST_SPREAD)
+        self.left = spread
+        """Standard deviations (k, 4) that the commands leave of the numbers of a state."""
 
     def estimate(self, first: int, end: int, controller: CompiledController, state: FloatArray) -> FloatArray:
         """Return `state` (k, n) with the lost rows of first..end - 1 and of what follows estimated.
@@ -63,7 +65,9 @@ class LostInputs:
         found = np.asarray(commands, np.float64)[there]
         slopes = (found[:, 1:] - found[:, :1]).transpose(0, 2, 1).reshape(-1, count) / COMMAND_NOISE_RAD
         left = (inputs.command_rad[first:end][there] - found[:, 0]).reshape(-1) / COMMAND_NOISE_RAD
-        change = np.linalg.solve(slopes.T @ slopes + np.eye(count), slopes.T @ left)
+        covariance = np.linalg.inv(slopes.T @ slopes + np.eye(count))
+        change = covariance @ (slopes.T @ left)
+        self.left[lost] = np.sqrt(np.diag(covariance)).reshape(-1, ESTIMATED) * self._deviation[lost]
         estimated = state.copy()
         estimated[lost, :ESTIMATED] += change.reshape(-1, ESTIMATED) * self._deviation[lost]
         return estimated

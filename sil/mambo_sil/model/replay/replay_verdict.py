@@ -1,5 +1,6 @@
 """Whether a log is one of a controller: its worst second against what the log leaves open."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.model.identify.signals import THRUST
+from mambo_sil.model.identify.signals import THRUST, TILTS
 from mambo_sil.model.replay.log_replay import Axis, LogReplay
+
+Axes = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -19,25 +22,48 @@ class Tolerance:
     """Largest median error of a second, of roll, pitch and thrust: in rad, rad and m/s^2.
 
     known:   where the log has all that the command depends on.
-    unknown: in addition, right behind what it has not: a lost row, or the state in which it begins.
-    fades_s: time constant with which the controller forgets that.
+    begun:   in addition behind a beginning in a state that the log does not have.
+    lost:    likewise behind a row that the log has lost; the larger one counts.
+    begun_fades_s, lost_fades_s: time constants with which the controller forgets it.
     """
 
-    known: tuple[float, float, float]
-    unknown: tuple[float, float, float]
-    fades_s: float
+    known: Axes
+    begun: Axes
+    begun_fades_s: Axes
+    lost: Axes
+    lost_fades_s: Axes
 
-    def at(self, axis: int, known_s: FloatArray) -> FloatArray:
-        """Return the tolerance (n,) of an axis at times (n,) since something was not in the log."""
-        left = np.where(np.isinf(known_s), 0.0, np.exp(-np.minimum(known_s, 1e6) / self.fades_s))
-        return np.asarray(self.known[axis] + self.unknown[axis] * left)
+    def at(self, axis: int, begun_s: float, complete_s: float) -> float:
+        """Return the tolerance of an axis at times since a beginning, and since a lost row."""
+        begun, lost = (
+            largest[axis] * math.exp(-since_s / fades_s[axis]) if since_s < _NEVER_S else 0.0
+            for largest, fades_s, since_s in (
+                (self.begun, self.begun_fades_s, begun_s),
+                (self.lost, self.lost_fades_s, complete_s),
+            )
+        )
+        return self.known[axis] + max(begun, lost)
 
 
-QUADRATIC: Final = Tolerance((8e-6, 8e-6, 2e-4), (4e-4, 4e-4, 0.1), 3.0)
-"""Right logs: 0 where all is known; at most .046 mrad and .04 mm/s^2 two seconds behind a beginning in
-flight; .13 mrad and .05 m/s^2 between lost rows. Of faults the least are a velocity noise, a drag or a delay
-that is off by 10 to 20 %: .015, .02 and .09 mrad in a hover; in curves a gain off by 2 %: .6 mrad."""
-ONE_NORM: Final = Tolerance((8e-6, 8e-6, 2e-4), (0.045, 0.045, 0.1), np.inf)
+_NEVER_S: Final = 1e6
+QUADRATIC: Final = Tolerance(
+    known=(8e-6, 8e-6, 2e-4),
+    begun=(0.01, 0.01, 0.1),
+    begun_fades_s=(2.0, 2.0, 1.0),
+    lost=(4e-4, 4e-4, 0.1),
+    lost_fades_s=(3.0, 3.0, 1.0),
+)
+"""Right logs: 0 where all is known. Behind a beginning in flight with wind 2.9 mrad after 1.25 s, which falls
+with a time constant of 2.0 s; the thrust .04 mm/s^2 after 2 s. Between lost rows .13 mrad and .05 m/s^2.
+Of faults the least are a velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad
+in a hover; in curves a gain off by 2 %: .6 mrad."""
+ONE_NORM: Final = Tolerance(
+    known=(8e-6, 8e-6, 2e-4),
+    begun=(0.045, 0.045, 0.1),
+    begun_fades_s=(math.inf, math.inf, math.inf),
+    lost=(0.045, 0.045, 0.1),
+    lost_fades_s=(math.inf, math.inf, math.inf),
+)
 """Its search never forgets: after one other bit right logs are up to 33 mrad off, for good."""
 FILLED: Final = 2.0
 """How many times the largest of what is drawn for a second its error may be."""
@@ -48,7 +74,7 @@ OTHER: Final = 0.013
 TELLS: Final = 0.03
 """Largest error that rounding and lost rows may make, over the standard deviation of the command, with which
 a log tells controllers apart that differ by a few percent."""
-TELLS_ONE_NORM: Final = 0.2
+TELLS_ONE_NORM: Final = 0.4
 TELLS_M_S2: Final = 0.1
 """The same of the thrust, absolute: 1 % of the weight."""
 FAR: Final = 0.5
@@ -61,8 +87,9 @@ LEAST_UPDATES: Final = 150
 MOST_FILLED: Final = 0.3
 """Largest share of filled updates among which the others tell controllers apart."""
 SECOND_S: Final = 1.0
-_LEAST_JUDGED: Final = 0.8
-"""Least share of a second's updates that can be judged."""
+_LARGEST: Final = 0.999
+_LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
+"""Least shares of a second's updates that can be judged, and that are not at the tilt limit."""
 
 
 class ReplayVerdict(StrEnum):
@@ -153,15 +180,16 @@ def _worst_second(
 ) -> tuple[float, float, float, float]:
     """Return median error and tolerance of the second that is farthest off, and from when to when."""
     length = round(SECOND_S / replay.update_period_s)
+    free = replay.settled & ~_limited(replay, k)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
-        judged = replay.settled[rows]
-        if judged.sum() < _LEAST_JUDGED * length:
+        judged = free[rows]
+        if replay.settled[rows].sum() < _LEAST_JUDGED * length or judged.sum() < _LEAST_FREE * length:
             continue
-        known_s = replay.known_s[rows][judged].min(keepdims=True)
+        begun_s, complete_s = (float(one[rows][judged].min()) for one in (replay.begun_s, replay.complete_s))
         open_by_draws = FILLED * float(np.median(drawn[:, rows][:, judged], axis=1).max())
-        tolerated = float(tolerance_of(replay.settings).at(k, known_s)[0]) + open_by_draws
+        tolerated = tolerance_of(replay.settings).at(k, begun_s, complete_s) + open_by_draws
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan
@@ -174,6 +202,13 @@ def _worst_second(
     since_s = replay.time_s - replay.time_s[0]
     until = min(found[end][2] + length, len(since_s)) - 1
     return found[at][0], found[at][1], float(since_s[found[begin][2]]), float(since_s[until])
+
+
+def _limited(replay: LogReplay, k: int) -> NDArray[np.bool_]:
+    """Return whether a tilt of log and controller is the limit (k,), which is that of others, too."""
+    logged, most = replay.logged[:, k], replay.settings.limits.tilt_rad
+    is_largest = np.abs(logged) >= _LARGEST * most if k < len(TILTS) else np.zeros(len(logged), bool)
+    return np.asarray(is_largest & (replay.replayed[:, k] == logged))
 
 
 def _miss(error: FloatArray, logged: FloatArray, settled: NDArray[np.bool_]) -> float:

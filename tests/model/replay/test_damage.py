@@ -1,0 +1,208 @@
+"""Verdicts of `replay` on damaged logs: what a file or a radio loses, and what another controller did."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_codegen.settings import controller_toml, presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.replay.log_replay import replay_log
+from mambo_sil.model.replay.replay_report import LogReplaySummary, summarise
+from tests.support.command import run
+
+Columns = dict[str, NDArray[np.float64]]
+ROLL, PITCH, THRUST = "roll_command_rad", "pitch_command_rad", "thrust_acceleration_m_s2"
+COURSE: Final = ("--trajectory", "circle", "--size-m", "1", "--no-pictures")
+
+
+def judged(columns: Columns, settings: Settings, folder: Path) -> LogReplaySummary:
+    """Write a log, and return what its replay says."""
+    log = folder / "log.csv"
+    with log.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(np.stack(list(columns.values()), axis=1).tolist())
+    return summarise(replay_log(log, {}, settings), "log.csv", "settings", settings.digest)
+
+
+def flown(folder: Path, *options: str) -> Columns:
+    """Fly, and return the columns of the trace with the estimates in place of the true state."""
+    run("fly", *options, *COURSE, "-o", str(folder / "flight"))
+    header, *rows = csv.reader((folder / "flight" / "trace.csv").read_text("utf-8").splitlines())
+    table = np.array(rows, np.float64)
+    seen = {name.removeprefix("seen_"): name for name in header if name.startswith("seen_")}
+    return {name: table[:, header.index(seen.get(name, name))] for name in header if name[:5] != "seen_"}
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Columns, Settings]:
+    """Return the log of 18 s on a circle, and the settings that flew, which command the thrust."""
+    folder = tmp_path_factory.mktemp("flight")
+    source = folder / "controller.toml"
+    source.write_text(controller_text(vehicle_toml.load("crazyflie"), "crazyflie"), "utf-8")
+    columns = flown(folder, str(source), "--vehicle", "crazyflie", "--sensors", "mocap", "--duration-s", "18")
+    return columns, controller_toml.read(source)
+
+
+def scaled(name: str, factor: float, first: int = 0, end: int | None = None) -> Callable[[Columns], Columns]:
+    """Return a damage that scales a column between two rows."""
+
+    def damage(columns: Columns) -> Columns:
+        value = columns[name].copy()
+        value[first:end] *= factor
+        return columns | {name: value}
+
+    return damage
+
+
+def late(rows: int) -> Callable[[Columns], Columns]:
+    """Return a damage that makes the commands of the tilt late."""
+    return lambda columns: (
+        columns
+        | {name: np.concatenate([columns[name][:rows], columns[name][:-rows]]) for name in (ROLL, PITCH)}
+    )
+
+
+def rounded(round_to: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Callable[[Columns], Columns]:
+    """Return a damage that rounds all columns but the clock."""
+    return lambda columns: {
+        name: value if name == "time_s" else round_to(value) for name, value in columns.items()
+    }
+
+
+def jittering(columns: Columns) -> Columns:
+    """Return a log whose time stamps are up to 3 ms off."""
+    noise_s = np.random.default_rng(1).uniform(-0.003, 0.003, len(columns["time_s"]))
+    return columns | {"time_s": columns["time_s"] + noise_s}
+
+
+def twice(columns: Columns) -> Columns:
+    """Return two flights one behind the other, with the clock going on."""
+    passed_s = columns["time_s"][-1] - columns["time_s"][0] + 0.01
+    later = columns | {"time_s": columns["time_s"] + passed_s}
+    return {name: np.concatenate([columns[name], later[name]]) for name in columns}
+
+
+def lossy(columns: Columns) -> Columns:
+    """Return a log without a tenth of its rows."""
+    kept = np.random.default_rng(2).random(len(columns["time_s"])) > 0.1
+    return {name: value[kept] for name, value in columns.items()}
+
+
+def same(columns: Columns) -> Columns:
+    """Return the log itself."""
+    return columns
+
+
+RIGHT: Final[dict[str, tuple[Callable[[Columns], Columns], str]]] = {
+    "as it is": (same, "no bit differs"),
+    "4 decimals": (rounded(lambda value: np.round(value, 4)), "allowed"),
+    "6 digits": (rounded(lambda value: np.array([float(f"{one:.6g}") for one in value])), "allowed"),
+    "a clock that jitters": (jittering, "no bit differs"),
+    "two flights": (twice, ""),
+    "lost rows": (lossy, "allowed"),
+    "without its first seconds": (lambda columns: {k: v[300:] for k, v in columns.items()}, "allowed"),
+}
+WRONG: Final[dict[str, tuple[Callable[[Columns], Columns], str]]] = {
+    "sign of roll for 1 s": (scaled(ROLL, -1.0, 420, 520), " s roll is"),
+    "sign of pitch for 45 %": (scaled(PITCH, -1.0, 300, 840), " s pitch is"),
+    "roll 5 mrad off": (lambda columns: columns | {ROLL: columns[ROLL] + 0.005}, " s roll is"),
+    "roll 2 % larger": (scaled(ROLL, 1.02), " s roll is"),
+    "clamped": (lambda columns: columns | {ROLL: np.clip(columns[ROLL], -0.03, 0.03)}, " s roll is"),
+    "10 ms late": (late(1), "from 0.0 to"),
+    "thrust of 0": (scaled(THRUST, 0.0), " s thrust is"),
+    "thrust of 0 for 1 s": (scaled(THRUST, 0.0, 420, 520), " s thrust is"),
+    "thrust 1.3 times": (scaled(THRUST, 1.3), " s thrust is"),
+}
+OTHERS: Final = {
+    "lag": ("model.roll_lag_s", 1.03),
+    "delay": ("model.roll_delay_s", 1.2),
+    "drag": ("model.drag_1_s", 1.1),
+    "noise": ("observer.velocity_noise", 1.1),
+    "lag of the thrust": ("height.lag_s", 1.3),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_what_a_file_or_a_radio_loses_is_no_other_controller(
+    name: str, flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """Yes, with roll, pitch and thrust compared."""
+    damage, words = RIGHT[name]
+    summary = judged(damage(flight[0]), flight[1], tmp_path)
+    assert (summary.verdict, summary.axes) == ("yes", ["roll", "pitch", "thrust"]), summary.reason
+    assert words in summary.reason
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_commands_of_another_controller_are_told(
+    name: str, flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """No, with the axis, and from when to when."""
+    damage, words = WRONG[name]
+    summary = judged(damage(flight[0]), flight[1], tmp_path)
+    assert summary.verdict == "no"
+    assert words in summary.reason
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_controller_with_another_setting_is_told(
+    name: str, flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """No: some percent of one setting, in a log that lacks nothing."""
+    key, factor = OTHERS[name]
+    section, field = key.split(".")
+    value = getattr(getattr(flight[1], section), field)
+    other = with_option(flight[1], key, round(factor * value, 6))
+    assert judged(flight[0], other, tmp_path).verdict == "no"
+
+
+def test_the_column_with_too_few_digits_is_named(flight: tuple[Columns, Settings], tmp_path: Path) -> None:
+    """2 decimals tell nothing."""
+    summary = judged(rounded(lambda value: np.round(value, 2))(flight[0]), flight[1], tmp_path)
+    assert summary.verdict == "cannot tell"
+    assert " has 2 decimals, log " in summary.reason
+
+
+def test_a_log_without_the_thrust_says_so(flight: tuple[Columns, Settings], tmp_path: Path) -> None:
+    """Only roll and pitch are judged."""
+    columns = {name: value for name, value in flight[0].items() if name != THRUST}
+    summary = judged(columns, flight[1], tmp_path)
+    assert (summary.verdict, summary.axes, summary.lacks_thrust) == ("yes", ["roll", "pitch"], True)
+
+
+@pytest.fixture(scope="module")
+def one_norm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Columns, Settings]:
+    """Return the log of 8 s of a 1-norm, and its settings."""
+    columns = flown(tmp_path_factory.mktemp("one-norm"), "mambo-1norm", "--duration-s", "8")
+    return columns, presets.preset("mambo-1norm")
+
+
+@pytest.mark.parametrize(
+    ("damage", "verdict"),
+    [
+        (same, "yes"),
+        (jittering, "yes"),
+        (twice, "yes"),
+        (lossy, "yes"),
+        (rounded(lambda value: np.round(value, 4)), "cannot tell"),
+        (late(1), "no"),
+        (scaled(ROLL, 1.02), "no"),
+        (scaled(ROLL, -1.0, 420, 520), "no"),
+        (lambda columns: columns | {ROLL: columns[ROLL] + 0.05}, "no"),
+    ],
+)
+def test_a_one_norm_is_judged_by_its_bits(
+    damage: Callable[[Columns], Columns], verdict: str, one_norm: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """And where the log lacks something, by tolerances of its own."""
+    assert judged(damage(one_norm[0]), one_norm[1], tmp_path).verdict == verdict
