@@ -215,6 +215,8 @@ def test_a_log_of_another_rate_is_interpolated() -> None:
             "short.csv: has no column for target_x_m (target_x_m, nmpc.targetX, ctrltarget.x); name it",
         ),
         (["flight.ulg"], "flight.ulg: is no ULog"),
+        (["flight.bin"], "flight.bin: is a DataFlash log, which lacks the inputs of the controller's steps"),
+        (["flight.dat"], "line 1: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg"),
         (["short.csv", "--columns", "targt_x_m=x"], "must begin with target_x_m"),
     ],
 )
@@ -222,6 +224,8 @@ def test_a_log_that_cannot_be_replayed_is_refused(arguments: list[str], message:
     """Exit 2, and nothing is written."""
     (tmp_path / "short.csv").write_text("time_s,roll_command_rad\n0,0\n", "utf-8")
     (tmp_path / "flight.ulg").write_bytes(b"ULog")
+    for name in ("flight.bin", "flight.dat"):
+        (tmp_path / name).write_bytes(b"\xa3\x95\x80")
     before = sorted(tmp_path.iterdir())
     assert message in run("replay", *arguments, code=2)[1]
     assert sorted(tmp_path.iterdir()) == before
