@@ -75,15 +75,15 @@ class HeldCommand:
 
 
 def is_rare(signal: Signal) -> bool:
-    """Return whether a signal changes between its samples by more than its use can leave out."""
-    return float(np.median(np.diff(signal.time_s))) > LONGEST_HELD_S
+    """Return whether a signal may change between its samples by more than its use can leave out."""
+    return len(signal.time_s) > 1 and float(np.median(np.diff(signal.time_s))) > LONGEST_HELD_S
 
 
 def _mean_gap_s(signal: Signal) -> float:
     """Return the mean length of the gap in which a time lies; gaps that no stretch spans do not count."""
     gaps_s = np.diff(signal.time_s)
     gaps_s = gaps_s[gaps_s <= LONGEST_GAP_S]
-    return float(gaps_s @ gaps_s / gaps_s.sum())
+    return float(gaps_s @ gaps_s / gaps_s.sum()) if len(gaps_s) else LONGEST_GAP_S
 
 
 def _interpolate(signal: Signal) -> Signal:
