@@ -76,14 +76,15 @@ class HeldCommand:
 
 def is_rare(signal: Signal) -> bool:
     """Return whether a signal may change between its samples by more than its use can leave out."""
-    return len(signal.time_s) > 1 and float(np.median(np.diff(signal.time_s))) > LONGEST_HELD_S
+    gaps_s = np.diff(signal.time_s)
+    return len(gaps_s) > 0 and LONGEST_HELD_S < float(np.median(gaps_s)) <= LONGEST_GAP_S
 
 
 def _mean_gap_s(signal: Signal) -> float:
     """Return the mean length of the gap in which a time lies; gaps that no stretch spans do not count."""
     gaps_s = np.diff(signal.time_s)
     gaps_s = gaps_s[gaps_s <= LONGEST_GAP_S]
-    return float(gaps_s @ gaps_s / gaps_s.sum()) if len(gaps_s) else LONGEST_GAP_S
+    return float(gaps_s @ gaps_s / gaps_s.sum())
 
 
 def _interpolate(signal: Signal) -> Signal:
@@ -100,7 +101,8 @@ def _interpolate(signal: Signal) -> Signal:
     x = np.where(spanned[at], (step + 0.5) / counts[at], 0.0)
     bend = (1.0 - x) * (gaps_s * slopes[:-1] - rises)[at] - x * (gaps_s * slopes[1:] - rises)[at]
     middle = values[at] + x * (rises[at] + (1.0 - x) * bend)
-    return Signal(knots_s[at] + step / counts[at] * gaps_s[at], middle, signal.column)
+    time_s = np.append(knots_s[at] + step / counts[at] * gaps_s[at], knots_s[-1])
+    return Signal(time_s, np.append(middle, values[-1]), signal.column)
 
 
 @dataclass(frozen=True, eq=False)
