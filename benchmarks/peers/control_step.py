@@ -126,7 +126,7 @@ def _row(one: Measured, ours: Measured) -> dict[str, str]:
         "heap": "yes" if one.heap else "no",
         **{f"{name}, mean (most)": f"{n.mean():,.0f} ({n.max():,})" for name, n in one.instructions.items()},
         "over ours": "1" if one is ours else f"{min(ratios):,.0f} to {max(ratios):,.0f}",
-        "apart": "" if one is ours else f"{apart:.0e}",
+        "apart": "-" if one is ours else f"{apart:.0e}",
     }
 
 

@@ -88,6 +88,18 @@ def size(name: str) -> str:
     return f"{found['stack_bytes']} B, {flash}, {found['ram_bytes']} B, {step_us(name)} us"
 
 
+def solver(name: str) -> str:
+    """Return how many times our instructions a solver takes for the problem of a control step."""
+    return str(next(row for row in figures("peers")["rows"] if row["solver"] == name)["over ours"])
+
+
+def least_and_most_of_ours() -> str:
+    """Return the least mean and the most instructions of our minimum."""
+    ours = figures("peers")["rows"][0]
+    counts = [text.split() for name, text in ours.items() if name.endswith("mean (most)")]
+    return f"{min(int(mean) for mean, _ in counts)} to {max(int(most.strip('()')) for _, most in counts)}"
+
+
 def in_app(part: str, *columns: str) -> str:
     """Return what a part of the Crazyflie's app takes in kilobytes, flash or RAM."""
     row = next(row for row in figures("app-sizes")["rows"] if row["part"] == part)
@@ -140,7 +152,7 @@ def frozen() -> str:
 
 FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
 CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
-APP = "docs/how-to/crazyflie.md"
+APP, SOLVERS = "docs/how-to/crazyflie.md", "docs/evidence/peers.md"
 OF_DESIGN = "`design crazyflie`: flash", "`design crazyflie`: RAM"
 OF_PRESET = "preset `crazyflie`: flash", "preset `crazyflie`: RAM"
 X500, PYBULLET = "hb_x500, fitted", "gym-pybullet-drones, cf2x"
@@ -162,6 +174,9 @@ FIGURES = [
     Figure(
         "docs/how-to/own-firmware.md", r"adds (\S+) KB of flash", lambda: in_app("self-test", OF_PRESET[0])
     ),
+    Figure(SOLVERS, r"(\d+ to \d+) instructions\*\*", least_and_most_of_ours),
+    Figure(SOLVERS, r"takes (\d+ to \d+) times as many", lambda: solver("DAQP, float")),
+    Figure(SOLVERS, r"OSQP (\d+ to \d+) times", lambda: solver("OSQP, float")),
     Figure(APP, r"With the self-test (\S+ KB of flash and \S+) KB", lambda: in_app("together", *OF_DESIGN)),
     Figure(
         APP,
