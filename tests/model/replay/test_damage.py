@@ -124,9 +124,7 @@ WRONG: Final[dict[str, tuple[Callable[[Columns], Columns], str]]] = {
 }
 OTHERS: Final = {
     "lag": ("model.roll_lag_s", 1.03),
-    "delay": ("model.roll_delay_s", 1.2),
     "drag": ("model.drag_1_s", 1.1),
-    "noise": ("observer.velocity_noise", 1.1),
     "lag of the thrust": ("height.lag_s", 1.3),
 }
 

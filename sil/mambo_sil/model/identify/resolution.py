@@ -11,6 +11,8 @@ MOST_DIGITS: Final = 7
 """Decimals or digits beyond which a column has all digits: single precision has no more."""
 LEAST_CHANGES: Final = 20
 """Changes of a value without which nothing can be read: a target at rest has few digits in every log."""
+_LIKELIER: Final = 2.0
+"""Values from 0.1 to 1 have as many decimals as digits: they count as rounded to decimals."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ def read_resolution(values: FloatArray, unit: float = 1.0) -> Resolution | None:
     with np.errstate(over="ignore"):
         if (values.astype(np.float16) == values).all():
             found.append(Resolution("half precision", 0, unit))
-    return max(found, key=lambda one: float(np.mean(one.spacing(unit * values))), default=None)
+    coarser = {"decimals": _LIKELIER, "digits": 1.0, "half precision": 1.0}
+    mean = [coarser[one.kind] * float(np.mean(one.spacing(unit * values))) for one in found]
+    return found[int(np.argmax(mean))] if found else None
 
 
 def _has_digits(values: FloatArray, digits: int) -> bool:
