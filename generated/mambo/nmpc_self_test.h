@@ -13,22 +13,23 @@
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
-/* An episode is nmpc_init() and NMPC_SELF_TEST_TICKS calls of nmpc_step() with built-in inputs. */
+/* An episode is nmpc_init() and NMPC_SELF_TEST_TICKS calls of nmpc_step() with built-in inputs; between them the other
+ * functions of nmpc.h are called, with good and bad arguments. */
 #define NMPC_SELF_TEST_EPISODES 1000
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, computed by the reference. */
-#define NMPC_SELF_TEST_DIGEST 0x24801A82UL
+#define NMPC_SELF_TEST_DIGEST 0xC81F163CUL
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Call nmpc_step() 24 times on `scratch`, with built-in good and bad inputs, and compare a digest of
- * every bit of their results with that of the reference. Returns 0 if all agree, else the number, counted from 1, of
- * the first call that differs. Call it at start-up, before nmpc_init() of the flight controller. `scratch` may be
- * the flight controller itself: it is initialised before and after, which loses its state. `scratch` must not
- * be null. */
+/* Make 41 control steps on `scratch`, with built-in good and bad inputs, and calls of the other functions of nmpc.h
+ * between them; compare a digest of every bit of their results with that of the reference. Returns 0 if all agree, else
+ * the number, counted from 1, of the first step that differs, or that stands behind a call that does. Call it at
+ * start-up, before nmpc_init() of the flight controller. `scratch` may be the flight controller itself: it is initialised
+ * before and after, which loses its state and its limits. `scratch` must not be null. */
 int nmpc_self_test(nmpc_t *scratch);
 
 /* Run one episode, counted from 0, on `scratch`, with good and bad inputs, and fold every bit of every result
