@@ -162,7 +162,7 @@ def _worst_second(
             continue
         begun_s, complete_s = (float(one[rows][judged].min()) for one in (replay.begun_s, replay.complete_s))
         open_by_draws = FILLED * float(np.median(drawn[:, rows][:, judged], axis=1).max())
-        tolerated = tolerance_of(replay.settings).at(k, begun_s, complete_s) + open_by_draws
+        tolerated = max(tolerance_of(replay.settings).at(k, begun_s, complete_s), open_by_draws)
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan
