@@ -1,7 +1,7 @@
 """The errors of a replay by axis: its worst second, and what is tolerated there."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -55,6 +55,9 @@ QUADRATIC: Final = Tolerance(
 with a time constant of 2.0 s; the thrust .04 mm/s^2 after 2 s. Between lost rows .13 mrad and .05 m/s^2.
 Of faults the least are a velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad
 in a hover; in curves a gain off by 2 %: .6 mrad."""
+FIXED: Final = replace(QUADRATIC, known=(4e-5, 4e-5, 2e-3))
+"""In fixed point commands are multiples of 15 microradians and .6 mm/s^2. Right logs differ by one or two of
+them for good behind a beginning in flight; faults as above by four or more."""
 ONE_NORM: Final = Tolerance(
     known=(8e-6, 8e-6, 2e-4),
     begun=(0.045, 0.045, 0.1),
@@ -113,7 +116,9 @@ class AxisErrors:
 
 def tolerance_of(settings: Settings) -> Tolerance:
     """Return the tolerance for controllers of these settings."""
-    return QUADRATIC if settings.cost.norm == "quadratic" else ONE_NORM
+    if settings.cost.norm != "quadratic":
+        return ONE_NORM
+    return FIXED if settings.code.scalar == "fixed" else QUADRATIC
 
 
 def errors_of(replay: LogReplay) -> tuple[AxisErrors, ...]:

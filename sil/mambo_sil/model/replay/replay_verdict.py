@@ -154,15 +154,19 @@ def _blur(evidence: Evidence) -> str:
     return f"{column} has {resolution.text}, log {resolution.finer(one.expected / most)}"
 
 
-def _begins_otherwise(evidence: Evidence) -> bool:
-    """Return whether a 1-norm's log that lacks nothing begins with another command.
+def _has_other_bits(evidence: Evidence) -> bool:
+    """Return whether the bits of a log that lacks nothing are those of another controller.
 
-    Such a controller is known by its bits alone.
+    That is known of a 1-norm by its first command, of fixed point where no command is equal.
     """
     replay = evidence.replay
-    lacks = replay.filled or replay.gaps or replay.input_errors is not None or not replay.is_exact
-    is_other = bool((replay.replayed[0] != replay.logged[0]).any())
-    return replay.settings.cost.norm != "quadratic" and replay.from_start and not lacks and is_other
+    if replay.filled or replay.gaps or replay.input_errors is not None:
+        return False
+    differs = (replay.replayed != replay.logged).any(axis=1)
+    if replay.settings.cost.norm != "quadratic":
+        return replay.from_start and replay.is_exact and bool(differs[0])
+    is_fixed = replay.settings.code.scalar == "fixed"
+    return is_fixed and replay.from_start and replay.is_exact and bool(differs.all())
 
 
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
@@ -185,7 +189,11 @@ BRANCHES: Final[tuple[Branch, ...]] = (
         lambda e: e.is_far if e.is_rare or not e.replay.is_exact else e.is_off,
         _off,
     ),
-    (ReplayVerdict.NO, _begins_otherwise, lambda _: "its first command is another one"),
+    (
+        ReplayVerdict.NO,
+        _has_other_bits,
+        lambda _: "the log has all digits from its start on, and the bits are others",
+    ),
     (
         ReplayVerdict.CANNOT_TELL,
         lambda e: e.is_rare,
