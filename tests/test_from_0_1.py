@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings import controller_toml, presets
-from mambo_sil.model.identify.csv_log import read_text
 from tests.support.command import run, unwrapped
 from tests.support.tools import require
 
@@ -31,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 def columns(path: Path, *names: str) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
     """Return columns of a trace.csv."""
-    header = read_text(path).splitlines()[0].split(",")
+    header = path.read_text("utf-8").splitlines()[0].split(",")
     return np.loadtxt(path, delimiter=",", skiprows=1, usecols=[header.index(name) for name in names])
 
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from mambo_sil.errors import LinkError
 from mambo_sil.link.links import UdpLink
 from mambo_sil.link.messages import send_record
-from mambo_sil.link.peer import Peer
+from mambo_sil.link.peer import AutopilotSource
 from mambo_sil.link.records import COMPANION, PX4, Battery, Heartbeat, Parameter, Record
 from mambo_sil.link.signing import read_key, sign
 from mambo_sil.link.sockets import Address, MavlinkSocket
@@ -30,16 +30,16 @@ def message(system: int, component: int, vehicle: int | None = None) -> Any:
     return one
 
 
-def connected() -> Peer:
+def connected() -> AutopilotSource:
     """Return the peer that is system 1 at HERE, heard at 10 s."""
-    peer = Peer()
+    peer = AutopilotSource()
     assert peer.counts(message(1, 1, 2), HERE, 10.0)
     return peer
 
 
 def test_nothing_counts_before_the_heartbeat_of_an_autopilot() -> None:
     """No parameter, nor the heartbeat of a camera or a ground station, decides who is flown."""
-    peer = Peer()
+    peer = AutopilotSource()
     for one in (message(1, 1), message(1, 100, 30), message(255, 190, 6)):
         assert not peer.counts(one, HERE, 0.0)
     assert peer.address is None

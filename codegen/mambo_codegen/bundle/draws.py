@@ -151,7 +151,7 @@ def tiny_m(method: Method) -> float:
     return 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
 
 
-class Draws:
+class EpisodeDraws:
     """n random number generators: Marsaglia's xorshift (Journal of Statistical Software 8(14), 2003).
 
     last: (n,) the numbers that they drew last, which are their states.
@@ -189,7 +189,7 @@ class Draws:
         spoilt: Real = np.where(which, self.beyond(choice >> 6)[:, None], numbers)
         return spoilt
 
-    def beyond(self, choice: Words) -> Any:
+    def beyond(self, choice: NDArray[Any]) -> Any:
         """Return numbers out of range (n,): NaN or a large one of either sign, by the lowest bits."""
         sign = np.where(choice & 2 == 0, 1, -1)
         if self._numbers.formats is not None:

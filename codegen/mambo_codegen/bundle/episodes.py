@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.bundle.draws import Draws, InputScales, Words, input_scales
+from mambo_codegen.bundle.draws import EpisodeDraws, InputScales, Words, input_scales
 from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
@@ -85,7 +85,7 @@ class Episodes:
         """`episodes` (n,) are their numbers."""
         self._method, self._numbers = method, method.numbers
         self._scales: InputScales = input_scales(method)
-        self._draws = Draws(episodes, method.numbers)
+        self._draws = EpisodeDraws(episodes, method.numbers)
         self._lost = lost_inputs(method)
         self._is_lost = episodes % 8 == 7
         self._aim: Real = np.zeros(0)
@@ -171,7 +171,7 @@ class Episodes:
         motions = scales.target_motion, scales.target_motion, scales.climb_motion
         target += [draw(scale, quantity) for scale in motions * PREVIEW_TIMES * method.has_preview]
         if index >= FIRST_LOST:
-            state[0] = np.where(rests, self._draws.beyond(np.uint32(0)), state[0])
+            state[0] = np.where(rests, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
 
     def _spoilt(self, given: _Input) -> _Input:

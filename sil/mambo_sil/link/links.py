@@ -5,7 +5,7 @@ from typing import Any
 
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.link.messages import RecordReader
-from mambo_sil.link.peer import Peer
+from mambo_sil.link.peer import AutopilotSource
 from mambo_sil.link.records import Record, Stack
 from mambo_sil.link.signing import sign
 from mambo_sil.link.simulated import Condition, SimulatedAutopilot
@@ -19,7 +19,7 @@ class UdpLink:
     """An autopilot that sends to an address of this machine, in real time; `key` signs both directions."""
 
     def __init__(self, listen: Address, key: bytes | None = None) -> None:
-        self.socket, self._peer, self._reader = MavlinkSocket(listen), Peer(), RecordReader()
+        self.socket, self._peer, self._reader = MavlinkSocket(listen), AutopilotSource(), RecordReader()
         if key is not None:
             sign(self.socket.mav, key)
 

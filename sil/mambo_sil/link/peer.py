@@ -12,7 +12,7 @@ MOVES_AFTER_S: Final = 1.0
 """Silence after which the autopilot may send from another port: it, or a router, has been restarted."""
 
 
-class Peer:
+class AutopilotSource:
     """Decides which messages count: those of the autopilot that sent the first heartbeat, from its host.
 
     Heartbeats of another pilot count too, by the same way. `address` is where the autopilot was heard.

@@ -197,7 +197,7 @@ def replay(
     """
     from mambo_sil.model.identify.columns import parse_columns
     from mambo_sil.model.replay.log_replay import replay_log, write_curves
-    from mambo_sil.model.replay.logged_inputs import SIGNALS
+    from mambo_sil.model.replay.logged_columns import SIGNALS
     from mambo_sil.model.replay.replay_plots import draw_replay
     from mambo_sil.model.replay.replay_report import CURVES, PICTURES, LogReplaySummary, summarise
 

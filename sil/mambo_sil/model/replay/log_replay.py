@@ -21,7 +21,7 @@ from mambo_sil.model.replay.lost_inputs import LostInputs, blocks_of
 from mambo_sil.model.replay.replay_step import begin, command_of, step
 
 
-class Axis(NamedTuple):
+class LoggedAxis(NamedTuple):
     """A command: its name and its unit, as in a sentence and as in a name."""
 
     name: str
@@ -29,7 +29,11 @@ class Axis(NamedTuple):
     suffix: str
 
 
-AXES: Final = (Axis("roll", "rad", "rad"), Axis("pitch", "rad", "rad"), Axis("thrust", "m/s^2", "m_s2"))
+AXES: Final = (
+    LoggedAxis("roll", "rad", "rad"),
+    LoggedAxis("pitch", "rad", "rad"),
+    LoggedAxis("thrust", "m/s^2", "m_s2"),
+)
 
 SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
@@ -75,7 +79,7 @@ class LogReplay:
     remarks: tuple[str, ...]
 
     @property
-    def axes(self) -> tuple[Axis, ...]:
+    def axes(self) -> tuple[LoggedAxis, ...]:
         """What the columns of the commands are."""
         return AXES[: self.logged.shape[1]]
 

@@ -213,7 +213,7 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
         for name, each in SIGNALS.items()
         if name in wanted or name not in ASKED
     }
-    log = read_ulog(path) if is_ulog else read_csv(path, columns, known, ULOG)
+    log = read_ulog(path) if is_ulog else read_csv(path, columns, known, binary=ULOG)
     missing = [name for name in wanted if name not in log.signals]
     if missing and is_ulog:
         raise LogError(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
-from mambo_sil.model.replay.log_replay import Axis, LogReplay
+from mambo_sil.model.replay.log_replay import LoggedAxis, LogReplay
 
 Axes = tuple[float, float, float]
 
@@ -89,7 +89,7 @@ class AxisErrors:
     expected_miss: the largest of what is drawn.
     """
 
-    axis: Axis
+    axis: LoggedAxis
     worst: float
     tolerated: float
     from_s: float
