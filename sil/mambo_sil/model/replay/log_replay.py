@@ -34,10 +34,6 @@ AXES: Final = (
     LoggedAxis("pitch", "rad", "rad"),
     LoggedAxis("thrust", "m/s^2", "m_s2"),
 )
-    LoggedAxis("roll", "rad", "rad"),
-    LoggedAxis("pitch", "rad", "rad"),
-    LoggedAxis("thrust", "m/s^2", "m_s2"),
-)
 
 SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
