@@ -39,7 +39,7 @@ def found(log: FlightLog) -> list[AxisParameters]:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_intervals_of_rare_logs_hold_the_truth(seed: int) -> None:
     """Of drawn drones, held for 10 ms: gain, lag, dead time and their sum, no wider than they must be."""
     random = np.random.default_rng(seed)
