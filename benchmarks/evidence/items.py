@@ -292,7 +292,7 @@ ITEMS: Final = (
         commands=("python -m benchmarks.app_sizes",),
         controllers=("design crazyflie", "crazyflie"),
         paths=(
-            *("benchmarks/app_sizes.py", "codegen/mambo_codegen/bundle/self_test.py"),
+            *("benchmarks/app_sizes.py", "codegen/mambo_codegen/bundle/episodes.py"),
             *("sil/mambo_sil/board/desk/stand_ins", "templates/mambo_templates/firmware/crazyflie/src"),
             *(f"templates/mambo_templates/common/nmpc_self_test.{end}.j2" for end in "ch"),
         ),
