@@ -156,7 +156,9 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     behind = _behind_gaps(is_logged, round(LONGEST_FILLED_S / period_s))
     jump = _jumps(log, time_s)
     begins = _take_overs(log, time_s) | behind
-    restarts = clock.restarts | _elsewhere(state, is_logged & ~jump.any(axis=1), time_s)
+    shift = np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1)
+    is_steady = ~(jump.any(axis=1) | shift.any(axis=1))
+    restarts = clock.restarts | _elsewhere(state, is_logged & is_steady, time_s)
     begins |= restarts
     begins |= np.diff(time_s, prepend=time_s[0]) > _PAUSE_UPDATES * period_s
     return LoggedInputs(
@@ -169,7 +171,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         has_thrust=has_thrust,
         start_rad=np.stack(starts, axis=1),
         start_m_s2=start_m_s2,
-        shift=np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1),
+        shift=shift,
         levelled=levelled,
         begins=begins,
         restarts=restarts,
