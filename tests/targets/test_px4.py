@@ -12,7 +12,7 @@ from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover
 from tests.support.command import run
-from tests.support.px4 import HOLD, MPC, POSITION, Px4Desk, build_px4, px4_settings, status_ulog
+from tests.support.px4 import HOLD, LAND, MPC, POSITION, Px4Desk, build_px4, px4_settings, status_ulog
 
 SEEDS = range(3)
 
@@ -275,6 +275,7 @@ def test_a_fault_gives_the_drone_back_to_hold_and_is_said_once(fault: str, modul
 def test_a_drone_without_a_global_position_is_given_back_to_position_mode(module: Path) -> None:
     """PX4 refuses hold indoors; in the meantime it hears that the mode cannot run."""
     desk = Px4Desk(module).select(MPC, 1000)
+    desk.set("px4.sticks", 1)
     desk.set("px4.indoors", 1.0)
     desk.set("px4.roll_error", 0.8)
     desk.run(150)
@@ -282,6 +283,21 @@ def test_a_drone_without_a_global_position_is_given_back_to_position_mode(module
     desk.run(250)
     assert (desk["mode"], desk["commands"]) == (POSITION, 2.0)
     assert desk.console.count("tilted too far") == 1
+
+
+def test_a_drone_that_was_given_back_stays_so_until_the_pilot_selects_another_mode(module: Path) -> None:
+    """PX4 goes back to a selected mode as soon as it can run: it cannot, although the cause has gone."""
+    desk = Px4Desk(module).select(MPC, 1000)
+    desk.set("px4.indoors", 1.0)
+    desk.set("px4.invalid", 1.0)
+    desk.run(350)
+    assert desk["mode"] == LAND
+    desk.set("px4.invalid", 0.0)
+    desk.run(1000)
+    assert desk["mode"] == LAND
+    assert (desk["s.take_overs"], desk["s.refusal"], desk["can_run"]) == (1.0, 9.0, 0.0)
+    desk.select(POSITION, 700).select(MPC, 100)
+    assert (desk["mode"], desk["s.take_overs"]) == (MPC, 2.0)
 
 
 def test_parameters_hold_each_by_itself(module: Path) -> None:
@@ -302,12 +318,49 @@ def test_parameters_hold_each_by_itself(module: Path) -> None:
     assert int(desk["s.limits"]) & 4
 
 
-def test_a_module_that_stops_takes_its_mode_away(module: Path) -> None:
-    """PX4 is told."""
-    desk = Px4Desk(module)
+def test_a_module_that_stops_takes_its_mode_away_and_nothing_else(module: Path) -> None:
+    """PX4 is told, and its attitude controller still hears the set-points of PX4's other modes."""
+    desk = Px4Desk(module).select(MPC, 500).select(POSITION, 500)
     desk.set("px4.stop", 1.0)
     desk.run(100)
     assert desk["left"] == 1.0
+    heard = desk["heard"]
+    desk.run(100)
+    assert desk["heard"] - heard == 100.0
+
+
+def test_a_module_whose_mode_flies_does_not_stop(module: Path) -> None:
+    """The console says what to do first."""
+    desk = Px4Desk(module).select(MPC, 500)
+    desk.set("px4.stop", 1.0)
+    before = desk["s.step"]
+    desk.run(1000)
+    assert "not stopped: mode MPC flies; select another mode first" in desk.console
+    assert (desk["left"], desk["mode"], desk["s.step"] - before) == (0.0, MPC, 100.0)
+
+
+HOVERS = (0.1, 0.125, 0.155, 0.3, 0.5)
+"""Throttles of hover; PX4's MPC_THR_MIN is 0.12."""
+
+
+@pytest.mark.parametrize("hover", HOVERS)
+def test_no_thrust_is_cut_in_the_air_however_strong_the_drone(hover: float, module: Path) -> None:
+    """PX4 finds ground contact where a strong drone hovers in the air; on the floor it still lands."""
+    desk = Px4Desk(module)
+    desk.be_strong(hover)
+    desk.select(MPC, 500)
+    desk.set("px4.sticks", 1)
+    contacts = 0.0
+    for k in range(2000):
+        desk.set("px4.throttle", 0.6 if k % 200 < 100 else -0.9 if k % 400 < 200 else -0.5)
+        desk.run(10)
+        contacts += desk["contact"]
+        assert desk["throttle"] > 0.25 * hover
+        assert (desk["s.grounded"], desk["s.level"]) == (0.0, 0.0)
+    assert (contacts > 0.0) == (hover < 0.15)
+    desk.set("px4.throttle", -0.7)
+    desk.run(20000)
+    assert (desk["landed"], desk["throttle"], desk["mode"]) == (1.0, 0.0, MPC)
 
 
 @pytest.mark.usefixtures("in_an_empty_folder")

@@ -24,7 +24,7 @@ from mambo_sil.results.shared_library import LibrarySource, built_library
 
 HERE: Final = Path(__file__).parent
 TEMPLATES: Final = Path(mambo_templates.__file__).parent / "firmware" / "px4"
-POSITION, HOLD, MPC = 2, 4, 23
+POSITION, HOLD, LAND, MPC = 2, 4, 18, 23
 """Modes of PX4: `nav_state`."""
 MODULE: Final = TARGETS["px4"].source_folder
 FLAGS: Final = ("-O2", "-ffp-contract=off", "-Wl,-Bsymbolic", "-Wall", "-Wextra", "-Wno-unused-parameter")
@@ -142,6 +142,12 @@ class Px4Desk(Desk):
         self.set("px4.mode", mode)
         self.run(milliseconds)
         return self
+
+    def be_strong(self, hover: float) -> None:
+        """Become a drone that hovers with another share of its throttle, which PX4 knows."""
+        self.set("px4.strength", self["throttle"] / hover)
+        self.set("px4.hover", hover)
+        self.run(600)
 
     def status(self) -> dict[str, float]:
         """Return the fields of mc_nmpc_status, but its times."""

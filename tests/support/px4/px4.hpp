@@ -119,7 +119,15 @@ public:
 	virtual int print_status() = 0;
 	bool should_exit() const { return stops; }
 	static void exit_and_cleanup(Descriptor &desc) { delete desc.object.load(); desc.object.store(nullptr); }
-	static int main(Descriptor &desc, int, char **) { return desc.task_spawn(0, nullptr); }
+	static int main(Descriptor &desc, int argc, char **argv)
+	{
+		if (strcmp(argv[1], "stop") == 0) {
+			desc.object.load()->stops = true;
+			return PX4_OK;
+		}
+
+		return desc.task_spawn(argc - 1, argv + 1);
+	}
 	static constexpr int task_id_is_work_queue = -2;
 	bool stops{false};
 };
@@ -169,6 +177,7 @@ struct Topic {
 	size_t size;
 	unsigned generation;
 	px4::ScheduledWorkItem *waits;
+	bool is_advertised;
 };
 #define ORB_ID(name) (&topic_##name)
 namespace uORB
@@ -177,9 +186,11 @@ class Subscription
 {
 public:
 	explicit Subscription(Topic *topic) : _topic(topic) {}
-	bool update(void *to) { const bool is_new = _seen != _topic->generation; return is_new && copy(to); }
+	bool update(void *to) { return (_seen != _topic->generation) && copy(to); }
 	bool copy(void *to)
 	{
+		if (!_topic->is_advertised) { return false; }
+
 		_seen = _topic->generation;
 		memcpy(to, _topic->data, _topic->size);
 		return _seen > 0;
@@ -198,21 +209,23 @@ public:
 private:
 	px4::ScheduledWorkItem *_item;
 };
-template <class T> class Publication
+class PublicationBase
 {
 public:
-	explicit Publication(Topic *topic) : _topic(topic) {}
-	void publish(const T &message)
-	{
-		memcpy(_topic->data, &message, sizeof message);
-		_topic->generation++;
-
-		if (_topic->waits != nullptr) {
-			_topic->waits->ScheduleNow();
-		}
-	}
+	explicit PublicationBase(Topic *topic) : _topic(topic) {}
+	PublicationBase(const PublicationBase &) = delete;
+	~PublicationBase(); // takes the topic from all who publish it, until one advertises it anew
+protected:
+	void publish(const void *message);
 private:
 	Topic *_topic;
+	bool _advertises{false};
+};
+template <class T> class Publication : PublicationBase
+{
+public:
+	explicit Publication(Topic *topic) : PublicationBase(topic) {}
+	void publish(const T &message) { PublicationBase::publish(&message); }
 };
 }
 
@@ -228,7 +241,7 @@ struct vehicle_attitude_setpoint_s { hrt_abstime timestamp; float q_d[4], thrust
 struct vehicle_status_s {
 	static constexpr uint8_t ARMING_STATE_ARMED = 2, NAVIGATION_STATE_POSCTL = 2, NAVIGATION_STATE_AUTO_LOITER = 4, NAVIGATION_STATE_AUTO_LAND = 18, NAVIGATION_STATE_EXTERNAL1 = 23;
 	hrt_abstime timestamp;
-	uint8_t arming_state, nav_state, system_id, component_id;
+	uint8_t arming_state, nav_state, nav_state_user_intention, system_id, component_id;
 };
 struct vehicle_land_detected_s { hrt_abstime timestamp; bool ground_contact, maybe_landed, landed; };
 struct hover_thrust_estimate_s { hrt_abstime timestamp; float hover_thrust; bool valid; };

@@ -29,14 +29,16 @@ Parameter *first_parameter;
 
 // What the pilot of the desk sets
 static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops, is_indoors, flies_rates;
-static float hover = 0.6f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error;
+static float hover = 0.6f, strength = 1.f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error;
 
 // What they find
 static uint8_t nav_state = POSITION, can_run;
+static uint32_t heard; // attitude set-points, by PX4's attitude controller
 static float roll_setpoint, pitch_setpoint, yaw_setpoint, throttle; // rad, share
 static float offset[3], offset_velocity[3], offset_heading;         // of the estimator's frame, in PX4's
 static hrt_abstime delay; // what steps that take long have cost
 static setpoint_t hold;
+static uORB::Subscription attitude_setpoint{&topic_vehicle_attitude_setpoint};
 
 static void *const PARAMETERS = stored_parameters;
 
@@ -47,7 +49,7 @@ extern "C" const struct variable host_parameters[] = {
 	BYTE("mode", &wanted_mode) BYTE("estimate_ms", &estimate_ms) BYTE("silent", &is_silent) BYTE("invalid", &is_invalid)
 	BYTE("sticks", &has_sticks) BYTE("trajectory", &has_trajectory) BYTE("slow_ms", &slow_ms) BYTE("stop", &stops) BYTE("indoors", &is_indoors)
 	BYTE("rates", &flies_rates)
-	FLOAT("hover", &hover) FLOAT("roll", &sticks[0]) FLOAT("pitch", &sticks[1]) FLOAT("yaw", &sticks[2]) FLOAT("throttle", &sticks[3])
+	FLOAT("hover", &hover) FLOAT("strength", &strength) FLOAT("roll", &sticks[0]) FLOAT("pitch", &sticks[1]) FLOAT("yaw", &sticks[2]) FLOAT("throttle", &sticks[3])
 	FLOAT("jump_x", &jump[0]) FLOAT("jump_y", &jump[1]) FLOAT("jump_z", &jump[2]) FLOAT("jump_heading", &jump_heading) FLOAT("roll_error", &roll_error)
 	FLOAT("jump_vx", &jump_velocity[0]) FLOAT("jump_vy", &jump_velocity[1]) FLOAT("jump_vz", &jump_velocity[2])
 	FLOAT("SPEED", &stored_parameters[0]) FLOAT("BRAKE", &stored_parameters[1]) FLOAT("TILT", &stored_parameters[2])
@@ -60,7 +62,8 @@ extern "C" const struct variable host_logged[] = {
 	BYTE("mode", &nav_state) BYTE("can_run", &can_run) FLOAT("roll", &roll_setpoint) FLOAT("pitch", &pitch_setpoint)
 	FLOAT("yaw", &yaw_setpoint) FLOAT("throttle", &throttle) BYTE("attitude_only", &data_config_control_setpoints.flag_control_attitude_enabled)
 	BYTE("position_controlled", &data_config_control_setpoints.flag_multicopter_position_control_enabled)
-	BYTE("landed", &data_vehicle_land_detected.landed) { "uint32_t", "commands", &topic_vehicle_command.generation },
+	BYTE("landed", &data_vehicle_land_detected.landed) BYTE("contact", &data_vehicle_land_detected.ground_contact) { "uint32_t", "heard", &heard },
+	{ "uint32_t", "commands", &topic_vehicle_command.generation },
 	{ "uint32_t", "statuses", &topic_mc_nmpc_status.generation }, { "uint32_t", "left", &topic_unregister_ext_component.generation },
 	STATUS_FIELDS
 	{ nullptr, "px4", nullptr }
@@ -69,10 +72,27 @@ extern "C" const struct variable host_logged[] = {
 static hrt_abstime now() { return 1000ULL * xTaskGetTickCount() + delay; }
 hrt_abstime hrt_absolute_time() { delay += 1000 * slow_ms; return now(); }
 
+uORB::PublicationBase::~PublicationBase()
+{
+	if (_advertises) { _topic->is_advertised = false; }
+}
+
+void uORB::PublicationBase::publish(const void *message)
+{
+	if (!_advertises) { _advertises = _topic->is_advertised = true; }
+
+	memcpy(_topic->data, message, _topic->size);
+	_topic->generation++;
+
+	if (_topic->waits != nullptr) { _topic->waits->ScheduleNow(); }
+}
+
 template <class T> static void publish(Topic &topic, T &message)
 {
+	static uORB::Publication<T> publication{&topic}; // of one topic
+
 	message.timestamp = now();
-	uORB::Publication<T>(&topic).publish(message);
+	publication.publish(message);
 }
 
 static bool is_due(uint32_t period_ms) { return (xTaskGetTickCount() % period_ms) == 0; }
@@ -80,7 +100,7 @@ static bool is_due(uint32_t period_ms) { return (xTaskGetTickCount() % period_ms
 static void command()
 {
 	static unsigned obeyed, registered;
-	static uint8_t last_wanted = POSITION;
+	static uint8_t last_wanted = POSITION, intention = POSITION;
 
 	if (registered != topic_register_ext_component_request.generation) {
 		registered = topic_register_ext_component_request.generation;
@@ -100,32 +120,46 @@ static void command()
 
 	if (wanted_mode != last_wanted) { // the pilot's switch
 		last_wanted = wanted_mode;
-		nav_state = (wanted_mode != MPC || can_run) ? wanted_mode : nav_state;
+		intention = (wanted_mode != MPC || can_run) ? wanted_mode : intention;
 	}
 
 	if (obeyed != topic_vehicle_command.generation) {
 		obeyed = topic_vehicle_command.generation;
 		const uint8_t asked = static_cast<uint8_t>(data_vehicle_command.param1);
 
-		if (!is_indoors || asked != vehicle_status_s::NAVIGATION_STATE_AUTO_LOITER) { // hold wants a global position
-			nav_state = last_wanted = wanted_mode = asked;
+		const bool is_refused = (asked == vehicle_status_s::NAVIGATION_STATE_AUTO_LOITER) ? is_indoors // it wants a global position
+					: (asked == POSITION) && !has_sticks;
+
+		if (!is_refused) {
+			intention = last_wanted = wanted_mode = asked;
 		}
 	}
 
+	// where the mode cannot run PX4 flies another one, and goes back to what the pilot selected as soon as it can
+	const bool is_possible = intention != MPC || can_run || !supervisorIsFlying();
+	const uint8_t fallback = is_indoors ? vehicle_status_s::NAVIGATION_STATE_AUTO_LAND : vehicle_status_s::NAVIGATION_STATE_AUTO_LOITER;
+
+	nav_state = is_possible ? intention : fallback;
 	data_vehicle_status.nav_state = nav_state;
+	data_vehicle_status.nav_state_user_intention = intention;
 	data_vehicle_status.arming_state = supervisorIsFlying() ? vehicle_status_s::ARMING_STATE_ARMED : 1;
 	data_vehicle_status.system_id = data_vehicle_status.component_id = 1;
 	publish(topic_vehicle_status, data_vehicle_status);
 }
 
-// Low thrust on the floor for a third of a second, then none for twice as long
+// Without climb and with low thrust for a third of a second, then with the least thrust of manual flight, twice as long. PX4's own
+// modes, which fly the height, must also ask for a descent, for which the desk takes that the floor is near. Defaults of
+// MPC_THR_MIN, MPC_MANTHR_MIN, LNDMC_Z_VEL_MAX, LNDMC_XY_VEL_MAX and LNDMC_TRIG_TIME; no range finder.
 static void detect_landing(const state_t &state)
 {
 	static uint32_t contact_ms, maybe_ms, landed_ms;
 	vehicle_land_detected_s &land = data_vehicle_land_detected;
 	const bool is_flying = supervisorIsFlying();
 
-	contact_ms = (throttle < 0.6f * hover && state.position.z < 0.05f && fabsf(state.velocity.z) < 0.25f) ? contact_ms + 1 : 0;
+	const bool is_light = throttle <= 0.12f + 0.6f * (hover - 0.12f);
+	const bool is_still = fabsf(state.velocity.z) < (land.maybe_landed ? 0.625f : 0.25f) && hypotf(state.velocity.x, state.velocity.y) < 1.5f;
+
+	contact_ms = (is_light && is_still && (nav_state == MPC || state.position.z < 0.05f)) ? contact_ms + 1 : 0;
 	land.ground_contact = !is_flying || contact_ms > 333;
 	maybe_ms = (land.ground_contact && throttle < 0.09f) ? maybe_ms + 1 : 0;
 	land.maybe_landed = !is_flying || maybe_ms > 333;
@@ -226,8 +260,16 @@ static setpoint_t flown(const setpoint_t &setpoint)
 
 	to.mode = {modeDisable, modeDisable, modeDisable, modeAbs, modeAbs, modeAbs, modeDisable};
 	to.attitude = {setpoint.timestamp, DEG * tilt.phi(), DEG * tilt.theta(), -DEG * matrix::wrap_pi(euler.psi() - offset_heading)};
-	to.thrust = -data_vehicle_attitude_setpoint.thrust_body[2] * FULL;
+	to.thrust = math::min(-data_vehicle_attitude_setpoint.thrust_body[2] * strength, 1.f) * FULL;
 	return to;
+}
+
+static int run_command(const char *verb)
+{
+	char name[] {"mc_nmpc"};
+	char *arguments[] {name, const_cast<char *>(verb)};
+
+	return mc_nmpc_main(2, arguments);
 }
 
 extern "C" bool controllerOutOfTreeTest(void)
@@ -235,7 +277,7 @@ extern "C" bool controllerOutOfTreeTest(void)
 	static const float defaults[] {DEFAULT_PARAMETERS};
 
 	memcpy(stored_parameters, defaults, sizeof defaults);
-	return (mc_nmpc_main(0, nullptr) == PX4_OK) && controllerPidTest();
+	return (run_command("start") == PX4_OK) && controllerPidTest();
 }
 
 extern "C" void controllerOutOfTreeInit(void) { controllerPidInit(); }
@@ -254,9 +296,13 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 
 	command();
 
+	if (module() != nullptr && stops) {
+		stops = 0;
+		run_command("stop");
+	}
+
 	if (module() != nullptr && module()->due <= now()) {
 		module()->due = UINT64_MAX;
-		module()->stops = stops;
 		static_cast<px4::ScheduledWorkItem *>(module())->Run();
 	}
 
@@ -271,7 +317,7 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 	setpoint_t to = (nav_state == MPC) ? flown(*setpoint) : (nav_state == POSITION) ? *setpoint : hold;
 
 	controllerPid(control, &to, sensors, state, step);
-	throttle = control->thrust / FULL;
+	throttle = control->thrust / FULL / strength;
 
 	if (nav_state != MPC && !flies_rates) { // PX4's own controllers publish too, but those of rates alone
 		matrix::Quatf(matrix::Eulerf(state->attitude.roll / DEG, state->attitude.pitch / DEG, data_vehicle_local_position.heading))
@@ -279,6 +325,9 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 		data_vehicle_attitude_setpoint.thrust_body[2] = -throttle;
 		publish(topic_vehicle_attitude_setpoint, data_vehicle_attitude_setpoint);
 	}
+
+	static vehicle_attitude_setpoint_s flown_last;
+	heard += attitude_setpoint.update(&flown_last);
 
 	const matrix::Eulerf euler{matrix::Quatf{data_vehicle_attitude_setpoint.q_d}};
 	roll_setpoint = euler.phi();
