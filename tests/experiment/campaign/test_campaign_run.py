@@ -154,9 +154,8 @@ def test_a_flight_without_a_file_repeats_bit_for_bit(whole: Path, tmp_path: Path
 def test_a_record_of_no_flight_cannot_be_read(path: str, whole: Path, tmp_path: Path) -> None:
     """No such flight, controller, file or campaign."""
     assert campaign_record(whole / path) is None
-    assert run("fly", "--repeat", str(whole / path), "-o", str(tmp_path), code=2)[1].endswith(
-        "cannot be read: No such file or directory\n"
-    )
+    said = run("fly", "--repeat", str(whole / path), "-o", str(tmp_path), code=2)[1]
+    assert "cannot be read: No such file or directory" in said
 
 
 def test_a_record_of_another_version_cannot_be_read(folder: Path) -> None:
