@@ -41,7 +41,7 @@ static const unsigned long self_test_digests[NMPC_SELF_TEST_STEPS] = {
 #define NMPC_SELF_TEST_START 46
 
 /* Consecutive control steps with the same input, but for the target's velocity, so that moves reach their limits and searches converge. */
-#define NMPC_SELF_TEST_HELD 4
+#define NMPC_SELF_TEST_HELD 4U
 
 /* The numbers of a record, in the order of its members, all of which come before its integers. */
 static nmpc_real_t *numbers_of(void *record)
@@ -149,7 +149,7 @@ static void start(nmpc_self_test_run_t *run, int episode)
 {
     run->stream = fold(0UL, (unsigned long)episode + 1UL);
     run->is_lost = 0;
-    if ((episode % 8) == 7) {
+    if (((unsigned int)episode % 8U) == 7U) {
         run->is_lost = 1;
     }
 }
@@ -381,7 +381,7 @@ static unsigned long fold_nulls(unsigned long digest, nmpc_t *scratch, const nmp
 static unsigned long call_others(nmpc_t *scratch, nmpc_self_test_run_t *run, int index, unsigned long digest)
 {
     unsigned long *const stream = &run->stream;
-    const int turn = (run->is_lost != 0) ? 15 : (index % 16);
+    const unsigned int turn = (run->is_lost != 0) ? 15U : ((unsigned int)index & 15U);
     unsigned long results = fold_heading(digest, stream);
     nmpc_status_t status = NMPC_OK;
     nmpc_command_t command;
@@ -390,20 +390,22 @@ static unsigned long call_others(nmpc_t *scratch, nmpc_self_test_run_t *run, int
     status = nmpc_last_estimate(scratch, &estimate);
     results = fold_reals(results, numbers_of(&estimate), 6);
     results = fold(results, (unsigned long)estimate.is_valid);
-    if ((turn == 1) || (turn == 9)) {
+    if ((turn == 1U) || (turn == 9U)) {
         status = call_shift(scratch, stream, index & 8);
-    } else if ((turn == 2) || (turn == 10)) {
+    }
+    if ((turn == 2U) || (turn == 10U)) {
         draw_command(stream, &command);
         status = nmpc_set_command(scratch, &command);
-    } else if ((turn == 0) || (turn == 8)) {
+    }
+    if ((turn == 0U) || (turn == 8U)) {
         status = call_set_limits(scratch, stream);
-    } else if (turn == 5) {
+    }
+    if (turn == 5U) {
         draw_command(stream, &command);
         status = nmpc_reset(scratch, &command);
-    } else if (turn == 6) {
+    }
+    if (turn == 6U) {
         results = fold_nulls(results, scratch, run);
-    } else {
-        /* Only steps. */
     }
     return fold_controller(fold(results, (unsigned long)status), scratch);
 }
@@ -411,14 +413,16 @@ static unsigned long call_others(nmpc_t *scratch, nmpc_self_test_run_t *run, int
 /* Take step number `step` of a run, of four steps the first after other calls, and fold in all results. */
 static unsigned long run_step(nmpc_t *scratch, nmpc_self_test_run_t *run, int step, unsigned long digest)
 {
+    const unsigned int turn = (unsigned int)step % NMPC_SELF_TEST_HELD;
+    const int index = (int)((unsigned int)step / NMPC_SELF_TEST_HELD);
     unsigned long results = digest;
     nmpc_command_t command;
     nmpc_status_t status;
 
-    if ((step % NMPC_SELF_TEST_HELD) == 0) {
-        next_input(run, step / NMPC_SELF_TEST_HELD);
-        results = call_others(scratch, run, step / NMPC_SELF_TEST_HELD, results);
-    } else if ((step % NMPC_SELF_TEST_HELD) == (NMPC_SELF_TEST_HELD - 1)) {
+    if (turn == 0U) {
+        next_input(run, index);
+        results = call_others(scratch, run, index, results);
+    } else if (turn == (NMPC_SELF_TEST_HELD - 1U)) {
         spoil(&run->stream, numbers_of(&run->state), NMPC_SELF_TEST_STATE_NUMBERS);
         spoil(&run->stream, numbers_of(&run->target), NMPC_SELF_TEST_TARGET_NUMBERS);
         spoil(&run->stream, &run->thrust_m_s2, 1U);
