@@ -414,7 +414,8 @@ static unsigned long call_others(nmpc_t *scratch, nmpc_self_test_run_t *run, int
 static unsigned long run_step(nmpc_t *scratch, nmpc_self_test_run_t *run, int step, unsigned long digest)
 {
     const unsigned int turn = (unsigned int)step % NMPC_SELF_TEST_HELD;
-    const int index = (int)((unsigned int)step / NMPC_SELF_TEST_HELD);
+    const unsigned int number = (unsigned int)step / NMPC_SELF_TEST_HELD;
+    const int index = (int)number;
     unsigned long results = digest;
     nmpc_command_t command;
     nmpc_status_t status;
