@@ -10,7 +10,15 @@ import numpy as np
 from mambo_sil.link.life_cycle import LifeCycle
 from mambo_sil.link.steady_frame import FrameJump
 from mambo_sil.link.steering import Update
-from mambo_sil.model.identify.signals import JUMP, JUMPS, START_THRUST, TAKE_OVERS, THRUST, THRUST_COMMAND
+from mambo_sil.model.identify.signals import (
+    JUMP,
+    JUMPS,
+    START_THRUST,
+    TAKE_OVERS,
+    THRUST,
+    THRUST_COMMAND,
+    UPDATE,
+)
 from mambo_sil.results.blocks import CommandResult, ResultTable
 from mambo_sil.results.summary import Number, ReportedSummary
 
@@ -20,7 +28,7 @@ COLUMNS: Final = (
     *("target_x_m", "target_y_m", "target_height_m", "target_vx_m_s", "target_vy_m_s", "target_climb_m_s"),
     *("target_ax_m_s2", "target_ay_m_s2", "target_climb_acceleration_m_s2", "target_yaw_rad"),
     *("roll_command_rad", "pitch_command_rad", THRUST, THRUST_COMMAND, "status"),
-    *(TAKE_OVERS, START_THRUST, JUMPS, *JUMP),
+    *(TAKE_OVERS, UPDATE, START_THRUST, JUMPS, *JUMP),
 )
 """The target is the one that the controller got: off by what remains of the jumps of the estimator."""
 SETTLES_S: Final = 5.0
@@ -156,7 +164,7 @@ def _logged(update: Update) -> list[float]:
         *(x, y, -z, vx, vy, -vz, ax, ay, -az),
         0.0 if target.yaw_rad is None else float(target.yaw_rad),
         *(*update.command_rad, update.thrust_m_s2, update.thrust, update.status),
-        *(update.take_overs, update.start_thrust_m_s2, update.jumps),
+        *(update.take_overs, update.number, update.start_thrust_m_s2, update.jumps),
         *_jump(update.jump),
     ]
 

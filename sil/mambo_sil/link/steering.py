@@ -14,6 +14,7 @@ from mambo_sil.api.states import DroneState, StepOutcome, TargetState
 from mambo_sil.errors import LinkError
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
+from mambo_sil.model.identify.signals import UPDATES
 
 PAUSE_S: Final = 0.1
 """Time without an estimate after which the controller begins anew, at the present attitude."""
@@ -36,6 +37,8 @@ class Update:
     thrust_m_s2: float
     status: int
     take_overs: int
+    number: int
+    """Steps of the controller so far, those between two estimates included, modulo `UPDATES`."""
     start_thrust_m_s2: float
     """Thrust over mass with which the controller began."""
     thrust: float
@@ -69,6 +72,7 @@ class Steering:
         """How far the drone is from the last target that the controller got."""
         self.frame = SteadyFrame()
         self.take_overs = 0
+        self._steps = 0
         self._record = record
         self._last: EstimatedState | None = None
         self._jump: FrameJump | None = None
@@ -103,6 +107,7 @@ class Steering:
         self._follow_frame(estimate)
         if steps < 1:
             return None
+        self._steps += steps
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
             self._step(_between(last, estimate, 1.0 - left / steps), self._goal(targets(left * period_s)))
@@ -150,7 +155,7 @@ class Steering:
         self._record(
             Update(
                 *(estimate, target, (roll_rad, pitch_rad), thrust_m_s2, int(outcome.status)),
-                *(self.take_overs, self.hover_m_s2, thrust, self.frame.jumps),
+                *(self.take_overs, self._steps % UPDATES, self.hover_m_s2, thrust, self.frame.jumps),
                 self._jump,
             )
         )

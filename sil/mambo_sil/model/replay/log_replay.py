@@ -35,6 +35,10 @@ AXES: Final = (
     LoggedAxis("thrust", "m/s^2", "m_s2"),
 )
 
+_JUMP_RAD: Final = 0.1
+"""Least change of a command from one update to the next with which a mixer may cap the thrust."""
+_TOLD_BEHIND: Final = 3
+"""Updates within which a capped thrust changes a command."""
 SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
 
@@ -58,10 +62,12 @@ class LogReplay:
     """Whether the controller has not begun in the last `SETTLING_S`, or with the command of the log (k,)."""
     begun_s: FloatArray
     """Time (k,) since the controller began in a state that the log does not have, infinite before it did."""
+    capped_s: FloatArray
+    """Time (k,) since a mixer may have capped the thrust, which no log shows, likewise."""
     complete_s: FloatArray
     """Time (k,) since the last update that the log has lost, likewise."""
     from_start: bool
-    """Whether the log begins with the controller: at its first update, or at time 0."""
+    """Whether the log certainly begins with the first update of the controller."""
     update_period_s: float
     lost: int
     """Updates that the log has lost."""
@@ -131,6 +137,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     is_filled = np.zeros(len(there), bool)
     for first, end, _ in blocks:
         is_filled[first:end] = ~there[first:end]
+    is_capped = np.zeros_like(is_filled) if settings.height is None else _may_be_capped(inputs, replayed)
     begun_s = _since_s(inputs.time_s, _begins_unknown(inputs, replayed))
     return LogReplay(
         time_s=inputs.time_s[there],
@@ -139,6 +146,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         status=status[there],
         settled=(begun_s >= SETTLING_S)[there],
         begun_s=begun_s[there],
+        capped_s=_since_s(inputs.time_s, is_capped)[there],
         complete_s=_since_s(inputs.time_s, is_filled)[there],
         from_start=inputs.from_start,
         update_period_s=settings.horizon.update_period_s,
@@ -156,13 +164,27 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
 def _begins_unknown(inputs: LoggedInputs, replayed: FloatArray) -> NDArray[np.bool_]:
     """Return whether the controller begins at an update (k,) in a state that the log does not have.
 
-    It has it where the count of the updates begins, or where the first command is that of the log.
+    It has it where the log begins with the first update, or where the first command is that of the log.
     """
     first = np.flatnonzero(inputs.is_logged)[0]
     begins = inputs.begins.copy()
-    begins[first] = not inputs.is_counted_from_start
+    begins[first] = not inputs.from_start
     is_known = (replayed == inputs.command).all(axis=1) & inputs.command_rad.any(axis=1)
     return np.asarray(begins & ~is_known | inputs.may_lie)
+
+
+def _may_be_capped(inputs: LoggedInputs, replayed: FloatArray) -> NDArray[np.bool_]:
+    """Return whether a mixer may have capped the thrust behind updates (k,), and have told the controller.
+
+    It does where a command of the tilt jumps. Where the log begins with the controller and has all digits,
+    the commands (k, axes) that are `replayed` are those of the log up to there, and differ soon behind it.
+    """
+    tilt = np.concatenate([inputs.start_rad[:1], inputs.command_rad])
+    jumps: NDArray[np.bool_] = np.abs(np.diff(tilt, axis=0)).max(axis=1) > _JUMP_RAD
+    if not inputs.from_start or inputs.resolutions or not inputs.is_logged.all():
+        return jumps
+    first = int(np.argmax((replayed != inputs.command).any(axis=1)))
+    return jumps if jumps[max(first - _TOLD_BEHIND, 0) : first].any() else np.zeros_like(jumps)
 
 
 def _since_s(time_s: FloatArray, happens: NDArray[np.bool_]) -> FloatArray:

@@ -34,6 +34,7 @@ from mambo_sil.model.identify.signals import (
     FlightLog,
 )
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
+from mambo_sil.model.replay.beginning import is_from_start
 from mambo_sil.model.replay.logged_columns import (
     APP_GROUP,
     ASKED,
@@ -89,9 +90,7 @@ class LoggedInputs:
     jump: FloatArray
     """By what the frame has jumped before an update (k, 7): position, velocity, z down, and heading."""
     from_start: bool
-    """Whether the log begins with the controller: at its first update, or at time 0."""
-    is_counted_from_start: bool
-    """Whether it begins at the first update by its count."""
+    """Whether the log certainly begins with the first update of the controller."""
     gaps: int
     """Gaps that are too long to fill."""
     may_lie: NDArray[np.bool_]
@@ -176,8 +175,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         begins=begins,
         restarts=restarts,
         jump=jump,
-        from_start=_is_from_start(log),
-        is_counted_from_start=UPDATE in log.signals and _is_from_start(log),
+        from_start=is_from_start(log, period_s),
         gaps=int(behind.sum()),
         may_lie=_near_floor(state[:, -3])
         if commands_thrust and GROUNDED not in log.signals
@@ -235,13 +233,6 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
 def _has_commanded_thrust(log: FlightLog, path: Path) -> bool:
     """Return whether `THRUST` is the command: always in a table, in a ULog only of our own flight mode."""
     return THRUST in log.signals and (path.suffix.lower() != ULOG or START_THRUST in log.signals)
-
-
-def _is_from_start(log: FlightLog) -> bool:
-    """Return whether a log begins with the controller, by its count of the updates or its clock."""
-    if UPDATE in log.signals:
-        return bool(log.signals[UPDATE].value[0] <= 1.0)
-    return bool(log.signals[COMMANDS[0]].time_s[0] <= 0.0)
 
 
 def _placed(log: FlightLog, name: str, clock: UpdateClock) -> FloatArray:

@@ -23,6 +23,7 @@ class Tolerance:
     begun:   in addition behind a beginning in a state that the log does not have.
     lost:    likewise behind a row that the log has lost; the larger one counts.
     begun_fades_s, lost_fades_s: time constants with which the controller forgets it.
+    for_good: what it never forgets of either.
     """
 
     known: Axes
@@ -30,6 +31,7 @@ class Tolerance:
     begun_fades_s: Axes
     lost: Axes
     lost_fades_s: Axes
+    for_good: Axes = (0.0, 0.0, 0.0)
 
     def at(self, axis: int, begun_s: float, complete_s: float) -> float:
         """Return the tolerance of an axis at times since a beginning, and since a lost row."""
@@ -40,7 +42,8 @@ class Tolerance:
                 (self.lost, self.lost_fades_s, complete_s),
             )
         )
-        return self.known[axis] + max(begun, lost)
+        for_good = self.for_good[axis] if min(begun_s, complete_s) < _NEVER_S else 0.0
+        return self.known[axis] + max(begun, lost) + for_good
 
 
 _NEVER_S: Final = 1e6
@@ -55,8 +58,8 @@ QUADRATIC: Final = Tolerance(
 with a time constant of 2.0 s; the thrust .04 mm/s^2 after 2 s. Between lost rows .13 mrad and .05 m/s^2.
 Of faults the least are a velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad
 in a hover; in curves a gain off by 2 %: .6 mrad."""
-FIXED: Final = replace(QUADRATIC, known=(4e-5, 4e-5, 2e-3))
-"""In fixed point commands are multiples of 15 microradians and .6 mm/s^2. Right logs differ by one or two of
+FIXED: Final = replace(QUADRATIC, known=(4e-5, 4e-5, 2e-3), for_good=(3e-5, 3e-5, 0.0))
+"""In fixed point commands are multiples of 15 microradians and .6 mm/s^2. Right logs differ by up to four of
 them for good behind a beginning in flight; faults as above by four or more."""
 ONE_NORM: Final = Tolerance(
     known=(8e-6, 8e-6, 2e-4),
@@ -165,9 +168,13 @@ def _worst_second(
         judged = free[rows]
         if replay.settled[rows].sum() < _LEAST_JUDGED * length or judged.sum() < _LEAST_FREE * length:
             continue
-        begun_s, complete_s = (float(one[rows][judged].min()) for one in (replay.begun_s, replay.complete_s))
+        begun_s, capped_s, complete_s = (
+            float(one[rows][judged].min()) for one in (replay.begun_s, replay.capped_s, replay.complete_s)
+        )
         open_by_draws = FILLED * float(np.median(drawn[:, rows][:, judged], axis=1).max())
-        tolerated = max(tolerance_of(replay.settings).at(k, begun_s, complete_s), open_by_draws)
+        tolerated = max(
+            tolerance_of(replay.settings).at(k, min(begun_s, capped_s), complete_s), open_by_draws
+        )
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan

@@ -157,16 +157,17 @@ def _blur(evidence: Evidence) -> str:
 def _has_other_bits(evidence: Evidence) -> bool:
     """Return whether the bits of a log that lacks nothing are those of another controller.
 
-    That is known of a 1-norm by its first command, of fixed point where no command is equal.
+    That is known where the log begins with the controller: if no command is equal, of a 1-norm if the first
+    one is not.
     """
     replay = evidence.replay
     if replay.filled or replay.gaps or replay.input_errors is not None:
         return False
-    differs = (replay.replayed != replay.logged).any(axis=1)
-    if replay.settings.cost.norm != "quadratic":
-        return replay.from_start and replay.is_exact and bool(differs[0])
-    is_fixed = replay.settings.code.scalar == "fixed"
-    return is_fixed and replay.from_start and replay.is_exact and bool(differs.all())
+    known = np.isinf(replay.begun_s)
+    if not (replay.from_start and replay.is_exact and known[0]):
+        return False
+    differs = (replay.replayed != replay.logged).any(axis=1)[known]
+    return bool(differs.all() if replay.settings.cost.norm == "quadratic" else differs[0])
 
 
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
