@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
-from mambo_sil.model.replay.log_replay import LoggedAxis, LogReplay
+from mambo_sil.model.replay.log_replay import SETTLING_S, LoggedAxis, LogReplay
 
 Axes = tuple[float, float, float]
 
@@ -22,6 +22,7 @@ class Tolerance:
     known:   where the log has all that the command depends on.
     begun:   in addition behind a beginning in a state that the log does not have.
     lost:    likewise behind a row that the log has lost; the larger one counts.
+    capped:  likewise behind a thrust that a mixer may have capped.
     begun_fades_s, lost_fades_s: time constants with which the controller forgets it.
     for_good: what it never forgets of either.
     """
@@ -31,19 +32,21 @@ class Tolerance:
     begun_fades_s: Axes
     lost: Axes
     lost_fades_s: Axes
+    capped: Axes = (0.004, 0.004, 0.1)
     for_good: Axes = (0.0, 0.0, 0.0)
 
-    def at(self, axis: int, begun_s: float, complete_s: float) -> float:
-        """Return the tolerance of an axis at times since a beginning, and since a lost row."""
-        begun, lost = (
+    def at(self, axis: int, begun_s: float, capped_s: float, complete_s: float) -> float:
+        """Return the tolerance of an axis at times since a beginning, a capped thrust, and a lost row."""
+        added = (
             largest[axis] * math.exp(-since_s / fades_s[axis]) if since_s < _NEVER_S else 0.0
             for largest, fades_s, since_s in (
                 (self.begun, self.begun_fades_s, begun_s),
+                (self.capped, self.begun_fades_s, capped_s),
                 (self.lost, self.lost_fades_s, complete_s),
             )
         )
-        for_good = self.for_good[axis] if min(begun_s, complete_s) < _NEVER_S else 0.0
-        return self.known[axis] + max(begun, lost) + for_good
+        for_good = self.for_good[axis] if min(begun_s, capped_s, complete_s) < _NEVER_S else 0.0
+        return self.known[axis] + max(added) + for_good
 
 
 _NEVER_S: Final = 1e6
@@ -72,6 +75,9 @@ ONE_NORM: Final = Tolerance(
 FILLED: Final = 2.0
 """How many times the largest of what is drawn for a second its error may be."""
 SECOND_S: Final = 1.0
+BEGUN: Final = 2.0
+"""How many times what is left of a beginning an error may be, by those of the first second that is judged:
+in right logs without rounding it fades by that time constant, and by nothing else."""
 _LARGEST: Final = 0.999
 _LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
 """Least shares of a second's updates that can be judged, and that are not at the tilt limit."""
@@ -162,6 +168,7 @@ def _worst_second(
     """Return median error and tolerance of the second that is farthest off, and from when to when."""
     length = round(SECOND_S / replay.update_period_s)
     free = replay.settled & ~_limited(replay, k)
+    tolerance = _tolerance(replay, k, free)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
@@ -172,9 +179,7 @@ def _worst_second(
             float(one[rows][judged].min()) for one in (replay.begun_s, replay.capped_s, replay.complete_s)
         )
         open_by_draws = FILLED * float(np.median(drawn[:, rows][:, judged], axis=1).max())
-        tolerated = max(
-            tolerance_of(replay.settings).at(k, min(begun_s, capped_s), complete_s), open_by_draws
-        )
+        tolerated = max(tolerance.at(k, begun_s, capped_s, complete_s), open_by_draws)
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan
@@ -187,6 +192,25 @@ def _worst_second(
     since_s = replay.time_s - replay.time_s[0]
     until = min(found[end][2] + length, len(since_s)) - 1
     return found[at][0], found[at][1], float(since_s[found[begin][2]]), float(since_s[until])
+
+
+def _tolerance(replay: LogReplay, k: int, free: NDArray[np.bool_]) -> Tolerance:
+    """Return the tolerance of an axis, whose updates in `free` (k,) are judged.
+
+    Of a log that lacks nothing but its beginning, the first second that is judged says how large the errors
+    may be: the largest tenth of them is left out. That of roll and pitch is one, as a heading mixes them.
+    """
+    tolerance, since_s = tolerance_of(replay.settings), replay.time_s - replay.time_s[0]
+    fades_s = tolerance.begun_fades_s[k]
+    lacks_more = replay.input_errors is not None or np.isfinite(replay.capped_s).any()
+    first = free & (since_s < SETTLING_S + SECOND_S)
+    if lacks_more or math.isinf(fades_s) or not first.any() or (replay.begun_s != since_s).any():
+        return tolerance
+    errors = np.abs(replay.replayed - replay.logged)
+    largest = errors[:, :2].max(axis=1) if k < len(TILTS) else errors[:, k]
+    left = BEGUN * float(np.quantile((largest * np.exp(since_s / fades_s))[first], 0.9))
+    roll, pitch, thrust = (min(one, left) for one in tolerance.begun)
+    return replace(tolerance, begun=(roll, pitch, thrust))
 
 
 def _limited(replay: LogReplay, k: int) -> NDArray[np.bool_]:

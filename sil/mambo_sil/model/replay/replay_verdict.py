@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.model.identify.signals import THRUST
+from mambo_sil.model.identify.signals import THRUST, TILTS
 from mambo_sil.model.replay.log_replay import LogReplay
 from mambo_sil.model.replay.replay_errors import CALM_RAD, AxisErrors
 
@@ -25,6 +25,8 @@ TELLS_M_S2: Final = 0.1
 FAR: Final = 0.5
 """Least error of another controller, over the command's standard deviation, where the log does not say which
 inputs a step read."""
+LAST_DIGITS_RAD: Final = 2e-6
+"""Largest error of a tilt that is one of the last digits of single precision."""
 LEAST_UPDATES: Final = 150
 """Least number of updates to judge by."""
 MOST_FILLED: Final = 0.3
@@ -157,8 +159,8 @@ def _blur(evidence: Evidence) -> str:
 def _has_other_bits(evidence: Evidence) -> bool:
     """Return whether the bits of a log that lacks nothing are those of another controller.
 
-    That is known where the log begins with the controller: if no command is equal, of a 1-norm if the first
-    one is not.
+    That is known where the log begins with the controller: if no command is equal, and not only the last
+    digits differ as in another type of float; of a 1-norm if the first one is not equal.
     """
     replay = evidence.replay
     if replay.filled or replay.gaps or replay.input_errors is not None:
@@ -166,8 +168,12 @@ def _has_other_bits(evidence: Evidence) -> bool:
     known = np.isinf(replay.begun_s)
     if not (replay.from_start and replay.is_exact and known[0]):
         return False
-    differs = (replay.replayed != replay.logged).any(axis=1)[known]
-    return bool(differs.all() if replay.settings.cost.norm == "quadratic" else differs[0])
+    error = np.abs((replay.replayed - replay.logged)[known])
+    differs = np.asarray(error.max(axis=1) > 0.0)
+    if replay.settings.cost.norm != "quadratic":
+        return bool(differs[0])
+    is_more = replay.settings.code.scalar == "fixed" or error[:, : len(TILTS)].max() > LAST_DIGITS_RAD
+    return bool(differs.all() and is_more)
 
 
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
