@@ -57,6 +57,7 @@ def test_a_curve_is_flown_and_the_log_repeats_it(stack: str, tmp_path: Path) -> 
     write_log(updates, log)
     replay = replay_log(log, {}, pilot.steering.controller.settings)
     assert replay.is_exact
+    assert replay.from_start
     np.testing.assert_array_equal(replay.replayed_rad, replay.logged_rad)
 
 

@@ -97,6 +97,12 @@ def lossy(columns: Columns) -> Columns:
     return {name: value[kept] for name, value in columns.items()}
 
 
+def cut(columns: Columns) -> Columns:
+    """Return 10 s of a flight, whose clock is set to 0 where they begin."""
+    later = {name: value[300:1300] for name, value in columns.items()}
+    return later | {"time_s": later["time_s"] - later["time_s"][0]}
+
+
 def same(columns: Columns) -> Columns:
     """Return the log itself."""
     return columns
@@ -110,6 +116,7 @@ RIGHT: Final[dict[str, tuple[Callable[[Columns], Columns], str]]] = {
     "two flights": (twice, ""),
     "lost rows": (lossy, "allowed"),
     "without its first seconds": (lambda columns: {k: v[300:] for k, v in columns.items()}, "allowed"),
+    "cut, with its clock set to 0": (cut, "allowed"),
 }
 WRONG: Final[dict[str, tuple[Callable[[Columns], Columns], str]]] = {
     "sign of roll for 1 s": (scaled(ROLL, -1.0, 420, 520), " s roll is"),
@@ -164,6 +171,41 @@ def test_a_controller_with_another_setting_is_told(
     assert judged(flight[0], other, tmp_path).verdict == "no"
 
 
+@pytest.mark.parametrize("key", ["model.drag_1_s", "observer.velocity_noise"])
+def test_a_cut_log_tells_what_fades_from_another_setting(
+    key: str, flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """No: errors of an unknown beginning fade, those of a setting that is 10 % off stay."""
+    section, field = key.split(".")
+    value = getattr(getattr(flight[1], section), field)
+    other = with_option(flight[1], key, round(1.1 * value, 6))
+    assert judged(cut(flight[0]), other, tmp_path).verdict == "no"
+
+
+def test_a_limit_that_acts_only_at_the_beginning_is_told(
+    flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """No: the log begins with the controller, and so does the judgement."""
+    tilt_rad = np.abs(np.stack([flight[0][ROLL], flight[0][PITCH]])).max(axis=0)
+    later_rad = float(tilt_rad[100:].max())
+    assert tilt_rad[:100].max() > later_rad
+    other = with_option(flight[1], "limits.tilt_rad", round(later_rad + 0.001, 6))
+    summary = judged(flight[0], other, tmp_path)
+    assert (summary.verdict, summary.from_s[0]) == ("no", 0.0)
+
+
+def test_a_thrust_that_the_mixer_caps_is_no_other_controller(
+    flight: tuple[Columns, Settings], tmp_path: Path
+) -> None:
+    """The controller is told, the log is not: its own log of a fast circle has other bits, and is its own."""
+    source = tmp_path / "controller.toml"
+    source.write_text(controller_text(vehicle_toml.load("crazyflie"), "crazyflie"), "utf-8")
+    fast = ("--rate-rad-s", "2", "--sensors", "mocap", "--duration-s", "6")
+    summary = judged(flown(tmp_path, str(source), "--vehicle", "crazyflie", *fast), flight[1], tmp_path)
+    assert summary.verdict == "yes", summary.reason
+    assert summary.equal_steps < summary.steps
+
+
 def test_the_column_with_too_few_digits_is_named(flight: tuple[Columns, Settings], tmp_path: Path) -> None:
     """2 decimals tell nothing."""
     summary = judged(rounded(lambda value: np.round(value, 2))(flight[0]), flight[1], tmp_path)
@@ -192,6 +234,7 @@ def one_norm(tmp_path_factory: pytest.TempPathFactory) -> tuple[Columns, Setting
         (jittering, "yes"),
         (twice, "yes"),
         (lossy, "yes"),
+        (cut, "yes"),
         (rounded(lambda value: np.round(value, 4)), "cannot tell"),
         (late(1), "no"),
         (scaled(ROLL, 1.02), "no"),

@@ -13,11 +13,19 @@ _OF_TRACE: Final = (*COMMANDS, *VELOCITY, *(f"seen_{name}" for name in VELOCITY)
 def is_from_start(log: FlightLog, period_s: float) -> bool:
     """Return whether a log certainly begins with the first update of its controller.
 
-    Either it counts the updates, or it is one of a simulation: that begins at rest, and the time of each row
-    is a multiple of the period in every bit. The clock of a log that was cut, and set to 0, is not.
+    It counts the updates, or is one of a simulation.
     """
     if UPDATE in log.signals:
         return bool(log.signals[UPDATE].value[0] <= 1.0)
+    return is_simulated(log, period_s)
+
+
+def is_simulated(log: FlightLog, period_s: float) -> bool:
+    """Return whether a log is the trace.csv of a whole simulated flight, whose floor is at a height of 0.
+
+    That begins at rest, and the time of each row is a multiple of the period in every bit. The clock of a log
+    that was cut, and set to 0, is not.
+    """
     time_s = log.signals[COMMANDS[0]].time_s
     velocities = [log.signals[name] for name in VELOCITY]
     return bool(

@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -35,7 +35,7 @@ AXES: Final = (
     LoggedAxis("thrust", "m/s^2", "m_s2"),
 )
 
-_JUMP_RAD: Final = 0.1
+_JUMP_RAD: Final = 0.2
 """Least change of a command from one update to the next with which a mixer may cap the thrust."""
 _TOLD_BEHIND: Final = 3
 """Updates within which a capped thrust changes a command."""
@@ -119,6 +119,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     is_whole, is_quadratic = bool(there.all()), settings.cost.norm == "quadratic"
     if not is_whole and is_quadratic and settings.code.scalar == "fixed":
         settings = with_option(settings, "code.scalar", "float64")  # slopes are differences of commands
+        inputs = replace(inputs, from_start=False)  # another type has other bits from the start on
     controller, state = CompiledController(settings), inputs.state
     blocks = list(blocks_of(inputs))
     most = max(int((~there[first:last]).sum()) for first, _, last in blocks)
@@ -181,7 +182,8 @@ def _may_be_capped(inputs: LoggedInputs, replayed: FloatArray) -> NDArray[np.boo
     """
     tilt = np.concatenate([inputs.start_rad[:1], inputs.command_rad])
     jumps: NDArray[np.bool_] = np.abs(np.diff(tilt, axis=0)).max(axis=1) > _JUMP_RAD
-    if not inputs.from_start or inputs.resolutions or not inputs.is_logged.all():
+    has_few_digits = any(name in inputs.resolutions for name in inputs.names)
+    if not inputs.from_start or has_few_digits or not inputs.is_logged.all():
         return jumps
     first = int(np.argmax((replayed != inputs.command).any(axis=1)))
     return jumps if jumps[max(first - _TOLD_BEHIND, 0) : first].any() else np.zeros_like(jumps)

@@ -1,5 +1,6 @@
 """Read a flight log for a replay: what it says of each update of the controller, with lost rows filled."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,7 +35,7 @@ from mambo_sil.model.identify.signals import (
     FlightLog,
 )
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
-from mambo_sil.model.replay.beginning import is_from_start
+from mambo_sil.model.replay.beginning import is_from_start, is_simulated
 from mambo_sil.model.replay.logged_columns import (
     APP_GROUP,
     ASKED,
@@ -177,7 +178,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         jump=jump,
         from_start=is_from_start(log, period_s),
         gaps=int(behind.sum()),
-        may_lie=_near_floor(state[:, -3])
+        may_lie=_near_floor(state[:, -3], 0.0 if is_simulated(log, period_s) else math.inf)
         if commands_thrust and GROUNDED not in log.signals
         else np.zeros_like(begins),
         is_exact=not clock.resampled and _is_of_rows(log, needed),
@@ -251,9 +252,12 @@ def _filled(name: str, value: FloatArray) -> FloatArray:
     return np.where(there, value, np.interp(number, number[there], known))
 
 
-def _near_floor(height_m: FloatArray) -> NDArray[np.bool_]:
-    """Return whether heights (k,) are the lowest of a log that has a take-off or a landing."""
-    over_m = height_m - height_m.min()
+def _near_floor(height_m: FloatArray, floor_m: float) -> NDArray[np.bool_]:
+    """Return whether heights (k,) are the lowest of a log that has a take-off or a landing.
+
+    The floor is at `floor_m` or below; where it may be anywhere that is infinite.
+    """
+    over_m = height_m - min(float(height_m.min()), floor_m)
     return np.asarray(over_m < (_FLOOR_M if over_m.max() > _CLIMB_M else 0.0))
 
 

@@ -202,15 +202,16 @@ def _tolerance(replay: LogReplay, k: int, free: NDArray[np.bool_]) -> Tolerance:
     """
     tolerance, since_s = tolerance_of(replay.settings), replay.time_s - replay.time_s[0]
     fades_s = tolerance.begun_fades_s[k]
-    lacks_more = replay.input_errors is not None or np.isfinite(replay.capped_s).any()
+    is_capped_later = (since_s - replay.capped_s).max() >= SETTLING_S
+    lacks_more = replay.input_errors is not None or is_capped_later
     first = free & (since_s < SETTLING_S + SECOND_S)
     if lacks_more or math.isinf(fades_s) or not first.any() or (replay.begun_s != since_s).any():
         return tolerance
     errors = np.abs(replay.replayed - replay.logged)
     largest = errors[:, :2].max(axis=1) if k < len(TILTS) else errors[:, k]
-    left = BEGUN * float(np.quantile((largest * np.exp(since_s / fades_s))[first], 0.9))
-    roll, pitch, thrust = (min(one, left) for one in tolerance.begun)
-    return replace(tolerance, begun=(roll, pitch, thrust))
+    grown = largest * np.exp(since_s / fades_s)
+    left = min(tolerance.begun[k], BEGUN * float(np.quantile(grown[first], 0.9)))
+    return replace(tolerance, begun=(left, left, left), capped=(left, left, left))
 
 
 def _limited(replay: LogReplay, k: int) -> NDArray[np.bool_]:
