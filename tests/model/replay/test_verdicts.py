@@ -150,7 +150,8 @@ def test_a_log_in_which_nothing_moves_tells_nothing() -> None:
 
 def test_a_short_log_tells_nothing(hover: Table) -> None:
     """It must be settled first."""
-    summary = judged(sent(hover[:300], lambda commands: np.round(commands, 6)))
+    cut = [hover[0], *hover[100:399]]
+    summary = judged(sent(cut, lambda commands: np.round(commands, 6)))
     assert (summary.verdict, summary.judged) == (ReplayVerdict.CANNOT_TELL, 99)
     assert "99 updates can be judged" in summary.reason
 
