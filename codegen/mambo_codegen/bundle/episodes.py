@@ -123,7 +123,9 @@ class Episodes:
         size = np.where(rests, 3, choice & 3)
 
         def moving(scale: float, quantity: str) -> Real:
-            return self._draws.draw(np.where(rests, 0, numbers.constant(scale, quantity)))
+            return self._draws.draw(
+                np.where(rests, numbers.constant(0.0, quantity), numbers.constant(scale, quantity))
+            )
 
         def error(sizes: tuple[float, ...], quantity: str) -> Real:
             return self._draws.draw(np.array([numbers.constant(one, quantity) for one in sizes])[size])
