@@ -85,7 +85,7 @@ static unsigned long fold_reals(unsigned long digest, const nmpc_real_t values[]
     unsigned long folded = digest;
     int k;
 
-    for (k = 0; k < count; k++) {
+    for (k = 0; (k < count) && (k < NMPC_STORED_NUMBERS); k++) {
         folded = fold_real(folded, values[k]);
     }
     return folded;
@@ -125,6 +125,7 @@ static const nmpc_real_t self_test_error_m_s[4] = { 1.1920929e-06f, 5.9604645e-0
 /* How many numbers the members of nmpc_state_t and nmpc_target_t are, but for integers. */
 #define NMPC_SELF_TEST_STATE_NUMBERS 7U
 #define NMPC_SELF_TEST_TARGET_NUMBERS 4U
+#define NMPC_SELF_TEST_MOST_NUMBERS (NMPC_SELF_TEST_STATE_NUMBERS + NMPC_SELF_TEST_TARGET_NUMBERS)
 
 /* In one of eight episodes so many inputs have no good state, from this one on, counted from 0. The drone is near its
  * target then, which is at rest, so that the model comes to rest after the outage. */
@@ -271,7 +272,7 @@ static void clear(nmpc_real_t numbers[], unsigned int count)
 {
     unsigned int k;
 
-    for (k = 0U; k < count; k++) {
+    for (k = 0U; (k < count) && (k < NMPC_SELF_TEST_MOST_NUMBERS); k++) {
         numbers[k] = (nmpc_real_t)0;
     }
 }
