@@ -4,8 +4,8 @@ import time
 from typing import Any
 
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.link.autopilot_source import AutopilotSource
 from mambo_sil.link.messages import RecordReader
-from mambo_sil.link.peer import AutopilotSource
 from mambo_sil.link.records import Record, Stack
 from mambo_sil.link.signing import sign
 from mambo_sil.link.simulated import Condition, SimulatedAutopilot

@@ -9,9 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from mambo_sil.errors import LinkError
+from mambo_sil.link.autopilot_source import AutopilotSource
 from mambo_sil.link.links import UdpLink
 from mambo_sil.link.messages import send_record
-from mambo_sil.link.peer import AutopilotSource
 from mambo_sil.link.records import COMPANION, PX4, Battery, Heartbeat, Parameter, Record
 from mambo_sil.link.signing import read_key, sign
 from mambo_sil.link.sockets import Address, MavlinkSocket
