@@ -80,12 +80,15 @@ NMPC_SELF_TEST_SHARED unsigned long fold_real(unsigned long digest, nmpc_real_t 
     return fold(digest, (unsigned long)view.bits);
 }
 
+/* The most numbers that are folded at once. */
+#define NMPC_SELF_TEST_MOST_FOLDED NMPC_STORED_NUMBERS
+
 static unsigned long fold_reals(unsigned long digest, const nmpc_real_t values[], int count)
 {
     unsigned long folded = digest;
     int k;
 
-    for (k = 0; (k < count) && (k < NMPC_STORED_NUMBERS); k++) {
+    for (k = 0; (k < count) && (k < NMPC_SELF_TEST_MOST_FOLDED); k++) {
         folded = fold_real(folded, values[k]);
     }
     return folded;

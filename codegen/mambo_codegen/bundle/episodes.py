@@ -117,64 +117,81 @@ class Episodes:
         The target's velocity changes for a tracker that measures the acceleration by it. With a height one
         drone in eight touches the floor.
         """
-        method, numbers, limits, scales = self._method, self._numbers, self._method.limits, self._scales
-        choice = self._draws.next()
-        draw, rests = self._draw, self._is_lost & (index < FIRST_LOST + self._lost)
+        method, scales, choice = self._method, self._scales, self._draws.next()
+        rests = self._is_lost & (index < FIRST_LOST + self._lost)
         size = np.where(rests, 3, choice & 3)
-
-        def moving(scale: float, quantity: str) -> Real:
-            return self._draws.draw(
-                np.where(rests, numbers.constant(0.0, quantity), numbers.constant(scale, quantity))
-            )
-
-        def error(sizes: tuple[float, ...], quantity: str) -> Real:
-            return self._draws.draw(np.array([numbers.constant(one, quantity) for one in sizes])[size])
-
-        jumps, axes = (size == 0) | (index == 0), 3 if method.has_height else 2
-        aim = np.stack(
-            [
-                moving(*one)
-                for _ in range(axes)
-                for one in (
-                    (scales.target_position_m, "position"),
-                    (scales.target_velocity_m_s, "velocity"),
-                )
-            ]
-        )
-        self._aim = np.where(jumps, aim, self._aim if index else aim)
+        self._aim = self._next_aim(rests, (size == 0) | (index == 0))
         target = [*self._aim[0:4:2], *self._aim[1:4:2]]
-        state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
-        state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
-        state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
-        state += [draw(scales.yaw_rad, "yaw")]
-        thrust = np.full_like(state[0], limits.thrust_least)
-        if not method.has_height:
-            thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_m_s2, "thrust")
-            thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+        state = self._beside(target, size)
+        state += [self._draw(scales.attitude_rad, "angle") for _ in range(2)]
+        state += [self._draw(scales.yaw_rad, "yaw")]
+        thrust = self._next_thrust(state[0])
         change = [np.zeros_like(thrust)] * len(method.target)
-        is_given = method.settings.target.gives_acceleration
-        has_motion, quantity = method.tracker is not None or is_given, "thrust" if is_given else "velocity"
-        if has_motion:
-            motion = [(draw if is_given else moving)(scales.target_motion, quantity) for _ in range(2)]
-            if is_given:
-                target += motion
-            else:
-                change[2:4] = motion
+        motion = [self._motion(scales.target_motion, rests) for _ in range(2)] if self._has_motion else []
+        if self._is_given:
+            target += motion
+        else:
+            change[2:4] = motion or change[2:4]
         if method.has_height:
-            target += [*self._aim[4:]]
-            state += [target[-2] + error(scales.error_position_m, "position")]
-            state += [target[-1] + error(scales.error_velocity_m_s, "velocity")]
-            state += [((choice >> 14) & 7 == 0).astype(numbers.computed)]
-            vertical = [(draw if is_given else moving)(scales.climb_motion, quantity)] if has_motion else []
-            if len(method.target) > len(target):
+            heights = [*self._aim[4:]]
+            target += heights
+            state += self._beside(heights, size)
+            state += [((choice >> 14) & 7 == 0).astype(self._numbers.computed)]
+            vertical = [self._motion(scales.climb_motion, rests)] if self._has_motion else []
+            if self._is_given:
                 target += vertical
             else:
                 change[-1:] = vertical or change[-1:]
         motions = scales.target_motion, scales.target_motion, scales.climb_motion
-        target += [draw(scale, quantity) for scale in motions * PREVIEW_TIMES * method.has_preview]
+        target += [self._draw(one, "thrust") for one in motions * PREVIEW_TIMES * method.has_preview]
         if index >= FIRST_LOST:
             state[0] = np.where(rests, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
+
+    @property
+    def _is_given(self) -> bool:
+        """Whether targets have accelerations."""
+        return self._method.settings.target.gives_acceleration
+
+    @property
+    def _has_motion(self) -> bool:
+        """Whether the acceleration of a target counts."""
+        return self._method.tracker is not None or self._is_given
+
+    def _next_aim(self, rests: Rows, jumps: Rows) -> Real:
+        """Draw place and velocity of the targets along each axis (k, n): new ones of those that jump."""
+        pair = (self._scales.target_position_m, "position"), (self._scales.target_velocity_m_s, "velocity")
+        axes = 3 if self._method.has_height else 2
+        aim = np.stack([self._moving(rests, *one) for one in pair * axes])
+        return np.where(jumps, aim, self._aim if self._aim.size else aim)
+
+    def _beside(self, target: list[Real], size: Words) -> list[Real]:
+        """Draw positions and velocities near those of targets, by sizes of the errors."""
+        half = len(target) // 2
+        kinds = [(self._scales.error_position_m, "position")] * half
+        kinds += [(self._scales.error_velocity_m_s, "velocity")] * half
+        errors = [np.array([self._numbers.constant(one, what) for one in sizes]) for sizes, what in kinds]
+        return [place + self._draws.draw(error[size]) for place, error in zip(target, errors, strict=True)]
+
+    def _next_thrust(self, like: Real) -> Real:
+        """Draw thrusts within their range; a controller of the height gets none."""
+        limits, scales = self._method.limits, self._scales
+        if self._method.has_height:
+            return np.full_like(like, limits.thrust_least)
+        thrust = self._numbers.constant(scales.hover_m_s2, "thrust") + self._draw(
+            scales.thrust_m_s2, "thrust"
+        )
+        drawn: Real = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+        return drawn
+
+    def _motion(self, scale: float, rests: Rows) -> Real:
+        """Draw accelerations of targets along an axis, or changes of their velocities in a step."""
+        return self._draw(scale, "thrust") if self._is_given else self._moving(rests, scale, "velocity")
+
+    def _moving(self, rests: Rows, scale: float, quantity: str) -> Real:
+        """Draw a number of targets, 0 for those that rest."""
+        constant = self._numbers.constant
+        return self._draws.draw(np.where(rests, constant(0.0, quantity), constant(scale, quantity)))
 
     def _spoilt(self, given: _Input) -> _Input:
         """Return inputs of which one in four is out of range."""
@@ -193,21 +210,23 @@ class Episodes:
     def _next_call(self, index: int) -> OtherCall | None:
         """Return the other call before input number `index`; None if there is none."""
         method = self._method
+        setter = method.setter, self._weights if method.weight_limits else self._command
         calls: dict[int, tuple[str, Callable[[], Real]]] = {
-            1: ("shift", lambda: self._shift(turns=index & 8 != 0)),
+            1: ("shift", lambda: self._shift(turns=False)),
+            9: ("shift", lambda: self._shift(turns=True)),
             5: ("reset", self._command),
-            2: (method.setter, self._weights if method.weight_limits else self._command),
-        }
+        } | dict.fromkeys((2, 10), setter)
         if method.limiting is not None:
-            calls[0] = "set_limits", self._limits
+            calls |= dict.fromkeys((0, 8), ("set_limits", self._limits))
         if method.has_height:
-            calls[3] = "set_thrust", lambda: self._command()[:, 2:]
+            calls |= dict.fromkeys((3, 11), ("set_thrust", lambda: self._command()[:, 2:]))
         if method.guard is not None:
-            calls[4] = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
+            measured = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
+            calls |= dict.fromkeys((4, 12), measured)
         turn, before = index % CALLS_IN_TURN, self._draws.last
-        name, arguments = calls.get(turn % 8 if turn < 13 else turn, ("", None))
-        if arguments is None or (name == "reset" and turn > 8):
+        if turn not in calls:
             return None
+        name, arguments = calls[turn]
         values = arguments()
         self._draws.restore(self._is_lost, before)
         return OtherCall(name, values)

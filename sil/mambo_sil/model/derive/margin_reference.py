@@ -4,7 +4,7 @@ from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.margins.margin_reserve import MarginReference, margins_of
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 
 
 def margin_reference(source: str, settings: Settings, drone: VehicleFile) -> MarginReference:
@@ -15,5 +15,5 @@ def margin_reference(source: str, settings: Settings, drone: VehicleFile) -> Mar
     """
     if source in presets.names() or settings.cost.norm == "1-norm":
         return margins_of(settings, drone, f"preset {source}" if source in presets.names() else source)
-    derived = controller_toml.parse(controller_text(drone, drone.name), drone.name)
+    derived = controller_toml.parse(chosen_text(drone, drone.name), drone.name)
     return margins_of(derived, drone, f"`design` for {drone.name}")
