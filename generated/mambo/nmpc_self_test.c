@@ -427,16 +427,16 @@ static unsigned long run_step(nmpc_t *scratch, nmpc_self_test_run_t *run, int st
     if (turn == 0U) {
         next_input(run, index);
         results = call_others(scratch, run, index, results);
-    } else if (turn == (NMPC_SELF_TEST_HELD - 1U)) {
+    } else {
+        run->target.velocity_m_s[0] = run->target.velocity_m_s[0] + run->change_m_s[0];
+        run->target.velocity_m_s[1] = run->target.velocity_m_s[1] + run->change_m_s[1];
+    }
+    if (turn == (NMPC_SELF_TEST_HELD - 1U)) {
         spoil(&run->stream, numbers_of(&run->state), NMPC_SELF_TEST_STATE_NUMBERS);
         spoil(&run->stream, numbers_of(&run->target), NMPC_SELF_TEST_TARGET_NUMBERS);
         spoil(&run->stream, &run->thrust_m_s2, 1U);
-    } else {
-        /* The input holds. */
     }
     status = nmpc_step(scratch, &run->state, &run->target, run->thrust_m_s2, &command);
-    run->target.velocity_m_s[0] = run->target.velocity_m_s[0] + run->change_m_s[0];
-    run->target.velocity_m_s[1] = run->target.velocity_m_s[1] + run->change_m_s[1];
     results = fold_command(fold(results, (unsigned long)status), &command);
     return fold_controller(results, scratch);
 }

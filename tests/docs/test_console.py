@@ -62,7 +62,7 @@ NOT_RUN = {
         "needs the firmware of Bitcraze, and a Crazyflie",
         "needs a Crazyflie",
     ),
-    "tutorials/px4-ardupilot.md": ("needs PX4",),
+    "tutorials/px4-ardupilot.md": ("needs PX4", "asks for a passphrase, and needs an autopilot"),
     "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }

@@ -109,7 +109,8 @@ class Episodes:
                     ~self._is_lost,
                     call if tick == 0 else None,
                 )
-                given = replace(given, target=given.target + given.change)
+                if self._has_motion and not self._is_given:  # -0 + 0 is 0, so that nothing is added else
+                    given = replace(given, target=given.target + given.change)
 
     def _next_input(self, index: int) -> _Input:
         """Draw the next inputs.
