@@ -67,12 +67,11 @@ def settings() -> dict[str, Settings]:
         text = chosen_text(DRONE, "crazyflie", acceleration=acceleration)
         return controller_toml.parse(text, "derived")
 
-    preview = derived("preview")
+    given = derived("given")
     return {
         "tracked: small angles": derived("tracked"),
-        "tracked: thrust vector": controller_toml.with_option(preview, "target.acceleration", "tracked"),
-        "given": derived("given"),
-        "preview": preview,
+        "tracked: thrust vector": controller_toml.with_option(given, "target.acceleration", "tracked"),
+        "given": given,
     }
 
 
@@ -142,7 +141,7 @@ def draw_eight(stem: Path) -> None:
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 2.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, words, colour in zip(panels, list(compared)[::3], (VERMILION, BLUE), strict=True):
+        for axes, words, colour in zip(panels, list(compared)[::2], (VERMILION, BLUE), strict=True):
             trace = flown(case, compared[words], SEEDS[0])
             late = trace.time_s > DURATION_S / 2.0
             target = trace.target[late, 0]

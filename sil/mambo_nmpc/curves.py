@@ -9,12 +9,11 @@ A curve is any object with the methods `target(time_s)`, [x, y, vx, vy] of shape
 of shape (..., 3), up positive, has a height.
 """
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mambo_codegen.numbers.representation import PREVIEW_PERIOD_S, PREVIEW_TIMES
 from mambo_sil.api.frames import FrameName, vectors_to_ned
 from mambo_sil.arguments import as_numbers, require, require_choice, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -51,7 +50,6 @@ __all__ = [
     "Trajectory",
     "Waypoints",
     "curve",
-    "preview",
     "sample",
 ]
 
@@ -62,9 +60,6 @@ class CurvePoint(NamedTuple):
     position_m: FloatArray
     velocity_m_s: FloatArray
     acceleration_m_s2: FloatArray
-
-
-_AHEAD_S: Final = tuple(PREVIEW_PERIOD_S * time for time in range(1, PREVIEW_TIMES + 1))
 
 
 def curve(name: CurveName, size_m: float = 2.0, rate_rad_s: float = 0.5) -> Trajectory:
@@ -104,12 +99,3 @@ def sample(
             for axis, plane in enumerate(level)
         )
     )
-
-
-def preview(trajectory: Trajectory, time_s: ArrayLike, frame: FrameName = "NED") -> FloatArray:
-    """Return the accelerations of a curve (..., 6, 3) at 0.05, 0.1 .. 0.3 s behind times (...), in m/s^2.
-
-    They are the `preview_m_s2` of a target. Raises ArgumentError as `sample`.
-    """
-    times_s = np.add.outer(as_numbers("time_s", time_s), _AHEAD_S)
-    return sample(trajectory, times_s, frame).acceleration_m_s2

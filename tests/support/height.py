@@ -94,18 +94,8 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "limits.speed_m_s": 5.0,
         "guard.tilt_rad_s": 8.4,
     },
-    CRAZYFLIE
-    | {
-        "model.tilt": "exact",
-        "limits.tilt_rad": 0.7,
-        "target.acceleration": "preview",
-        "limits.speed_m_s": 5.0,
-        "limits.fence.x_max_m": 2.0,
-        "guard.tilt_rad_s": 8.4,
-    },
-    ONE_MOVE | {"target.acceleration": "preview", "height.descent_m_s": 1.2},
 )
-"""One move and two, all that can be learnt, with and without tracker, preview, limits, fence, age, feedback
+"""One move and two, all that can be learnt, with and without tracker, limits, fence, age, feedback
 and guard; drones that deliver less than the commanded thrust, and more; with small angles and with the
 thrust vector."""
 

@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.numbers.representation import PREVIEW_TIMES
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_nmpc import Controller, DroneState, TargetState
 from mambo_nmpc.adapters.rotorpy import RotorpyController
@@ -150,9 +149,6 @@ def _records(update: Update) -> tuple[DroneState, TargetState]:
     """Return the inputs of one drone as the Python API takes them, with all that a target can say."""
     state, target = update.state, update.target
     heights, climbs = (state[:, 7:8], state[:, 8:9]) if state.shape[1] > 7 else np.ones((2, 1, 1))
-    preview = None
-    if target.shape[1] > 9:
-        preview = _down(target[:, 9:].reshape(1, PREVIEW_TIMES, 3))
     return (
         DroneState(
             _down(np.concatenate([state[:, :2], heights], axis=1)),
@@ -160,9 +156,7 @@ def _records(update: Update) -> tuple[DroneState, TargetState]:
             state[:, 4:7],
             state[:, 9] != 0.0 if state.shape[1] > 9 else False,
         ),
-        TargetState(
-            *(_down(target[:, [axis, axis + 1, 6 + axis // 2]]) for axis in (0, 2, 4)), preview_m_s2=preview
-        ),
+        TargetState(*(_down(target[:, [axis, axis + 1, 6 + axis // 2]]) for axis in (0, 2, 4))),
     )
 
 

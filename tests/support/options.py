@@ -52,8 +52,6 @@ COMMANDS: Final = (
 """What the command line does besides."""
 
 REFUSALS: Final = {
-    "A": r'target\.acceleration = "preview" .*"given"',
-    "P": r'preview_m_s2 is missing; the settings have target\.acceleration = "preview"',
     "H": r"be left out: the settings have \[height\]",
     "N": r"the settings have no \[height\].* derive settings",
     "L": r"wants settings with \[height\] and \[limits\].* derive them",
@@ -82,7 +80,7 @@ SPACE: Final[Base] = {
 }
 """A controller of the height, for the Crazyflie."""
 ALL: Final[Base] = SPACE | {
-    "target.acceleration": "preview",
+    "target.acceleration": "given",
     "model.tilt": "exact",
     "limits.tilt_rad": 0.8,
     "limits.speed_m_s": 1.5,
@@ -120,8 +118,6 @@ _LEVEL: Final = "=======+=N +++++++L" + _BY_COMMAND
 _SPACE: Final = "=====H=+=+ +++++++L" + _BY_COMMAND
 _LIMITED: Final = "=====H=+=+ ++++++++" + _BY_COMMAND
 """Those of a controller of the height with limits, which PX4 wants."""
-_PREVIEW: Final = "=====HAAPA +A+AA++A =+====A++++++=+="
-_PREVIEW_64: Final = "=====HAAPA +A+AAA+A A+====A++++++=+="
 
 _LIMITS: Final[Values] = {
     "limits.speed_m_s": 1.5,
@@ -133,8 +129,8 @@ _LIMITS: Final[Values] = {
 }
 
 OPTIONS: Final[dict[str, Option]] = {
-    # A preview stands first: the first row is in the quick tests.
-    "preview": Option(SPACE, {"target.acceleration": "preview"}, _PREVIEW),
+    # The first row is in the quick tests.
+    "height, given": Option(SPACE, {"target.acceleration": "given"}, _SPACE),
     "1-norm": Option(PAPER, {"cost.norm": "1-norm"}, _PAPER),
     "1-norm, given": Option(PAPER, {"target.acceleration": "given"}, _PAPER),
     "1-norm, tracked": Option(PAPER, {"target.acceleration": "tracked"}, _PAPER),
@@ -186,7 +182,6 @@ OPTIONS: Final[dict[str, Option]] = {
     "fixed": Option(LEVEL, {"code.scalar": "fixed"}, _LEVEL),
     "prefix": Option(LEVEL, {"code.prefix": "own"}, _LEVEL),
     "height": Option(SPACE, {"height.lag_s": 0.072}, _SPACE),
-    "height, given": Option(SPACE, {"target.acceleration": "given"}, _SPACE),
     "height, tracked": Option(SPACE, {"target.acceleration": "tracked"}, _SPACE),
     "exact tilt": Option(SPACE, {"model.tilt": "exact", "limits.tilt_rad": 0.8}, _SPACE),
     "acceleration learnt": Option(SPACE, {"height.learn": "acceleration"}, _SPACE),
@@ -202,8 +197,8 @@ OPTIONS: Final[dict[str, Option]] = {
         _LIMITED,
     ),
     "height, guard": Option(SPACE, {"guard.thrust_m_s2": 1.0, "guard.thrust_m_s3": 10.0}, _SPACE),
-    "all, float32": Option(ALL, {"code.scalar": "float32"}, _PREVIEW),
-    "all, float64": Option(ALL, {"code.scalar": "float64"}, _PREVIEW_64),
-    "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _PREVIEW),
+    "all, float32": Option(ALL, {"code.scalar": "float32"}, _LIMITED),
+    "all, float64": Option(ALL, {"code.scalar": "float64"}, _LIMITED),
+    "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _LIMITED),
 }
 """The table, a row an option; what a row sets that its base has too is what the option is about."""

@@ -76,7 +76,7 @@ def valid_values(draw: st.DrawFn) -> Values:
         "code.prefix": draw(prefixes()),
     }
     choices = {
-        key.path: draw(st.sampled_from(_level_choices(key))) for key in CHOICES if key.path not in constrained
+        key.path: draw(st.sampled_from(choices_of(key))) for key in CHOICES if key.path not in constrained
     }
     free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
     drawn = constrained | choices | free | {"cost.norm": "1-norm"}
@@ -127,7 +127,7 @@ def quadratic_values(draw: st.DrawFn) -> Values:
     for key in KEYS.values():
         if key.path not in values and settings.uses(key.path):
             values[key.path] = draw(
-                st.sampled_from(_level_choices(key)) if key.low is None else numbers(key.path)
+                st.sampled_from(choices_of(key)) if key.low is None else numbers(key.path)
             )
     return {path: values[path] for path in KEYS if path in values}
 
@@ -247,11 +247,6 @@ def base_of(path: str) -> Values:
 def choices_of(key: Key) -> list[str]:
     """Return what a key with named values admits."""
     return [choice.strip('"') for choice in key.domain.split(" or ")]
-
-
-def _level_choices(key: Key) -> list[str]:
-    """Return what a key with named values admits without a height."""
-    return [choice for choice in choices_of(key) if choice != "preview"]
 
 
 def nested(values: Values) -> dict[str, Values]:

@@ -1,4 +1,4 @@
-"""Controllers with height, guard, thrust vector, preview, learnt gain: checks pass them, not their faults."""
+"""Controllers with height, guard, thrust vector, learnt gain: checks pass them, not their faults."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -24,8 +24,7 @@ from tests.support.subjects import Harm, played_fault, subject
 from tests.support.tools import require
 
 CORNERS = {
-    name: height_case(index, "float32")
-    for name, index in (("preview", 9), ("height", 1), ("thrust vector", 6), ("guard", 5))
+    name: height_case(index, "float32") for name, index in (("height", 1), ("thrust vector", 6), ("guard", 5))
 }
 """Of `tests.support.height`; the samples leave out the guard, which the thrust vector has too."""
 LEARNING = {
@@ -93,30 +92,6 @@ FAULTS = {
             "nmpc.c",
             r"attitude_change_command\(attitude, asked_rad",
             "attitude_change_command(attitude, self->command_rad",
-        ),
-    },
-    "preview": {
-        "the last acceleration is not checked": Harm(
-            "nmpc.c", r"\n *&& within\(target->preview_m_s2\[5\]\[2\], [^)]*\)", ""
-        ),
-        "now is not turned": Harm(
-            "nmpc.c",
-            r"target->acceleration_m_s2\[0\], target->acceleration_m_s2\[1\], &state",
-            "target->acceleration_m_s2[1], target->acceleration_m_s2[0], &state",
-        ),
-        "what comes is of one time": Harm(
-            "nmpc.c", r"target->preview_m_s2\[time\]\[0\], target", "target->preview_m_s2[0][0], target"
-        ),
-        "the height knows nothing of what comes": Harm(
-            "nmpc.c", r"values\[7 \+ time\] = target->preview_m_s2\[time\]\[2\];", ""
-        ),
-        "without a target the height follows the last one": Harm(
-            "nmpc.c", r"values\[7 \+ time\] = \(nmpc_real_t\)0;", "values[7 + time] = NMPC_GRAVITY_M_STEP2;"
-        ),
-        "a limit does not bend what comes": Harm(
-            "nmpc.c",
-            r"limited->preview_m_s2\[time\]\[axis\] = limited[^;]*;",
-            "limited->preview_m_s2[time][axis] = (nmpc_real_t)0;",
         ),
     },
     "learnt gain": {
@@ -254,13 +229,12 @@ def test_every_case_has_the_bits_of_the_reference(scalar: str, tmp_path: Path) -
     [
         (CORNERS["height"], 20_000),
         (CORNERS["thrust vector"], 5_000),
-        (CORNERS["preview"], 5_000),
         (LEARNING["learnt gain, thrust vector"], 1_000),
     ],
-    ids=["height", "thrust vector", "preview", "learnt gain"],
+    ids=["height", "thrust vector", "learnt gain"],
 )
 def test_no_call_breaks_a_promise(settings: Settings, runs: int, tmp_path: Path) -> None:
-    """With contact with the floor and limits of the height, attitudes up to upside down, any preview."""
+    """With contact with the floor and limits of the height, attitudes up to upside down."""
     require("clang", "clang")
     result = fuzzing.check(subject(settings, tmp_path), runs=runs)
     assert result.outcome is CheckOutcome.PASSED, result.evidence

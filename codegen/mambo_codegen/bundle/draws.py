@@ -10,7 +10,6 @@ from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.limits_constants import LimitsConstants
 from mambo_codegen.methods.shared.math import Real, rounded
-from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.numbers.literals import SCALARS
@@ -77,8 +76,6 @@ def input_scales(method: Method) -> InputScales:
         if tracker:
             most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
         motions.append(min(tracker.tested_input, most) if tracker else 0.0)
-    if method.has_preview:
-        motions = [given_limit_m_s2(settings)] * 2
     cost = settings.cost
     weights = (cost.tracking_weight, cost.effort_weight) if method.weight_limits else ()
     return InputScales(

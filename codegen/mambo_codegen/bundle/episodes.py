@@ -10,7 +10,7 @@ from mambo_codegen.bundle.draws import EpisodeDraws, InputScales, Words, input_s
 from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
-from mambo_codegen.numbers.representation import PREVIEW_TIMES, THRUST
+from mambo_codegen.numbers.representation import THRUST
 
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
@@ -143,8 +143,6 @@ class Episodes:
                 target += vertical
             else:
                 change[-1:] = vertical or change[-1:]
-        motions = scales.target_motion, scales.target_motion, scales.climb_motion
-        target += [self._draw(one, "thrust") for one in motions * PREVIEW_TIMES * method.has_preview]
         if index >= FIRST_LOST:
             state[0] = np.where(rests, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
@@ -157,7 +155,7 @@ class Episodes:
     @property
     def _has_motion(self) -> bool:
         """Whether the acceleration of a target counts."""
-        return self._method.tracker is not None or self._is_given
+        return self._method.tracker is not None
 
     def _next_aim(self, rests: Rows, jumps: Rows) -> Real:
         """Draw place and velocity of the targets along each axis (k, n): new ones of those that jump."""

@@ -32,8 +32,6 @@ from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
-    PREVIEW_PERIOD_S,
-    PREVIEW_TIMES,
     STATE,
     TARGET,
     THRUST,
@@ -91,9 +89,6 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update
     period, or wants a controller of another kind.
     """
-    target.refuse_preview(
-        has_preview=settings.target.acceleration == "preview", is_double=settings.code.scalar == "float64"
-    )
     target.refuse_level(
         has_height=settings.height is not None, has_limits=method_of(settings).limiting is not None
     )
@@ -223,9 +218,6 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
             "given": settings.target.gives_acceleration,
-            "preview": PREVIEW_TIMES if method.has_preview else 0,
-            "preview_period_s": PREVIEW_PERIOD_S,
-            "previewed": [name for name in method.target_members if name.startswith("preview")],
             "trigonometry": method.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,

@@ -25,8 +25,6 @@ class FirmwareTarget:
     self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
     flies_height: whether it wants roll, pitch and thrust from one controller, within limits.
-    makes_targets: whether its code makes the targets, of which it knows no preview.
-    sends_targets: whether its link carries the targets, in frames that hold a preview of 32-bit numbers.
     """
 
     name: str
@@ -36,25 +34,6 @@ class FirmwareTarget:
     self_test: bool = True
     tick_s: float | None = None
     flies_height: bool = False
-    makes_targets: bool = False
-    sends_targets: bool = False
-
-    def refuse_preview(self, *, has_preview: bool, is_double: bool) -> None:
-        """Raise InvalidSettingsError for settings whose targets the code cannot make or receive."""
-        if self.sends_targets and has_preview and is_double:
-            raise InvalidSettingsError(
-                (
-                    f'target.acceleration = "preview" must not be with --for {self.name} and code.scalar = '
-                    '"float64": no frame of its link is so long; write "given", or scalar = "float32"',
-                )
-            )
-        if self.makes_targets and has_preview:
-            raise InvalidSettingsError(
-                (
-                    f'target.acceleration = "preview" must not be with --for {self.name}, whose set-points '
-                    'do not say what comes; write "given" or "tracked"',
-                )
-            )
 
     def refuse_level(self, *, has_height: bool, has_limits: bool) -> None:
         """Raise InvalidSettingsError for settings without a section that the target needs."""
@@ -92,13 +71,13 @@ _NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add rounds 
 """
 _TARGETS: Final = (
     FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
-    FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001, makes_targets=True),
+    FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
     FirmwareTarget("espidf", "mambo", ""),
-    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS, self_test=False, makes_targets=True),
-    FirmwareTarget("mambo", "mambo", "src/", self_test=False, tick_s=0.005, makes_targets=True),
-    FirmwareTarget("pil", "mambo", "", sends_targets=True),
+    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS, self_test=False),
+    FirmwareTarget("mambo", "mambo", "src/", self_test=False, tick_s=0.005),
+    FirmwareTarget("pil", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),
-    FirmwareTarget("px4", None, "src/modules/mc_nmpc/", flies_height=True, makes_targets=True),
+    FirmwareTarget("px4", None, "src/modules/mc_nmpc/", flies_height=True),
 )
 TARGETS: Final = {target.name: target for target in _TARGETS}
 """All targets by name."""

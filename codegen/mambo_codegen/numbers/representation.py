@@ -24,12 +24,6 @@ CONTACT: Final = ("whole",)
 WEIGHTS: Final = ("tracking", "effort")
 """The quantity of each column of an input."""
 
-PREVIEW_TIMES: Final = 6
-PREVIEW_PERIOD_S: Final = 0.05
-PREVIEW_NUMBERS: Final = 3 * PREVIEW_TIMES
-"""A preview has accelerations at so many times, the first of them so long ahead, as the next are apart, each
-along three axes."""
-
 SUMS: Final = frozenset({"cost", "gradient"})
 """Quantities whose numbers are of type nmpc_sum_t."""
 

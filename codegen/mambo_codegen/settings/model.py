@@ -34,11 +34,7 @@ class Settings(Sections):
         return self
 
     def _misplaced(self) -> list[Refusal]:
-        """Refuse a section that needs another method, and a preview without a height."""
-        if self.target.acceleration == "preview" and self.height is None:
-            return [
-                Refusal("target", "acceleration", 'must be "given", "tracked" or "none" without [height]')
-            ]
+        """Refuse a section that needs another method."""
         if self.cost.norm == "quadratic":
             return []
         placed = [name for name in ("height", "guard") if getattr(self, name) is not None]

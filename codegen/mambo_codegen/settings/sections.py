@@ -184,21 +184,28 @@ class Model(SettingsSection):
 class Target(SettingsSection):
     """What the controller knows of the target's motion beyond its position and velocity."""
 
-    acceleration: Literal["none", "given", "tracked", "preview"] = Field(
+    acceleration: Literal["none", "given", "tracked"] = Field(
         "none",
         description='Acceleration of the target in the prediction: "none" predicts a target of constant '
         'velocity, as the paper does (eq 11); "given" takes it from the caller, in a further member of the '
         'target; "tracked" estimates it from the velocities of successive steps, which must then be those '
         "of the target's motion, without noise. Held over the horizon, it removes most of the tracking error "
-        'on curved paths. "preview" takes the acceleration from the caller as "given" does, and those that '
-        "the target will have 0.05, 0.1 .. 0.3 s ahead, so that the drone tilts before the curve does; with "
-        "a height.",
+        "on curved paths.",
     )
+
+    @field_validator("acceleration", mode="before")
+    @classmethod
+    def _is_known(cls, acceleration: Any) -> Any:
+        if acceleration == "preview":
+            raise PydanticCustomError(
+                "preview", 'must not be "preview", which went in version 0.4; write "given", which is closer'
+            )
+        return acceleration
 
     @property
     def gives_acceleration(self) -> bool:
         """Whether the caller gives the acceleration."""
-        return self.acceleration in ("given", "preview")
+        return self.acceleration == "given"
 
     tracker_gain: Number = Field(
         0.3,

@@ -80,7 +80,7 @@ class Controller:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
         sensors:      what measures, in place of the sensors in the file; "true" for the state of a simulator.
-        acceleration: "given" or "preview" as `design --acceleration` derives them, with more tilt.
+        acceleration: "given" as `design --acceleration` derives them, with more tilt.
 
         Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
         InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
@@ -325,14 +325,7 @@ class Controller:
             if self._method.has_height and acceleration.shape[-1] != 3:
                 raise ArgumentError("target: acceleration_m_s2 has no z; [height] wants x, y, z (..., 3)")
             aims.append(acceleration)
-        columns = _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
-        if self._method.has_preview:
-            if target.preview_m_s2 is None:
-                raise ArgumentError(_missing("preview_m_s2", given.acceleration))
-            columns += list(
-                (target.preview_m_s2.reshape(self.n, -1, 3) * (1.0, 1.0, -1.0)).reshape(self.n, -1).T
-            )
-        return columns
+        return _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
 
     def _empty_inputs(self) -> list[NDArray[Any]]:
         """Return the arrays that the C reads: states and targets (n, k), thrusts (n,) without `[height]`."""

@@ -6,7 +6,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.numbers.representation import PREVIEW_TIMES
 from mambo_sil.api.frames import (
     FrameName,
     attitude_to_ned,
@@ -97,12 +96,9 @@ class TargetState:
     """Along the same axes (..., 2) or (..., 3)."""
     acceleration_m_s2: FloatArray | None
     """Along the same axes (..., 2) or (..., 3). Read, and then needed, with `target.acceleration = "given"`
-    or `"preview"` only, z of it with `[height]`; z is read by the altitude loop too, if there."""
+    only, z of it with `[height]`; z is read by the altitude loop too, if there."""
     yaw_rad: FloatArray | None
     """Heading (...), or None to keep the one of the first step."""
-    preview_m_s2: FloatArray | None
-    """Accelerations 0.05, 0.1 .. 0.3 s ahead (..., 6, 3), z down. Read, and then needed, with
-    `target.acceleration = "preview"` only."""
 
     def __init__(
         self,
@@ -110,14 +106,10 @@ class TargetState:
         velocity_m_s: ArrayLike,
         acceleration_m_s2: ArrayLike | None = None,
         yaw_rad: ArrayLike | None = None,
-        *,
-        preview_m_s2: ArrayLike | None = None,
     ) -> None:
         position = _vectors("position_m", position_m)
         batch = position.shape[:-1]
-        acceleration, yaw, preview = acceleration_m_s2, yaw_rad, preview_m_s2
-        if preview is not None:
-            preview = of_shape("preview_m_s2", preview, (*batch, PREVIEW_TIMES, 3))
+        acceleration, yaw = acceleration_m_s2, yaw_rad
         if acceleration is not None:
             acceleration = _vectors("acceleration_m_s2", acceleration, batch)
         if yaw is not None:
@@ -126,7 +118,6 @@ class TargetState:
         object.__setattr__(self, "velocity_m_s", _vectors("velocity_m_s", velocity_m_s, batch))
         object.__setattr__(self, "acceleration_m_s2", acceleration)
         object.__setattr__(self, "yaw_rad", yaw)
-        object.__setattr__(self, "preview_m_s2", preview)
 
     @classmethod
     def in_frame(
@@ -136,17 +127,14 @@ class TargetState:
         velocity_m_s: ArrayLike,
         acceleration_m_s2: ArrayLike | None = None,
         yaw_rad: ArrayLike | None = None,
-        *,
-        preview_m_s2: ArrayLike | None = None,
     ) -> Self:
         """Return targets in another frame; the arrays have the shapes of a TargetState."""
-        acceleration, yaw, preview = acceleration_m_s2, yaw_rad, preview_m_s2
+        acceleration, yaw = acceleration_m_s2, yaw_rad
         return cls(
             vectors_to_ned(frame, position_m, "position_m"),
             vectors_to_ned(frame, velocity_m_s, "velocity_m_s"),
             None if acceleration is None else vectors_to_ned(frame, acceleration, "acceleration_m_s2"),
             None if yaw is None else yaw_to_ned(frame, yaw),
-            preview_m_s2=None if preview is None else vectors_to_ned(frame, preview, "preview_m_s2"),
         )
 
     @property

@@ -192,7 +192,7 @@ def design(
         TargetAcceleration,
         typer.Option(
             help="What the controller knows of the target's acceleration: tracked, what its velocity shows; "
-            "given, what your program says; preview, that and the next 0.3 s. For quick curves.",
+            "given, what your program says, for quick curves.",
             metavar="NAME",
         ),
     ] = "tracked",

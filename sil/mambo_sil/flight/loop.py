@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import COMMAND, PREVIEW_PERIOD_S, PREVIEW_TIMES
+from mambo_codegen.numbers.representation import COMMAND
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -38,7 +38,6 @@ from mambo_sil.flight.controllers.thrust_controller import (
     ThrustDelivery,
     adapted,
     commands_thrust,
-    has_preview,
     numbers_of,
 )
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
@@ -207,24 +206,8 @@ class Flight:
         level = np.broadcast_to((HOVER_HEIGHT_M, 0.0, 0.0), (*by_flight.shape[:2], 3))
         return np.concatenate([by_flight, level], axis=-1).swapaxes(0, 1)
 
-    @cached_property
-    def targets_ahead(self) -> FloatArray:
-        """The targets (k, n, 27) as controllers with a preview are given them.
-
-        Behind the columns in space stand the accelerations x, y and up at each time of the preview.
-        """
-        columns = [self.targets_in_space.swapaxes(0, 1)]
-        for time in range(1, PREVIEW_TIMES + 1):
-            times_s = self.times_s() + time * PREVIEW_PERIOD_S
-            level, up = self.trajectory.acceleration(times_s), vertical_of(self.trajectory, times_s)[..., 2:]
-            columns.append(self._for_each_flight("acceleration", level, 2).swapaxes(0, 1))
-            columns.append(self._for_each_flight("vertical", up, 1).swapaxes(0, 1))
-        return np.concatenate(columns, axis=-1).swapaxes(0, 1)
-
-    def targets_for(self, *, commands_thrust: bool, has_preview: bool) -> FloatArray:
-        """Return the targets (k, n, 6, 9 or 27) as a controller is given them."""
-        if has_preview:
-            return self.targets_ahead
+    def targets_for(self, *, commands_thrust: bool) -> FloatArray:
+        """Return the targets (k, n, 6 or 9) as a controller is given them."""
         return self.targets_in_space if commands_thrust else self.given_targets
 
     @cached_property
@@ -257,7 +240,7 @@ def fly(
     controller = adapted(controller)
     has_thrust = commands_thrust(controller)
     times_s = flight.times_s()
-    targets = flight.targets_for(commands_thrust=has_thrust, has_preview=has_preview(controller))
+    targets = flight.targets_for(commands_thrust=has_thrust)
     open_loop_until, landing = open_loop_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])

@@ -58,11 +58,6 @@ class Pilot:
         farthest_m: float = FARTHEST_M,
     ) -> None:
         require_number("farthest_m", farthest_m, NEAREST_BOUND_M, FARTHEST_BOUND_M)
-        if controller.settings.target.acceleration == "preview":
-            raise ArgumentError(
-                'controller: target.acceleration = "preview" must be "given" or "tracked": the targets of a '
-                "pilot do not say what comes"
-            )
         self._open_link, self.steering = open_link, Steering(controller, record)
         self.life = LifeCycle(self.steering, 1.0, farthest_m)
         self._watch, self._interrupts, self._interrupted = watch or _watch_nothing, 0, ""

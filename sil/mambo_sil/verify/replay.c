@@ -452,12 +452,6 @@ static int passes_floats(nmpc_t *self)
     target_numbers.height_m = NMPC_POSITION(1.0);
     target_numbers.climb_m_s = NMPC_VELOCITY(0.125);
 #endif
-#ifdef NMPC_PREVIEW_TIMES
-    for (i = 0; i < NMPC_PREVIEW_TIMES; i++) {
-        target.preview_m_s2[i][1] = 0.5f + (0.25f * (float)i);
-        target_numbers.preview_m_s2[i][1] = NMPC_THRUST_ACCELERATION(0.5 + (0.25 * (double)i));
-    }
-#endif
 
     nmpc_init(self);
     nmpc_init(&other);

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
-from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import STATE, TARGET, THRUST
 from mambo_codegen.settings.model import Settings
@@ -102,18 +101,13 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
     method = method_of(settings)
     level, climb = method.tracker, method.climb_tracker
-    most = level.input_limit if level else given_limit_m_s2(settings)
-    if settings.target.gives_acceleration:
-        target = np.concatenate([target, _accelerations(most, high, (n, 2), rng)], axis=1)
+    if level and level.is_given:
+        target = np.concatenate([target, _accelerations(level.input_limit, high, (n, 2), rng)], axis=1)
     if method.has_height:
         own, goal = _heights(settings, scale, rng)
         state, target = np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1)
-        if settings.target.gives_acceleration:
-            most_up = climb.input_limit if climb else most
-            target = np.concatenate([target, _accelerations(most_up, high, (n, 1), rng)], axis=1)
-    if ahead := len(method.target) - target.shape[1]:
-        preview = _accelerations(most, high, (n, ahead), rng, special=0.003)
-        target = np.concatenate([target, preview], axis=1)
+        if climb and climb.is_given:
+            target = np.concatenate([target, _accelerations(climb.input_limit, high, (n, 1), rng)], axis=1)
     return StepInputs(state, target, None if method.has_height else thrust)
 
 
@@ -135,14 +129,10 @@ def _accelerations(
     range_m_s2: float,
     shape: tuple[int, int],
     rng: np.random.Generator,
-    special: float = 0.05,
 ) -> Array:
-    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input.
-
-    special: share of those at an edge.
-    """
+    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input."""
     drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, shape)
-    is_special = rng.random(shape) < special
+    is_special = rng.random(shape) < 0.05
     edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
     return np.where(is_special, rng.choice(edges, shape), np.clip(drawn, -range_m_s2, range_m_s2))
 

@@ -110,7 +110,6 @@ CASES = {
     "limits": settings_of(TWO_MOVES | LIMITED),
     "height, tracked": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "tracked"}),
     "height, given": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "given"}),
-    "preview": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "preview"}),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
     "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
     "height, guard": settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "guard.tilt_rad_s": 1.0}),
@@ -156,7 +155,7 @@ def declared(header: str, name: str) -> dict[str, list[int]]:
     """Return the members of a structure of nmpc.h, with the lengths of arrays."""
     body = re.search(rf"typedef struct {{\n((?: .*\n)*)}} nmpc_{name}_t;", header)
     assert body is not None
-    found = re.findall(r"^    \w+ (\w+)(.*?);", body[1].replace("NMPC_PREVIEW_TIMES", "6"), re.MULTILINE)
+    found = re.findall(r"^    \w+ (\w+)(.*?);", body[1], re.MULTILINE)
     return {member: [int(length) for length in re.findall(r"\d", array)] for member, array in found}
 
 

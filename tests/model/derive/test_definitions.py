@@ -13,7 +13,6 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
 from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.derived import settings_for
@@ -259,23 +258,21 @@ def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
     assert wants_exact(known) is found
     mambo = vehicle_toml.preset("mambo")
     flowing = changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n})
-    for name in ("given", "preview"):
-        assert wants_exact(known, name)
-        assert not wants_exact(strong(ratio), name)
-        assert not wants_exact(flowing, name)
+    assert wants_exact(known, "given")
+    assert not wants_exact(strong(ratio), "given")
+    assert not wants_exact(flowing, "given")
     assert not wants_exact(strong(ratio))
     assert not wants_exact(flowing)
 
 
-@pytest.mark.parametrize("name", ["given", "preview"])
-def test_a_target_that_says_more_has_more_of_the_possible_tilt(name: TargetAcceleration) -> None:
+def test_a_target_that_says_more_has_more_of_the_possible_tilt() -> None:
     """0.7 of it with the exact tilt, and half with small angles; what is given is not smoothed."""
     drone = strong(1.6, thrust={"lag_s": 0.05})
-    exact, small = (settings_for(drone, exact=exact, acceleration=name) for exact in (True, False))
-    assert exact.target.acceleration == small.target.acceleration == name
+    exact, small = (settings_for(drone, exact=exact, acceleration="given") for exact in (True, False))
+    assert exact.target.acceleration == small.target.acceleration == "given"
     assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 1.6), rel=ROUNDED)
     assert small.limits.tilt_rad == pytest.approx(0.5 * math.acos(1.0 / 1.6), rel=ROUNDED)
-    assert (exact.target.tracker_gain == 1.0) is (name == "given")
+    assert exact.target.tracker_gain == 1.0
 
 
 @pytest.mark.parametrize("ratio", [2.6, 4.0, 10.0])

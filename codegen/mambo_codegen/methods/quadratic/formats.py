@@ -27,7 +27,7 @@ from mambo_codegen.methods.quadratic.height_formats import (
     vertical_bounds,
     vertical_shifts,
 )
-from mambo_codegen.methods.quadratic.law import law_constants, law_states, limits
+from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
 from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     MOST_SLOPE,
@@ -52,7 +52,7 @@ LAGGED: Final = 1.01
 _ATTITUDE_STATES: Final = ("a", "i", "c", "u")
 """The states of the attitude model, in the order of its rows."""
 
-_INPUTS: Final = {"e": "position", "v": "speed", "p": "thrust"}
+_INPUTS: Final = {"e": "position", "v": "speed"}
 """The quantities of the law's states that are no accelerations in m/step^2."""
 
 _SUM_BITS: Final = 62
@@ -147,7 +147,7 @@ def formats(settings: Sections) -> QuadraticFormats:
         "factor": FACTOR_BITS,
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
-    names = law_states(settings)
+    names = STATES
     inputs = [bits[_INPUTS.get(name, "acceleration")] for name in names]
     shifts = {
         "attitude": _attitude_shift(loops, bounds.states, bits),
@@ -245,7 +245,6 @@ def _level_bounds(settings: Sections) -> _Bounds:
         "v": _TURN * (corrected + speed),
         "w": _TURN * (unexplained + target),
         "j": _TURN * jerk,
-        "p": _TURN * settings.ranges.thrust_acceleration_max_m_s2,
         "a": max(tilted, turned),
         "i": limit,
         "c": LAGGED * limit,
@@ -254,7 +253,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
         "innovation_step": innovation_step,
     }
     rows = np.abs(np.concatenate([attitude.tilt_row, attitude.integral_row]))
-    move = float(np.max(np.abs(law.rows) @ [states[name] for name in law_states(settings)]))
+    move = float(np.max(np.abs(law.rows) @ [states[name] for name in STATES]))
     if law.moves == 2:
         most = float(np.max(attitude.command_limit_m_step2))
         move += float(np.max(np.abs(law.ratios))) * (move + most)
@@ -279,7 +278,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
             guard.tilt_rad + guard.tilt_growth_rad if guard else 0.0,
         ),
         thrust_m_s2=max(
-            states["p"] if settings.target.acceleration == "preview" else states["p"] / _TURN,
+            settings.ranges.thrust_acceleration_max_m_s2,
             guard.thrust_m_s2 + guard.thrust_growth_m_s2 if guard and settings.height else 0.0,
         ),
         learnt_m_s2=max(settings.observer.disturbance_limit_m_s2, 0.001),

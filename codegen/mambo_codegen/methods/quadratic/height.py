@@ -121,7 +121,6 @@ class HeightAxis:
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._tracker = Tracker(found.tracker, products) if found.tracker else None
-        self._has_preview = constants.has_preview
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
             self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
@@ -246,15 +245,13 @@ class HeightAxis:
         products, motion = self._products, state.target
         goal = np.where(follows, target[:, 0], state.height_m)
         climb = np.where(follows, products.speed_product(target[:, 1]), np.zeros_like(goal))
-        disturbance, led = state.disturbance_m_step2, [np.zeros_like(goal)]
-        if self._has_preview:
-            led = [np.where(follows, each, np.zeros_like(goal)) for each in target[:, 2:].T]
+        disturbance, jerk = state.disturbance_m_step2, np.zeros_like(goal)
         if self._tracker is not None:
             given = target[:, 2:3] if self._tracker.is_given else target[:, 1:2]
             motion = choose(follows, self._tracker.update(motion, given), motion)
             acceleration = motion.acceleration_m_step2[:, 0]
             disturbance = np.where(follows, disturbance - acceleration, disturbance)
-            led = [np.where(follows, motion.jerk_m_step2_update[:, 0], led[0])]
+            jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
         error = state.height_m - goal
         lead = products.reach_product(self._reach, climb)
         up, down = self._up, self._down
@@ -267,9 +264,8 @@ class HeightAxis:
             share = products.factor_product(share, state.gain)
         least, most = (products.factor_product(thrust, share) - self._gravity for thrust in self._thrusts)
         values = [
-            *(limited, state.velocity_m_step - climb, disturbance, led[0]),
+            *(limited, state.velocity_m_step - climb, disturbance, jerk),
             *(self.lift(state, thrust) for thrust in (state.thrust, state.lagged, state.command)),
-            *led[1:],
         ]
         command = self._minimize(values, least, most)
         rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT, LoopValues, attitude_solution
-from mambo_codegen.methods.quadratic.law import STATES, LawSolution, axis_law, law_states
+from mambo_codegen.methods.quadratic.law import STATES, LawSolution, axis_law
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_small, reciprocal
 from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, has_thrust_vector
@@ -127,7 +127,7 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         thrust_row=rows[0, [0, 2, 3]],
         lagged_row=rows[2, 2:],
         rows=law,
-        states=tuple(name for name in law_states(settings) if name != "i"),
+        states=tuple(name for name in STATES if name != "i"),
         ratio=_solution(settings, height).ratio,
         gain=gain,
         learn=height.learn,

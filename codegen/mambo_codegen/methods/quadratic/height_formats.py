@@ -57,7 +57,6 @@ def vertical_bounds(
         "v": corrected + speed,
         "w": learnt + target,
         "j": jerk,
-        "p": ranges.thrust_acceleration_max_m_s2,
         "a": limit,
         "c": limit,
         "u": limit,

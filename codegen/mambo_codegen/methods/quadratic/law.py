@@ -16,7 +16,6 @@ the state, [e, v, w, j, a, i, c, u_k-1]; the limits of the command cut it off.
 
 import math
 from dataclasses import dataclass
-from itertools import count
 from typing import Any, Final
 
 import numpy as np
@@ -34,14 +33,10 @@ from mambo_codegen.methods.shared.limits_constants import (
 from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
 from mambo_codegen.methods.shared.rate_feedback import lag_refusals
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import PREVIEW_TIMES
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
-PREVIEWED: Final = ("e", "v", "w", "p", "a", "i", "c", "u", *["p"] * PREVIEW_TIMES)
-"""The states with a preview: in place of the jerk the target's acceleration, now and ahead, in m/s^2; w is
-the disturbance alone."""
 MOVED: Final = ("e", "v", "a", "i", "c", "u")
 """The states that the command moves."""
 MOST_OUTAGE_STEPS: Final = 250
@@ -53,8 +48,8 @@ class LawConstants:
     """Constants of the law, float64, for lengths in m and times in steps of an update period.
 
     moves:          1, or 2 with a ramp.
-    rows:           (2, moves, 8 or 14) the unlimited minimum, the free moves in m/step^2, from the state,
-                    `law_states`; axis 0 is right (roll), axis 1 forward (pitch).
+    rows:           (2, moves, 8) the unlimited minimum, the free moves in m/step^2, from the state,
+                    `STATES`; axis 0 is right (roll), axis 1 forward (pitch).
     ratios:         (2,) H12/H11 of the second derivatives H of the cost by two moves: by how much the best
                     first move falls when the second rises; 0 for one move.
     spectral_radius: (2,) of the closed loop without limits.
@@ -84,17 +79,6 @@ class LawSolution:
     def spectral_radius(self) -> float:
         """The largest absolute eigenvalue of the closed loop."""
         return float(np.max(np.abs(np.linalg.eigvals(np.array(self.closed_loop)))))
-
-
-def law_states(settings: Sections) -> tuple[str, ...]:
-    """Return the names of the states that a row multiplies."""
-    return PREVIEWED if settings.target.acceleration == "preview" else STATES
-
-
-def state_names(settings: Sections) -> tuple[str, ...]:
-    """Return the names of the same in nmpc.c: of accelerations ahead with their numbers."""
-    numbers = count()
-    return tuple(f"p{next(numbers)}" if name == "p" else name for name in law_states(settings))
 
 
 def law_constants(settings: Sections) -> LawConstants:
@@ -136,15 +120,15 @@ def axis_law(
     settings: Sections, response_time_s: float, velocity_weight_s: float, loop: LoopValues
 ) -> LawSolution:
     """Return the law along an axis whose acceleration answers its command by `loop`."""
-    horizon, previews = settings.horizon, settings.target.acceleration == "preview"
+    horizon = settings.horizon
     inputs = horizon.update_period_s, horizon.ramp_s, response_time_s, velocity_weight_s, loop
 
     def solve() -> dict[str, Any]:
         from mambo_codegen.methods.quadratic.solutions import solve_law  # noqa: PLC0415 - imports mpmath
 
-        return solve_law(*inputs, previews=previews)
+        return solve_law(*inputs)
 
-    return LawSolution(**keep("previewed law" if previews else "law", inputs, solve))
+    return LawSolution(**keep("law", inputs, solve))
 
 
 def limits(settings: Sections) -> LimitsConstants | None:

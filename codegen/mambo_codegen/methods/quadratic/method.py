@@ -15,8 +15,8 @@ from mambo_codegen.methods.quadratic.controller import QuadraticController, Quad
 from mambo_codegen.methods.quadratic.height_constants import height_context
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
-from mambo_codegen.methods.quadratic.law import state_names
-from mambo_codegen.methods.quadratic.optimizer import row_quantities
+from mambo_codegen.methods.quadratic.law import STATES
+from mambo_codegen.methods.quadratic.optimizer import ROW_QUANTITIES
 from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.step_choices import step_choices
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
@@ -156,10 +156,10 @@ class Quadratic(QuadraticConstants, Method):
             "most_noise": MOST_NOISE,
             "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),
-            "row_quantities": row_quantities(self),
-            "height_quantities": [name for name in row_quantities(self) if name != "row_i"],
-            "row_names": state_names(self.settings),
-            "height_names": [name for name in state_names(self.settings) if name != "i"],
+            "row_quantities": ROW_QUANTITIES,
+            "height_quantities": [name for name in ROW_QUANTITIES if name != "row_i"],
+            "row_names": STATES,
+            "height_names": [name for name in STATES if name != "i"],
             "stored_limits": _stored_limits(self),
             "attitude_shares": [
                 period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)

@@ -1,24 +1,24 @@
 """Optimizer of the quadratic cost: its minimum in a box, along both axes of the heading."""
 
+from typing import Final
+
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.law import law_states
+from mambo_codegen.methods.quadratic.law import STATES
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real, clamp
 
-
-def row_quantities(constants: QuadraticConstants) -> tuple[str, ...]:
-    """Return the quantity of each gain of a row."""
-    return tuple(f"row_{state}" for state in law_states(constants.settings))
+ROW_QUANTITIES: Final = tuple(f"row_{state}" for state in STATES)
+"""The quantity of each gain of a row."""
 
 
 class QuadraticOptimizer:
     """The constants of the minimum, in the scalar type of the controller."""
 
     def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic, limit: Real) -> None:
-        numbers, law, quantities = arithmetic.numbers, constants.law, row_quantities(constants)
+        numbers, law, quantities = arithmetic.numbers, constants.law, ROW_QUANTITIES
         self._products = arithmetic
         self._limit = limit
         self._rows = np.array(
@@ -35,7 +35,7 @@ class QuadraticOptimizer:
         """Of the last moves (n, 4): whether no limit decided each, and whether the second row did."""
 
     def minimize(self, state: Real, limit: Real | None = None) -> Real:
-        """Return the first free move (n, 2), right and forward, from states (n, 2, k) of `law_states`.
+        """Return the first free move (n, 2), right and forward, from states (n, 2, k) of `STATES`.
 
         limit, (2,) or (n, 2), is that of the moves; None for that of the settings.
         """

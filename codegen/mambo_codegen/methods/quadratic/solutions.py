@@ -7,17 +7,12 @@ import math
 from typing import Any, Final
 
 from mambo_codegen.methods.quadratic.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
-from mambo_codegen.numbers.representation import PREVIEW_PERIOD_S, PREVIEW_TIMES
 
 Rows = list[list[float]]
 LoopValues = tuple[float, float, float, float]
 """The arguments of `_Loop`."""
 
 _COMMAND: Final = 7
-_FIRST: Final = 8
-_SECOND: Final = 9
-_AHEAD: Final = 10
-"""Indices of the free moves, and of the first acceleration of a preview, behind the states."""
 _MOVED: Final = (0, 1, 4, 5, 6, 7)
 """Indices of the command and of the states `MOVED` among `law.STATES`."""
 _JERK_POLE_1_S: Final = 1
@@ -57,19 +52,12 @@ def solve_law(
     response_time_s: float,
     velocity_weight_s: float,
     loop: LoopValues,
-    *,
-    previews: bool = False,
 ) -> dict[str, Any]:
-    """Return the members of the `LawSolution` of an axis whose attitude loop is `loop`.
-
-    previews: whether the law knows the accelerations that the target will have.
-    """
+    """Return the members of the `LawSolution` of an axis whose attitude loop is `loop`."""
     law = _Law(mp.mpf(update_period_s), response_time_s, velocity_weight_s, _Loop(*loop))
     ramp = round(ramp_s / update_period_s)
     rows, curvature = law.two_moves(ramp) if ramp else (law.one_move(), None)
     scale = law.scale()
-    if previews:
-        rows, scale = law.previewed(ramp, curvature), law.previewed_scale()
     return {
         "rows": [[float(rows[move, k] * scale[k]) for k in range(rows.cols)] for move in range(rows.rows)],
         "ratio": 0.0 if curvature is None else float(curvature[0, 1] / curvature[0, 0]),
@@ -82,7 +70,7 @@ class _Law:
     """The law along one axis."""
 
     def __init__(self, period_s: Any, response_time_s: float, velocity_weight_s: float, loop: _Loop) -> None:
-        self._period_s, self._loop, self._spacing_s = period_s, loop, mp.mpf(str(PREVIEW_PERIOD_S))
+        self._period_s, self._loop = period_s, loop
         self._transition, self._input = _model(loop, period_s)
         self._state_cost = mp.zeros(8)
         self._state_cost[0, 0] = mp.mpf(1)
@@ -116,61 +104,6 @@ class _Law:
         curvature = form[8:, 8:]
         return -(mp.inverse(curvature) * form[8:, :8]), curvature
 
-    def previewed(self, ramp: int, curvature: Matrix | None) -> Matrix:
-        """Return the rows, in SI units, from the states of `law.PREVIEWED`.
-
-        Between the times of the preview the target's acceleration runs straight; behind them it goes on as a
-        tracked one, with the jerk of the last piece. Sums the cost from the end of preview and ramp back to
-        now, step by step, as a quadratic form of state, moves and accelerations; behind the ramp the command
-        is free in each step. `curvature`, the second derivatives by the moves, does not depend on a target.
-        """
-        count = PREVIEW_TIMES + 1
-        n, steps = _AHEAD + count, int(mp.ceil(PREVIEW_TIMES * self._spacing_s / self._period_s))
-        form, gain = mp.zeros(n), mp.zeros(1, n)
-        form[:8, :8] = self._to_go
-        for step in reversed(range(max(steps, ramp + 1))):
-            if step == steps - 1:
-                form = self._ending(n).T * form * self._ending(n)
-            transition, cost, change = mp.eye(n), mp.zeros(n), mp.zeros(1, n)
-            transition[:8, :8], cost[:8, :8] = self._transition, self._state_cost
-            if step < steps:
-                transition[:2, _AHEAD:] = self._led(step)
-            if 0 < ramp >= step:
-                moved, held, share = (
-                    (_FIRST, _COMMAND, 1) if step == 0 else (_SECOND, _FIRST, mp.mpf(1) / ramp)
-                )
-                change[moved], change[held] = share, -share
-                transition[:8, :] += self._input * change
-                cost += self._input_cost[0] * (change.T * change)
-            weighted = self._input.T * form[:8, :] * transition
-            pivot = self._input_cost[0] + (self._input.T * form[:8, :8] * self._input)[0]
-            form = sum_costs(transition, cost, form, 1)
-            if ramp == 0 or step > ramp:
-                gain = weighted / pivot
-                form -= pivot * (gain.T * gain)
-        rows = -gain if curvature is None else -(mp.inverse(curvature) * form[_FIRST:_AHEAD, :])
-        rows[0, _COMMAND] += curvature is None
-        columns = [*range(3), _AHEAD, *range(4, 8), *range(_AHEAD + 1, n)]
-        return mp.matrix([[rows[move, column] for column in columns] for move in range(rows.rows)])
-
-    def _led(self, step: int) -> Matrix:
-        """Return how position and velocity of the error change in a step by the accelerations ahead."""
-        changes = mp.zeros(2, PREVIEW_TIMES + 1)
-        for end, shares in ((step, (3, 2)), (step + 1, (6, 2))):
-            time = min(end * self._period_s / self._spacing_s, mp.mpf(PREVIEW_TIMES))
-            before = min(int(time), PREVIEW_TIMES - 1)
-            for k, weight in ((before, before + 1 - time), (before + 1, time - before)):
-                changes[0, k] -= weight / shares[0] * self._period_s**2
-                changes[1, k] -= weight / shares[1] * self._period_s
-        return changes
-
-    def _ending(self, n: int) -> Matrix:
-        """Return what makes the last accelerations of the preview the disturbance and the jerk behind it."""
-        ending = mp.eye(n)
-        ending[2, n - 1] = mp.mpf(-1)
-        ending[3, n - 1], ending[3, n - 2] = 1 / self._spacing_s, -1 / self._spacing_s
-        return ending
-
     def closed_loop(self, rows: Matrix) -> Matrix:
         """Return the transition of the states `MOVED`, without the limits of the command."""
         change = rows[0, :8].copy()
@@ -187,11 +120,6 @@ class _Law:
         integral = 1 / share if share else mp.mpf(0)
         one = mp.mpf(1)
         return [period_s**2, period_s, one, 1 / period_s, one, integral, one, one]
-
-    def previewed_scale(self) -> list[Any]:
-        """Return the same for rows of `law.PREVIEWED`, whose accelerations of the target are in m/s^2."""
-        scale, given = self.scale(), self._period_s**2
-        return [*scale[:3], given, *scale[4:], *[given] * PREVIEW_TIMES]
 
 
 def _model(loop: _Loop, period_s: Any) -> tuple[Matrix, Matrix]:

@@ -19,7 +19,6 @@ from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory, limits_law
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
-from mambo_codegen.numbers.representation import PREVIEW_TIMES
 
 _GROUNDED: Final = 9
 """The column of a state that says whether the drone touches the floor, if there is a height."""
@@ -69,7 +68,6 @@ class _Aim:
     """What n controllers aim at in a step.
 
     target: (n, 4 or more) less the height's columns, and within the limits.
-    ahead:  (n, 7, 2) accelerations of the target, now and in a preview; None without one.
     weight: (n,) by how much more tilts count with the next thrust than in hover; None if no more.
     missed: (n,) as in the memory.
     has_command: (n,) whether there is a new command.
@@ -77,7 +75,6 @@ class _Aim:
     """
 
     target: Real
-    ahead: Real | None
     motion: TargetMotion
     limits: LimitsMemory
     height: HeightState
@@ -111,7 +108,6 @@ class ControlStep:
             [constant(steps, "feedback") for steps in constants.feedback_steps]
         )
         self._level_columns = len(constants.level_target)
-        self._has_preview = constants.has_preview
         self._is_predicted = constants.settings.model.attitude == "predicted"
         self._no_estimate = constants.observer.outage_steps + 1
         """`missed` while the model brakes after an outage, and without limits from then on."""
@@ -250,10 +246,6 @@ class ControlStep:
         missed = self._count(memory.missed, inputs.has_state)
         columns, follows = self._level_columns, inputs.allows_command & (missed < self._no_estimate)
         level, upward = inputs.target[:, :columns], inputs.target[:, columns:]
-        ahead = None
-        if self._has_preview:
-            upward, ahead = upward[:, :3], upward[:, 3:].reshape(len(upward), PREVIEW_TIMES, 3)
-            upward = np.concatenate([upward, ahead[:, :, 2]], axis=1)
         height, limit_active = self.height.aim(
             lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
@@ -262,15 +254,8 @@ class ControlStep:
         )
         if self.tracker is not None:
             motion = choose(follows, self.tracker.update(motion, target[:, self.tracker.columns]), motion)
-        if ahead is not None:
-            now = target[:, None, 4:6]
-            bent = follows & (limits.active != 0)
-            ahead = np.where(bent[:, None, None], np.repeat(now, PREVIEW_TIMES, axis=1), ahead[:, :, :2])
-            ahead = np.concatenate([now, ahead], axis=1)
         weight = self.height.command_weight(height)
-        aim = _Aim(
-            target, ahead, motion, limits, height, weight, missed, has_command=follows, rests=follows & False
-        )
+        aim = _Aim(target, motion, limits, height, weight, missed, has_command=follows, rests=follows & False)
         if not self.limits.brake:
             return aim
         return self._end_outage(aim, estimate, limit_active)
@@ -289,7 +274,6 @@ class ControlStep:
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),
-            ahead=None if aim.ahead is None else np.where(overdue[:, None, None], 0, aim.ahead),
             motion=choose(overdue, unknown_motion(aim.motion.velocity_m_s), aim.motion),
             limits=replace(aim.limits, active=active),
             height=self.height.clear_target(aim.height, overdue),
@@ -346,12 +330,10 @@ class ControlStep:
 
         And whether what the thrust leaves limits one of them (n,).
         """
-        disturbance, led = self.observer.disturbance(estimate), [np.zeros_like(tilt)]
-        if aim.ahead is not None:
-            led = [self._to_heading(attitude, each) for each in aim.ahead.swapaxes(0, 1)]
+        disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(tilt)
         if self.tracker is not None:
             disturbance = disturbance - aim.motion.acceleration_m_step2
-            led = [self._to_heading(attitude, aim.motion.jerk_m_step2_update)]
+            jerk = self._to_heading(attitude, aim.motion.jerk_m_step2_update)
         errors = (
             estimate.position_m - aim.target[:, 0:2],
             estimate.velocity_m_step - self.products.speed_product(aim.target[:, 2:4]),
@@ -359,12 +341,11 @@ class ControlStep:
         )
         state = [
             *(self._to_heading(attitude, error) for error in errors),
-            led[0],
+            jerk,
             attitude.tilt if self._is_predicted else tilt,
             attitude.integral,
             attitude.lagged,
             attitude.command,
-            *led[1:],
         ]
         limit, spare = aim.limits.command_limit, self.height.spare(aim.height)
         if self.tilt_gain is not None:

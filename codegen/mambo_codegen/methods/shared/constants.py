@@ -17,8 +17,6 @@ from mambo_codegen.numbers.representation import (
     COMMAND,
     CONTACT,
     HEIGHT,
-    PREVIEW_NUMBERS,
-    PREVIEW_TIMES,
     STATE,
     TARGET,
     THRUST,
@@ -82,11 +80,6 @@ class Constants(ABC):
         return self.limiting is not None
 
     @property
-    def has_preview(self) -> bool:
-        """Whether the caller gives accelerations that the target will have."""
-        return self.settings.target.acceleration == "preview"
-
-    @property
     def has_height(self) -> bool:
         """Whether the controller has the height for a third axis, and commands the thrust."""
         return self.settings.height is not None
@@ -118,7 +111,7 @@ class Constants(ABC):
         if not self.has_height:
             return level
         upward = THRUST if len(level) > len(TARGET) else ()
-        return (*level, *HEIGHT, *upward, *THRUST * (PREVIEW_NUMBERS * self.has_preview))
+        return (*level, *HEIGHT, *upward)
 
     @property
     def command(self) -> tuple[str, ...]:
@@ -143,9 +136,7 @@ class Constants(ABC):
         is_given = self.settings.target.gives_acceleration
         level = _pairs("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
         upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
-        times = range(PREVIEW_TIMES * self.has_preview)
-        ahead = (f"preview_m_s2[{time}][{axis}]" for time in times for axis in range(3))
-        return (*level, *upward, *ahead) if self.has_height else level
+        return (*level, *upward) if self.has_height else level
 
     @property
     def limits_members(self) -> tuple[str, ...]:

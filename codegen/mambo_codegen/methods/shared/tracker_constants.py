@@ -90,10 +90,10 @@ def tracker_constants(
 ) -> TrackerConstants | None:
     """Derive the constants of the tracker for the prediction step tau; None if `settings` have none.
 
-    A target with a preview is not tracked: it says where it goes. `jump_m_s2` is the acceleration from which
+    `jump_m_s2` is the acceleration from which
     on the target has jumped; None for what the tilt limit gives.
     """
-    if settings.target.acceleration in ("none", "preview"):
+    if settings.target.acceleration == "none":
         return None
     is_given, ranges = settings.target.acceleration == "given", settings.ranges
     update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain

@@ -144,7 +144,7 @@ def native_faulty(
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
         record.controller, record.self = inner.step, inner.instance(row)
-        record.commands_thrust, record.has_preview = inner.commands_thrust, inner.has_preview
+        record.commands_thrust = inner.commands_thrust
         record.computed = pointer("double *", history)
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))

@@ -9,7 +9,6 @@ import numpy as np
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
-from mambo_codegen.numbers.representation import PREVIEW_NUMBERS
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -83,13 +82,13 @@ def linear_controller(settings: Settings, load: float = 1.0) -> LinearController
 
 
 def _hover(settings: Settings) -> tuple[FloatArray, FloatArray]:
-    """Return state and target at rest at the origin; with a height (1, 10) and (1, 27), the target midway.
+    """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), the target midway.
 
     That is between floor and ceiling; `_learn` moves the state there.
     """
     if settings.height is None:
         return np.zeros((1, 7)), np.zeros((1, 6))
-    state, target, fence = np.zeros((1, 10)), np.zeros((1, 9 + PREVIEW_NUMBERS)), settings.limits.fence
+    state, target, fence = np.zeros((1, 10)), np.zeros((1, 9)), settings.limits.fence
     target[:, 6] = (fence.floor_m + fence.ceiling_m) / 2.0
     return state, target
 

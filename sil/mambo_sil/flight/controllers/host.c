@@ -13,11 +13,7 @@
 #define LEVEL_NUMBERS 4
 #endif
 #ifdef NMPC_HAS_HEIGHT
-#ifdef NMPC_PREVIEW_TIMES
-#define TARGET_NUMBERS (LEVEL_NUMBERS + (LEVEL_NUMBERS / 2) + (3 * NMPC_PREVIEW_TIMES))
-#else
 #define TARGET_NUMBERS (LEVEL_NUMBERS + (LEVEL_NUMBERS / 2))
-#endif
 #define COMMAND_NUMBERS 3
 #define AXES 3
 #define LIMITS_NUMBERS 11
@@ -162,7 +158,7 @@ static nmpc_real_t number_of(double value, int bits)
 #endif
 
 /* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
- * of a state, whose last is not 0 on the floor, and 9 of a target, behind which a preview stands; a thrust that is no
+ * of a state, whose last is not 0 on the floor, and 9 of a target; a thrust that is no
  * NaN is the reported one. It returns the next one behind the angles. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
                        double thrust_acceleration_m_s2, double *command)
@@ -196,11 +192,6 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     wanted.climb_m_s = NUMBER(target[7], VELOCITY);
 #ifdef NMPC_HAS_TARGET_ACCELERATION
     wanted.climb_acceleration_m_s2 = NUMBER(target[8], THRUST);
-#endif
-#ifdef NMPC_PREVIEW_TIMES
-    for (i = 0; i < (3 * NMPC_PREVIEW_TIMES); i++) {
-        wanted.preview_m_s2[i / 3][i % 3] = NUMBER(target[9 + i], THRUST);
-    }
 #endif
     status = nmpc_step((nmpc_t *)self, &measured, &wanted, &given);
     command[2] = THRUST_M_S2(given.thrust_m_s2);

@@ -2,7 +2,6 @@
 
     state  [x, y, vx, vy, roll, pitch, yaw, height, climb, contact with the floor]   (n, 10)
     target [x, y, vx, vy, ax, ay, height, climb, vertical acceleration]              (n, 9)
-           and with a preview [ax, ay, vertical acceleration] at each of its times   (n, 27)
     thrust what the drones got in the last update period over the nominal mass       (n,)
 
 The thrust is NaN where it is what the controller had commanded.
@@ -66,7 +65,7 @@ class ThrustController:
 
     def wrap(self, _engine: Any, inner: Any) -> Any:
         """Return the same in the engine: `nmpc_host_step` has this interface."""
-        return replace(inner, commands_thrust=True, has_preview=has_preview(self))
+        return replace(inner, commands_thrust=True)
 
 
 def adapted(controller: Any) -> Any:
@@ -90,12 +89,6 @@ def commands_thrust(controller: Any) -> bool:
             return False
         controller = controller.controller
     return True
-
-
-def has_preview(controller: Any) -> bool:
-    """Return whether a controller knows the accelerations that its target will have."""
-    settings = getattr(innermost(controller), "settings", None)
-    return settings is not None and settings.target.acceleration == "preview"
 
 
 def hover_command(controller: Any) -> tuple[float, ...]:

@@ -74,12 +74,12 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
     const int active = (faulty->begin <= faulty->update) && (faulty->update < faulty->end);
     const int dropped = active && (faulty->drop_every > 0) && ((since % faulty->drop_every) == 0);
     const size_t states = (faulty->commands_thrust ? 10U : 7U) * sizeof(double);
-    const size_t targets = (faulty->has_preview ? 27U : (faulty->commands_thrust ? 9U : 6U)) * sizeof(double);
+    const size_t targets = (faulty->commands_thrust ? 9U : 6U) * sizeof(double);
     double *computed = faulty->computed + (3 * (faulty->update % depth));
     const double *before = faulty->computed + (3 * ((faulty->update + faulty->late_updates) % depth));
     const double *sent = computed;
     double given[10];
-    double aimed[27];
+    double aimed[9];
     double answer[3] = { 0.0, 0.0, 0.0 };
     int64_t status;
     int i;

@@ -25,7 +25,7 @@ from mambo_sil.flight.controllers.pd import (
     PdFeedForwardController,
     PidFeedForwardController,
 )
-from mambo_sil.flight.controllers.thrust_controller import commands_thrust, has_preview, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import commands_thrust, numbers_of
 from mambo_sil.flight.engine.engine_library import ffi
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PdName
@@ -46,7 +46,6 @@ class Native:
 
     kept: whatever the instances point to, which lives as long as this record.
     commands_thrust: whether they command the thrust.
-    has_preview: whether they know the accelerations that their targets will have.
     """
 
     step: Any
@@ -54,7 +53,6 @@ class Native:
     stride: int
     kept: tuple[Any, ...] = ()
     commands_thrust: bool = False
-    has_preview: bool = False
 
     def instance(self, index: int) -> Any:
         """Return a pointer to the instance of flight `index`."""
@@ -147,7 +145,7 @@ def called_back(
     is not called any more.
     """
     has_thrust, errors = commands_thrust(controller), list[BaseException]()
-    targets = flight.targets_for(commands_thrust=has_thrust, has_preview=has_preview(controller))
+    targets = flight.targets_for(commands_thrust=has_thrust)
     updates, done = len(targets), 0
 
     def step(_self: Any, state: Any, target: Any, thrust_m_s2: float, command: Any) -> int:
@@ -167,7 +165,7 @@ def called_back(
         errors.append(error.with_traceback(traceback))
 
     function = ffi.callback("engine_controller_t", step, error=NOT_CALLED, onerror=keep)
-    return Native(function, ffi.NULL, 0, (function,), has_thrust, has_preview(controller)), errors
+    return Native(function, ffi.NULL, 0, (function,), has_thrust), errors
 
 
 def _row(numbers: Any, columns: int) -> FloatArray:

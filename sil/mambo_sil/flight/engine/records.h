@@ -22,7 +22,7 @@ typedef struct {
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
     int64_t commands_thrust;  /* whether the controllers command the thrust */
-    int64_t target_columns;   /* of a row of targets: 6, 9 if courses have heights, 27 with a preview */
+    int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
 
     double step_s;            /* a tick */
     double gravity_m_s2;
@@ -281,7 +281,6 @@ typedef struct {
     engine_controller_t controller;
     void *self;
     int64_t commands_thrust;  /* whether the controller commands the thrust */
-    int64_t has_preview;      /* whether its targets have one */
     int64_t effect;
     double values[10];
     int64_t columns[2];

@@ -45,13 +45,10 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(
-    flight: Flight, times_s: FloatArray, *, commands_thrust: bool = False, has_preview: bool = False
-) -> Record:
+def simulation_record(flight: Flight, times_s: FloatArray, *, commands_thrust: bool = False) -> Record:
     """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
 
-    `commands_thrust` says whether the controllers command the thrust, `has_preview` whether they know the
-    accelerations that their targets will have.
+    `commands_thrust` says whether the controllers command the thrust.
     """
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
@@ -78,9 +75,7 @@ def simulation_record(
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
             "commands_thrust": commands_thrust,
-            "target_columns": flight.targets_for(
-                commands_thrust=commands_thrust, has_preview=has_preview
-            ).shape[2],
+            "target_columns": flight.targets_for(commands_thrust=commands_thrust).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,

@@ -169,11 +169,9 @@ class _Simulation:
 
     def fly(self, first: int, called: Native, record: Any, place: int) -> None:
         """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
-        flight, wants = (
-            self._flight,
-            {"commands_thrust": called.commands_thrust, "has_preview": called.has_preview},
-        )
-        common, targets = self._records(**wants), flight.targets_for(**wants)
+        flight, has_thrust = self._flight, called.commands_thrust
+        common = self._records(commands_thrust=has_thrust)
+        targets = flight.targets_for(commands_thrust=has_thrust)
         common["flights"] = place + min(self.lanes, flight.flights - first)
         self._engine.engine_fly(
             pointer("engine_simulation_t *", common),

@@ -43,7 +43,6 @@ EXACT_THRUST: Final = 2.5
 ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
     "tracked": "Removes most of the tracking error on curves",
     "given": "By the program, which knows the curve",
-    "preview": "By the program, which knows the curve, now and up to 0.3 s ahead",
 }
 """Why the settings take the target's acceleration from there."""
 

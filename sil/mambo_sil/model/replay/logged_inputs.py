@@ -121,10 +121,6 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     have times of their own, each is of the nearest update. Raises LogError.
     """
     is_given, commands_thrust = settings.target.acceleration == "given", settings.height is not None
-    if settings.target.acceleration == "preview":
-        raise LogError(
-            ('target.acceleration = "preview" cannot be replayed: no log has what came; write "given"',)
-        )
     wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
     wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if commands_thrust else ()
     measured = (*STATE, *HEIGHT_STATE) if commands_thrust else STATE

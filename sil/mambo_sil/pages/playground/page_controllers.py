@@ -47,7 +47,7 @@ class PageController:
 def page_controllers(sources: Sequence[str]) -> tuple[PageController, ...]:
     """Return the controllers of `sources`: laws without a model, presets, settings files, folders of bundles.
 
-    Raises FlightError for too many, one twice, a preview, or different update periods, and what
+    Raises FlightError for too many, one twice, or different update periods, and what
     `presets.load` raises.
     """
     if len(sources) > MOST:
@@ -57,12 +57,6 @@ def page_controllers(sources: Sequence[str]) -> tuple[PageController, ...]:
         raise FlightError(f"playground: {echo(twice)} is named twice; name each controller once")
     found = tuple(_page_controller(source) for source in sources)
     generated = [one for one in found if isinstance(one.kind, Settings)]
-    for one in found:
-        if isinstance(one.kind, Settings) and one.kind.target.acceleration == "preview":
-            raise FlightError(
-                f'{echo(one.source)}: target.acceleration = "preview" must be "given" or "tracked": '
-                "the target of the page does not say what comes"
-            )
     for other in generated[1:]:
         if period_s([other]) != period_s(generated):
             raise FlightError(
