@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mambo_sil.flight.height_profiles import (
     UpAndDown,
     helix_climb,
 )
+from mambo_sil.flight.names import IN_SPACE, SIZED, TIMED, CurveName
 from mambo_sil.flight.trajectories import CURVES as CURVES_BY_NAME
 from mambo_sil.flight.trajectories import (
     Bernoulli,
@@ -281,6 +283,23 @@ def test_heights_go_where_their_names_say() -> None:
     np.testing.assert_allclose(step[:, 0], HOVER_HEIGHT_M - 0.5 * np.array([0, 0, 1, 1, 1, 0, 0, 0]))
     np.testing.assert_allclose(landing[:, 0], [0, 0, 0, 1.2, 1.2, 1.2, 0, 0], atol=1e-15)
     np.testing.assert_allclose(landing[:, 1:], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", CURVES_BY_NAME)
+def test_lists_of_names_say_what_a_curve_has(name: CurveName) -> None:
+    """A height, a size, an angular rate."""
+
+    def flown(size_m: float, rate_rad_s: float) -> list[Any]:
+        curve = CURVES_BY_NAME[name](size_m, rate_rad_s)
+        return [curve.target(TIMES_S), vertical_of(curve, TIMES_S)]
+
+    def differs(size_m: float, rate_rad_s: float) -> bool:
+        pairs = zip(flown(1.0, 1.0), flown(size_m, rate_rad_s), strict=True)
+        return not all(np.array_equal(one, other) for one, other in pairs)
+
+    assert is_spatial(CURVES_BY_NAME[name](1.0, 1.0)) is (name in IN_SPACE)
+    assert differs(2.0, 1.0) is (name in SIZED)
+    assert differs(1.0, 2.0) is (name in TIMED)
 
 
 def test_level_and_spatial_trajectories_fly_together() -> None:

@@ -2,20 +2,9 @@
 
 from typing import Any, Final, Literal, get_args
 
-CurveName = Literal[
-    "bernoulli",
-    "gerono",
-    "lissajous",
-    "circle",
-    "hover",
-    "step",
-    "tilted-circle",
-    "helix",
-    "swinging-eight",
-    "height-step",
-    "take-off-and-landing",
-]
-"""Level curves, then curves in space."""
+LevelCurveName = Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"]
+SpaceCurveName = Literal["tilted-circle", "helix", "swinging-eight", "height-step", "take-off-and-landing"]
+CurveName = Literal[LevelCurveName, SpaceCurveName]
 Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
 SensorsKind = Literal["true", "mocap", "flow-deck", "autopilot", "mambo"]
@@ -53,12 +42,12 @@ SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 ALTITUDE_NAMES: Final[tuple[AltitudeName, ...]] = get_args(AltitudeName)
-IN_SPACE: Final = CURVE_NAMES[6:]
+IN_SPACE: Final[tuple[SpaceCurveName, ...]] = get_args(SpaceCurveName)
 """Curves with a height."""
 _UNTIMED: Final = ("hover", "step", "height-step", "take-off-and-landing")
 TIMED: Final = tuple(name for name in CURVE_NAMES if name not in _UNTIMED)
 """Curves with an angular rate."""
-SIZED: Final = (*TIMED, *_UNTIMED[1:])
+SIZED: Final = tuple(name for name in CURVE_NAMES if name != "hover")
 """Curves with a size."""
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"
