@@ -253,7 +253,7 @@ def test_replaced_file_keeps_its_owner(folder: Path) -> None:
 
 
 def test_files_that_a_bundle_no_longer_has_go_and_edited_ones_stay(folder: Path) -> None:
-    """A folder of version 0.1 loses its own sources in src/ and include/, and keeps what was edited."""
+    """A folder loses its own files, and keeps what was edited."""
     (folder / "src" / "a.c").write_text("mine", "utf-8")
     new = {"README.md": "one", "nmpc.h": "one", "nmpc.c": "one"}
     changes = bundle.write(new, folder)

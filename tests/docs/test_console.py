@@ -39,7 +39,6 @@ NOT_RUN = {
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/design.md": ("it installs",),
     "how-to/footprint.md": ("needs a board, or QEMU with its firmware",),
-    "how-to/upgrade.md": ("needs files of 0.1",),
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/libraries.md": ("needs arduino-cli", "needs PlatformIO", "needs ESP-IDF"),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),

@@ -68,11 +68,6 @@ def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
     assert read_record(tmp_path / "flight.json") == record
 
 
-def test_the_older_name_of_the_true_state_is_read() -> None:
-    """In records of version 0.1 the true state is "none"."""
-    assert Scenario.model_validate({"sensors": "none"}) == Scenario(sensors="true")
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

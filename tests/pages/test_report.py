@@ -323,13 +323,10 @@ def test_what_is_no_result_is_named_and_nothing_written(change: Callable[[Path],
 
 
 def test_a_campaign_whose_flights_cannot_be_read_is_refused() -> None:
-    """Text instead of a database; and the CSV without a database, as version 0.1 wrote it."""
+    """Text instead of a database."""
     database = Path(made("campaign"), DATABASE)
     database.write_text("flight,seed\n" * 100)
     assert "flights.sqlite: cannot be read as the database of a campaign" in run("campaign", code=2)
-    database.rename("campaign/flights.csv")
-    said = run("campaign", code=2).replace("\n", " ")
-    assert "campaign: has flights.csv without flights.sqlite, as mambo-nmpc 0.1 wrote it; report it" in said
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import Metrics, measure
-from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start, present_sensors
+from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -86,7 +86,6 @@ def fly(
     require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
     require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
     require_number("duration_s", duration_s, 0.0, LONGEST_S)
-    sensors = present_sensors(sensors)
     require_choice("sensors", sensors, SENSORS_NAMES)
     require_choice("start", start, STARTS)
     given = _as_seeds(seeds)

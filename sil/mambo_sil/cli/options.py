@@ -13,7 +13,6 @@ from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, U
 from mambo_codegen.plain_file import find_obstacle
 from mambo_codegen.settings.toml_file import BOARDS, PRESETS
 from mambo_sil.drone.vehicles import VEHICLES
-from mambo_sil.flight.names import present_sensors
 from mambo_sil.results.terminal import result_text
 
 if TYPE_CHECKING:
@@ -74,13 +73,12 @@ Workers = Annotated[
 
 
 def sensors_option(names: Sequence[str], about: str) -> Any:
-    """Return the option that chooses sensors by name, of which older ones are read."""
+    """Return the option that chooses sensors by name."""
 
     def read(text: str) -> str:
-        name = present_sensors(text)
-        if name not in names:
+        if text not in names:
             raise typer.BadParameter(f"{text!r} is not one of {', '.join(map(repr, names))}.")
-        return str(name)
+        return text
 
     return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=_completing(names))
 

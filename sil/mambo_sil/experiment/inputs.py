@@ -20,7 +20,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.flight.names import PD_NAMES, RENAMED, PdName
+from mambo_sil.flight.names import PD_NAMES, PdName
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -149,8 +149,6 @@ def _section(names: Sequence[str], model: type[FileSection]) -> Any:
 
 def _explain_unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
     """Return a message that a key does not exist, with similar keys that do."""
-    if names[-1] in RENAMED:
-        return f"{dotted} is called {RENAMED[names[-1]]} since version 0.2"
     keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]
     near = near or difflib.get_close_matches(names[-1], keys, n=1)

@@ -1,6 +1,6 @@
 """Names by which options and files choose what is flown; light to import."""
 
-from typing import Any, Final, Literal, get_args
+from typing import Final, Literal, get_args
 
 LevelCurveName = Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"]
 SpaceCurveName = Literal["tilted-circle", "helix", "swinging-eight", "height-step", "take-off-and-landing"]
@@ -59,17 +59,3 @@ PD_TITLES: Final[dict[str, str]] = {
     "pid-feedforward": PID_FEEDFORWARD,
 }
 """What tables and pictures call the laws without a model, by name."""
-
-RENAMED: Final = {
-    "wind_m_s2": "push_m_s2",
-    "push_n_s": "impulse_n_s",
-    "push_time_s": "impulse_time_s",
-    **{f"wind_{axis}_m_s2": f"push_{axis}_m_s2" for axis in "xy"},
-    **{f"push_{axis}_n_s": f"impulse_{axis}_n_s" for axis in "xyz"},
-}
-"""Keys of version 0.1 and their names now, for messages."""
-
-
-def present_sensors(name: Any) -> Any:
-    """Return the name that sensors have now; version 0.1 called the true state "none"."""
-    return "true" if name == "none" else name

@@ -8,12 +8,11 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -44,12 +43,11 @@ from mambo_sil.flight.names import (
     CurveName,
     SensorsName,
     Start,
-    present_sensors,
 )
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 2
-"""Version 0.1 wrote 1, with other keys."""
+"""Of a record: other keys have another number."""
 
 LARGEST_FILE_BYTES: Final = 1_000_000
 LARGEST_SEED: Final = 2**63 - 1
@@ -142,7 +140,7 @@ class Scenario(_Record):
     altitude_loop: AltitudeName = "stock"
     """What holds the height: the vehicle's loop, that with feed-forward, or a PID with feed-forward."""
 
-    sensors: Annotated[SensorsName, BeforeValidator(present_sensors)] = "true"
+    sensors: SensorsName = "true"
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of all sensor noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)

@@ -211,8 +211,6 @@ BAD = {
     "draws = 3": "draws = 3 must be a section; write [draws] and its keys below",
     "[draws]\nmas_kg = 1": "draws.mas_kg is not a parameter; did you mean mass_kg?",
     "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_speed_m_s, wind_direction_rad",
-    "[draws]\nwind_x_m_s2 = 3": "draws.wind_x_m_s2 is called push_x_m_s2 since version 0.2",
-    "[draws]\npush_z_n_s = 3": "draws.push_z_n_s is called impulse_z_n_s since version 0.2",
     "[draws]\nmass_kg = 60": "draws.mass_kg = 60 must lie in 0.01..1",
     "[draws]\nmass_kg = nan": "draws.mass_kg = NaN must lie in 0.01..1",
     "[draws]\nmass_kg = { uniform = [0.08, 0.06] }": "[0.08, 0.06] } must have the lower limit first",

@@ -336,14 +336,14 @@ def test_an_edited_csv_is_written_anew(source: Path, whole: Path, folder: Path) 
 
 
 def test_a_campaign_of_another_version_is_refused(source: Path, folder: Path) -> None:
-    """Version 0.1 had no database: the message names the version and what to do, and no file changes."""
+    """The message names the version and what to do, and no file changes."""
     (folder / DATABASE).unlink()
     identity = json.loads((folder / "campaign.json").read_text())
-    (folder / "campaign.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0"}))
+    (folder / "campaign.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.2.0"}))
     before = contents(folder)
     said = run("campaign", str(source), "--flights", str(FLIGHTS), "-o", str(folder), code=2)[1]
     assert said.endswith(
-        "out: holds a campaign of mambo-nmpc 0.1.0, which this version does not read; "
+        "out: holds a campaign of mambo-nmpc 0.2.0, which this version does not read; "
         "go on with that version, or name another folder with -o\n"
     )
     assert contents(folder) == before

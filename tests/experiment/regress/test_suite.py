@@ -122,7 +122,6 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
     ("line", "message"),
     [
         ("yaw = 1.0", "yaw is not a key of this file; did you mean yaw_rad, yaw_rate_rad_s?"),
-        ("wind_m_s2 = [0.5, 0.0]", "wind_m_s2 is called push_m_s2 since version 0.2"),
         ("size_m = [1, 5000]", "size_m = [1, 5000] must be less than or equal to 1000; 5000 is not"),
         ("size_m = 5000", "size_m = 5000 must be less than or equal to 1000"),
         ("seed = 1.5", "seed = 1.5 must be a valid integer"),

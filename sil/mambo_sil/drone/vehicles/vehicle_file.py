@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, Final, Self, get_args
 
-from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_codegen.errors import InvalidSettingsError, echo
@@ -84,13 +84,6 @@ class VehicleFile(VehicleSection):
             thrust_max_n = min(4.0 * math.prod(figures), _LARGEST) or thrust_max_n
         gains = {"p_n_m": 10.0 * mass_kg, "d_n_s_m": 5.0 * mass_kg, "thrust_max_n": thrust_max_n}
         return {**document, "altitude": gains}
-
-    @field_validator("sensors", mode="before")
-    @classmethod
-    def _present_sensors(cls, section: Any) -> Any:
-        """Read the older name of the true state, "none"."""
-        is_old = isinstance(section, Mapping) and section.get("kind") == "none"
-        return {**section, "kind": "true"} if is_old else section
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

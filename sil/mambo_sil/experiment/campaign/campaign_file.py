@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pydantic import (
-    BeforeValidator,
     Field,
     PlainSerializer,
     PlainValidator,
@@ -33,7 +32,7 @@ from mambo_sil.experiment.campaign.parameters import (
     scenario_values,
 )
 from mambo_sil.experiment.inputs import Entrant, File, FileSection, load_drone, load_entrant, read_as
-from mambo_sil.flight.names import IN_SPACE, SENSORS_OF, AltitudeName, SensorsName, Start, present_sensors
+from mambo_sil.flight.names import IN_SPACE, SENSORS_OF, AltitudeName, SensorsName, Start
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
 _LONGEST_LIST: Final = 10
@@ -66,7 +65,7 @@ class FlightSection(FileSection):
     start: Start = "hover"
     vehicle: str = vehicle_toml.DEFAULT
     """A shipped drone, or its vehicle.toml."""
-    sensors: Annotated[SensorsName | None, BeforeValidator(present_sensors)] = None
+    sensors: SensorsName | None = None
     """None: the vehicle's own."""
     altitude_loop: AltitudeName = "stock"
     """What holds the height."""

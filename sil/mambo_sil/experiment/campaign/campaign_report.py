@@ -10,7 +10,6 @@ from pydantic import BaseModel
 
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import echo
-from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED
 from mambo_sil.experiment.campaign.campaign_records import record_name, write_records
@@ -24,7 +23,7 @@ from mambo_sil.experiment.campaign.statistics import (
     read_table,
     worst_flights,
 )
-from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
+from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, FlightStore, convert_os_errors
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.results.blocks import Block, CommandResult, Commands, Facts, Picture, ResultTable, Sentence
 from mambo_sil.results.folders import SUMMARY
@@ -59,10 +58,7 @@ class Drawn(BaseModel, extra="allow", frozen=True):
     def shown(
         self, folder: Path, good: bool | None, answer: list[str], blocks: Sequence[Block]
     ) -> CommandResult:
-        """Return a result with what a page shows of every campaign: its parameters and distributions.
-
-        Raises ResultsError for flights of version 0.1.
-        """
+        """Return a result with what a page shows of every campaign: its parameters and distributions."""
         flight = self.flight
         facts = {
             "trajectory": f"{flight.trajectory.text()}, {flight.size_m.text()} m, "
@@ -71,11 +67,6 @@ class Drawn(BaseModel, extra="allow", frozen=True):
             "sensors": str(flight.sensors),
             "seed": str(self.seed),
         }
-        if (folder / TABLE).is_file() and not (folder / DATABASE).is_file():
-            raise ResultsError(
-                f"{echo(str(folder))}: has {TABLE} without {DATABASE}, as mambo-nmpc 0.1 wrote it; "
-                "report it with that version, or run campaign again in another folder"
-            )
 
         def panels() -> list[Markup]:
             from mambo_sil.experiment.campaign.campaign_plots import distribution_panels  # noqa: PLC0415 - loaded when drawing
