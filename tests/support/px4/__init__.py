@@ -34,10 +34,11 @@ _TYPES: Final = {"bool": "bool", "uint": "uint{}_t", "float": "float"}
 _LOGGED: Final = {"bool": "uint8_t", "uint8_t": "uint8_t", "uint16_t": "uint16_t", "float": "float"}
 
 
-def px4_settings() -> Settings:
-    """Return the settings that `design crazyflie` writes, with a given acceleration of the target."""
+def px4_settings(acceleration: str = "given") -> Settings:
+    """Return the settings that `design crazyflie` writes, with the target's acceleration given or tracked."""
     text = controller_text(vehicle_toml.load("crazyflie"), "crazyflie")
-    return parse(text.replace('acceleration = "tracked"', 'acceleration = "given"'), "controller.toml")
+    found = text.replace('acceleration = "tracked"', f'acceleration = "{acceleration}"')
+    return parse(found, "controller.toml")
 
 
 def status_fields(message: str) -> tuple[dict[str, str], list[tuple[str, str, int]]]:

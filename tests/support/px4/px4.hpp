@@ -73,6 +73,17 @@ public:
 private:
 	float _angles[3];
 };
+class Dcmf
+{
+public:
+	explicit Dcmf(const Quatf &q) :
+		_rows{{1 - 2 * (q(2) *q(2) + q(3) *q(3)), 2 * (q(1) *q(2) - q(0) *q(3)), 2 * (q(1) *q(3) + q(0) *q(2))},
+		{2 * (q(1) *q(2) + q(0) *q(3)), 1 - 2 * (q(1) *q(1) + q(3) *q(3)), 2 * (q(2) *q(3) - q(0) *q(1))},
+		{2 * (q(1) *q(3) - q(0) *q(2)), 2 * (q(2) *q(3) + q(0) *q(1)), 1 - 2 * (q(1) *q(1) + q(2) *q(2))}} {}
+	float operator()(int row, int column) const { return _rows[row][column]; }
+private:
+	float _rows[3][3];
+};
 inline Quatf::Quatf(const Eulerf &euler)
 {
 	const float c[3] {cosf(euler.phi() / 2), cosf(euler.theta() / 2), cosf(euler.psi() / 2)};

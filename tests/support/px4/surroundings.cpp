@@ -29,7 +29,7 @@ Parameter *first_parameter;
 
 // What the pilot of the desk sets
 static uint8_t wanted_mode = POSITION, estimate_ms = 10, is_silent, is_invalid, has_sticks, has_trajectory, slow_ms, stops, is_indoors, flies_rates;
-static float hover = 0.6f, strength = 1.f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error;
+static float hover = 0.6f, strength = 1.f, sticks[4], jump[3], jump_velocity[3], jump_heading, roll_error, setpoint_x;
 
 // What they find
 static uint8_t nav_state = POSITION, can_run;
@@ -51,7 +51,7 @@ extern "C" const struct variable host_parameters[] = {
 	BYTE("rates", &flies_rates)
 	FLOAT("hover", &hover) FLOAT("strength", &strength) FLOAT("roll", &sticks[0]) FLOAT("pitch", &sticks[1]) FLOAT("yaw", &sticks[2]) FLOAT("throttle", &sticks[3])
 	FLOAT("jump_x", &jump[0]) FLOAT("jump_y", &jump[1]) FLOAT("jump_z", &jump[2]) FLOAT("jump_heading", &jump_heading) FLOAT("roll_error", &roll_error)
-	FLOAT("jump_vx", &jump_velocity[0]) FLOAT("jump_vy", &jump_velocity[1]) FLOAT("jump_vz", &jump_velocity[2])
+	FLOAT("setpoint_x", &setpoint_x) FLOAT("jump_vx", &jump_velocity[0]) FLOAT("jump_vy", &jump_velocity[1]) FLOAT("jump_vz", &jump_velocity[2])
 	FLOAT("SPEED", &stored_parameters[0]) FLOAT("BRAKE", &stored_parameters[1]) FLOAT("TILT", &stored_parameters[2])
 	FLOAT("CLIMB", &stored_parameters[3]) FLOAT("DESCENT", &stored_parameters[4]) FLOAT("X_MIN", &stored_parameters[5])
 	FLOAT("X_MAX", &stored_parameters[6]) FLOAT("Z_MIN", &stored_parameters[9]) FLOAT("Z_MAX", &stored_parameters[10])
@@ -228,7 +228,7 @@ static void receive(const setpoint_t &setpoint)
 		trajectory_setpoint_s &to = data_trajectory_setpoint;
 
 		last = setpoint.timestamp;
-		to = {0, {setpoint.position.x + offset[0], -setpoint.position.y + offset[1], -setpoint.position.z + offset[2]},
+		to = {0, {setpoint.position.x + offset[0] + setpoint_x, -setpoint.position.y + offset[1], -setpoint.position.z + offset[2]},
 			{setpoint.velocity.x, -setpoint.velocity.y, -setpoint.velocity.z},
 			{setpoint.acceleration.x, -setpoint.acceleration.y, -setpoint.acceleration.z},
 			matrix::wrap_pi(-2.f * atan2f(setpoint.attitudeQuaternion.z, setpoint.attitudeQuaternion.w) + offset_heading)

@@ -14,5 +14,6 @@ float fmaxf(float a, float b);
 float fminf(float a, float b);
 float remainderf(float a, float b);
 float sinf(float x);
+float sqrtf(float x);
 
 #endif

@@ -1,0 +1,161 @@
+"""Flight mode MPC on the desk, with the set-points of a companion: take-over, steps, low rates, bad ones."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.trajectories import Circle
+from tests.support.px4 import HOLD, MPC, Px4Desk, build_px4, px4_settings
+
+SEEDS = range(2)
+CIRCLE = Circle(1.0, 1.5)
+
+Places = Callable[[float], FloatArray]
+
+
+@pytest.fixture(scope="module", params=["given", "tracked"])
+def module(request: pytest.FixtureRequest) -> Path:
+    """Return the library of the module with the settings that `design crazyflie` writes."""
+    return build_px4(px4_settings(request.param))
+
+
+def at(x_m: float, y_m: float = 0.0) -> Places:
+    """Return a place to stay at, 1 m high: position, velocity and acceleration (3, 3) by time in s."""
+    motion = np.zeros((3, 3))
+    motion[0] = x_m, y_m, 1.0
+    return lambda _: motion
+
+
+def around(x_m: float, y_m: float) -> Places:
+    """Return a circle about a point, 1 m high."""
+
+    def motion(time_s: float) -> FloatArray:
+        place = [*CIRCLE.target(time_s), *CIRCLE.acceleration(time_s)]
+        return np.column_stack([np.reshape(place, (3, 2)), np.zeros(3)]) + at(x_m, y_m)(time_s)
+
+    return motion
+
+
+def watch(desk: Px4Desk, milliseconds: int) -> float:
+    """Let time pass; return the largest change of the attitude set-point from one to the next, in degrees."""
+    largest_deg, last_deg = 0.0, desk.angles_deg
+    for _ in range(milliseconds):
+        desk.run(1)
+        largest_deg = max(largest_deg, math.hypot(*(desk.angles_deg - last_deg)))
+        last_deg = desk.angles_deg
+    return largest_deg
+
+
+def send(
+    desk: Px4Desk, places: Places, duration_s: float, from_s: float = 0.0, period_ms: int = 10
+) -> tuple[float, FloatArray]:
+    """Send set-points; return the largest change of the attitude set-point, as `watch` does.
+
+    And the distances to where the companion's target is then, (n,) in m.
+    """
+    desk.set("px4.trajectory", 1)
+    largest_deg, distances = 0.0, []
+    for k in range(round(1000.0 * duration_s / period_ms)):
+        desk.full_state(places(from_s + 0.001 * period_ms * k))
+        largest_deg = max(largest_deg, watch(desk, period_ms))
+        there = places(from_s + 0.001 * period_ms * (k + 1))[0]
+        distances.append(math.hypot(*(desk.state.position_m - there)[:2]))
+    return largest_deg, np.array(distances)
+
+
+def test_a_take_over_in_hover_has_no_jump(module: Path) -> None:
+    """The set-points are 6 cm from where the drone hovers, to which it glides."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed).select(HOLD, 1000)
+        send(desk, at(0.05, 0.03), 0.5)
+        desk.set("px4.mode", MPC)
+        jump_deg, distances = send(desk, at(0.05, 0.03), 4.0)
+        assert jump_deg < 1.0
+        assert distances[-100:].max() < 0.01
+
+
+def test_a_take_over_by_a_target_that_moves_far_away_has_no_jump(module: Path) -> None:
+    """It is 2 m off, on a circle at 1.5 m/s; the drone joins it."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed).select(HOLD, 1000)
+        center = np.array([2.0, 0.0]) - CIRCLE.target(1.0)[:2]
+        send(desk, around(*center), 1.0)
+        desk.set("px4.mode", MPC)
+        jump_deg, distances = send(desk, around(*center), 10.0, from_s=1.0)
+        assert distances[0] == pytest.approx(2.0, abs=0.1)
+        assert jump_deg < 5.0
+        assert distances[500:].max() < 0.04
+
+
+def test_a_step_of_the_target_is_flown_as_a_glide(module: Path) -> None:
+    """3 m: nine tenths within 2.6 s, and not beyond; the attitude moves by less than 5 degrees at once."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed).select(MPC, 500)
+        send(desk, at(0.0), 1.0)
+        jump_deg, distances = send(desk, at(3.0), 8.0)
+        assert jump_deg < 5.0
+        assert distances[260] < 0.3
+        assert desk.state.position_m[0] == pytest.approx(3.0, abs=0.02)
+        assert distances[400:].max() < 0.05
+
+
+LATE = {500: (12.0, 0.4), 200: (10.0, 0.12), 50: (2.0, 0.04)}
+"""Largest change in degrees, largest distance in m, by the period of the set-points in ms."""
+
+
+@pytest.mark.parametrize("period_ms", LATE)
+def test_rare_set_points_are_carried_on(period_ms: int, module: Path) -> None:
+    """By their velocity and acceleration; where the next one is elsewhere the target glides there."""
+    most_deg, most_m = LATE[period_ms]
+    desk = Px4Desk(module).select(MPC, 500)
+    send(desk, around(0.0, 0.0), 4.0)
+    jump_deg, distances = send(desk, around(0.0, 0.0), 12.0, from_s=4.0, period_ms=period_ms)
+    assert jump_deg < most_deg
+    assert distances.max() < most_m
+
+
+def test_a_companion_that_falls_silent_leaves_a_target_that_brakes(module: Path) -> None:
+    """From 1.5 m/s without a jump, and within 4 m."""
+    desk = Px4Desk(module).select(MPC, 500)
+    send(desk, around(0.0, 0.0), 4.0)
+    desk.set("px4.trajectory", 0)
+    before = desk.state.position_m
+    assert watch(desk, 4000) < 3.0
+    assert np.abs(desk.state.velocity_m_s).max() < 0.05
+    assert math.hypot(*(desk.state.position_m - before)[:2]) < 4.0
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e30, -5000.0])
+def test_a_set_point_that_the_controller_cannot_take_stands_for_none(value: float, module: Path) -> None:
+    """The target brakes to a stop, and glides on when good ones come back."""
+    desk = Px4Desk(module).select(MPC, 500)
+    send(desk, at(0.5), 4.0)
+    desk.set("px4.setpoint_x", value)
+    jump_deg, distances = send(desk, at(0.5), 2.0)
+    desk.set("px4.setpoint_x", 0.5)
+    after_deg, _ = send(desk, at(0.5), 4.0)
+    assert max(jump_deg, after_deg) < 5.0
+    assert distances.max() < 0.02
+    assert desk.state.position_m[0] == pytest.approx(1.0, abs=0.02)
+    assert (desk["mode"], desk["s.take_overs"]) == (MPC, 1.0)
+
+
+@pytest.mark.parametrize(("follows", "farthest_m"), [(True, 0.02), (False, 0.22)])
+def test_a_companion_may_follow_the_estimator_s_jump_or_not(
+    follows: bool, farthest_m: float, module: Path
+) -> None:
+    """One that moves its set-points with the frame moves nothing; to those of another the drone glides."""
+    for seed in SEEDS:
+        desk = Px4Desk(module, seed).select(MPC, 500)
+        send(desk, at(0.0), 2.0)
+        desk.set("px4.jump_x", 0.2)
+        if not follows:
+            desk.set("px4.setpoint_x", -0.2)
+        jump_deg, distances = send(desk, at(0.0), 10.0)
+        assert jump_deg < 1.0
+        assert distances.max() < farthest_m
+        assert desk.state.position_m[0] == pytest.approx(0.0 if follows else -0.2, abs=0.01)
