@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_codegen.settings.controller_toml import to_toml
+from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
@@ -15,12 +15,19 @@ from tests.support.command import run
 from tests.support.px4 import HOLD, LAND, MPC, POSITION, Px4Desk, build_px4, px4_settings, status_ulog
 
 SEEDS = range(3)
+LITTLE_WIND = with_option(px4_settings(), "observer.disturbance_limit_m_s2", 1.0)
 
 
 @pytest.fixture(scope="module")
 def module() -> Path:
     """Return the library of the module with the settings that `design crazyflie` writes."""
     return build_px4(px4_settings())
+
+
+@pytest.fixture(scope="module")
+def in_little_wind() -> Path:
+    """Return the library of a module that learns no more than 1 m/s^2."""
+    return build_px4(LITTLE_WIND)
 
 
 def follow(desk: Px4Desk, curve: Bernoulli | Circle | Hover, duration_s: float) -> FloatArray:
@@ -270,6 +277,21 @@ def test_a_fault_gives_the_drone_back_to_hold_and_is_said_once(fault: str, modul
         desk.run(1000)
         assert [line for line in desk.console.splitlines() if line] == [f"GCS: MPC: {words}, hold"]
         assert desk["commands"] == 1.0
+
+
+@pytest.mark.parametrize(("roll_error", "is_pushed"), [(0.08, False), (0.2, True), (-0.2, True)])
+def test_a_drone_in_more_wind_than_it_learns_is_given_back(
+    roll_error: float, is_pushed: bool, in_little_wind: Path
+) -> None:
+    """After 2 s of a disturbance at its limit, 1 m/s^2, here by a tilt that PX4 sees and that moves nothing."""
+    desk = Px4Desk(in_little_wind).select(MPC, 1000)
+    desk.set("px4.roll_error", roll_error)
+    desk.run(2100)
+    assert desk["mode"] == MPC
+    desk.run(3000)
+    assert desk["mode"] == (HOLD if is_pushed else MPC)
+    assert desk["s.given_back"] == (10.0 if is_pushed else 0.0)
+    assert ("GCS: MPC: pushed away by more wind than in the settings, hold" in desk.console) == is_pushed
 
 
 def test_a_drone_without_a_global_position_is_given_back_to_position_mode(module: Path) -> None:
