@@ -77,15 +77,16 @@ def test_a_build_with_other_bits_is_refused() -> None:
     assert (desk["can_run"], desk["s.refusal"]) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize("wind_m_s", [0.0, 4.0])
-def test_the_pilot_may_switch_twenty_times(wind_m_s: float, module: Path) -> None:
-    """Without a bump of the attitude of more than 1 degree, in wind too, once PX4 holds the drone at rest."""
+@pytest.mark.parametrize(("wind_m_s", "most_deg"), [(0.0, 1.0), (4.0, 6.5)])
+def test_the_pilot_may_switch_twenty_times(wind_m_s: float, most_deg: float, module: Path) -> None:
+    """From rest without a bump of 1 degree; a lean of 6 against the wind is learnt anew."""
     for seed in SEEDS:
         desk = Px4Desk(module, seed, wind_m_s=(wind_m_s, 0.0))
         for count in range(20):
             before = desk.angles_deg
             assert desk.select(MPC)["s.take_overs"] == count + 1
-            assert np.abs(desk.angles_deg - before).max() < 1.0
+            assert np.abs(desk.angles_deg - before).max() < most_deg
+            assert math.hypot(*desk.state.position_m[:2]) < 0.3
             desk.run(800)
             desk.select(HOLD, 2000)
 
@@ -279,16 +280,16 @@ def test_a_fault_gives_the_drone_back_to_hold_and_is_said_once(fault: str, modul
         assert desk["commands"] == 1.0
 
 
-@pytest.mark.parametrize(("roll_error", "is_pushed"), [(0.08, False), (0.2, True), (-0.2, True)])
+@pytest.mark.parametrize(
+    ("wind_m_s", "is_pushed"), [((0.0, 3.0), False), ((0.0, -8.0), True), ((8.0, 1.0), True)]
+)
 def test_a_drone_in_more_wind_than_it_learns_is_given_back(
-    roll_error: float, is_pushed: bool, in_little_wind: Path
+    wind_m_s: tuple[float, float], is_pushed: bool, in_little_wind: Path
 ) -> None:
-    """After 2 s of a disturbance at its limit, 1 m/s^2, here by a tilt that PX4 sees and that moves nothing."""
-    desk = Px4Desk(in_little_wind).select(MPC, 1000)
-    desk.set("px4.roll_error", roll_error)
-    desk.run(2100)
+    """After 2 s of a disturbance at its limit, 1 m/s^2, which 4 m/s give; to the ground station too."""
+    desk = Px4Desk(in_little_wind, wind_m_s=wind_m_s).select(MPC, 2000)
     assert desk["mode"] == MPC
-    desk.run(3000)
+    desk.run(4000)
     assert desk["mode"] == (HOLD if is_pushed else MPC)
     assert desk["s.given_back"] == (10.0 if is_pushed else 0.0)
     assert ("GCS: MPC: pushed away by more wind than in the settings, hold" in desk.console) == is_pushed

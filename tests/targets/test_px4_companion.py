@@ -1,6 +1,7 @@
 """Flight mode MPC on the desk, with the set-points of a companion: take-over, steps, low rates, bad ones."""
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -101,6 +102,37 @@ def test_a_step_of_the_target_is_flown_as_a_glide(module: Path) -> None:
         assert distances[260] < 0.3
         assert desk.state.position_m[0] == pytest.approx(3.0, abs=0.02)
         assert distances[400:].max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("drag_1_s", "wind_m_s", "is_said"), [(0.244, 4.0, False), (1.0, 0.0, True), (1.0, 2.0, True)]
+)
+def test_a_drone_with_another_drag_is_said_once(
+    drag_1_s: float, wind_m_s: float, is_said: bool, module: Path
+) -> None:
+    """With its drag, that of the settings and the cure; wind, which is steady, does not count."""
+    desk = Px4Desk(module, drag_1_s=drag_1_s, wind_m_s=(wind_m_s, 0.0)).select(MPC, 500)
+    send(desk, around(0.0, 0.0), 20.0)
+    assert desk["s.drag"] == pytest.approx(drag_1_s, abs=0.1)
+    assert desk["s.differences"] == is_said
+    said = [line for line in desk.console.splitlines() if line]
+    assert len(said) == is_said
+    if is_said:
+        assert re.match(r"GCS: MPC: drag (0\.9|1\.0)\d 1/s, settings 0\.24: identify this drone$", said[0])
+
+
+@pytest.mark.parametrize(("share", "is_said"), [(0.7, True), (0.9, False)])
+def test_a_thrust_of_hover_that_is_far_off_is_said_once(share: float, is_said: bool, module: Path) -> None:
+    """PX4 believes in less thrust than carries the drone: the learnt gain says so."""
+    desk = Px4Desk(module)
+    desk.set("px4.hover", share * desk["throttle"])
+    desk.run(600)
+    desk.select(MPC, 12000)
+    assert desk["s.thrust_gain"] == pytest.approx(share, abs=0.02)
+    assert desk["s.differences"] == (2.0 if is_said else 0.0)
+    words = "GCS: MPC: thrust 0.70 times as in the settings: identify this drone"
+    assert desk.console.count(words) == is_said
+    assert desk["mode"] == MPC
 
 
 LATE = {500: (12.0, 0.4), 200: (10.0, 0.12), 50: (2.0, 0.04)}

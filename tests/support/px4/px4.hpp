@@ -17,6 +17,7 @@ extern "C" int consolePrintf(const char *format, ...);
 #define PX4_WARN(format, ...) consolePrintf("WARN: " format "\n", ##__VA_ARGS__)
 #define PX4_ERR(format, ...) consolePrintf("ERROR: " format "\n", ##__VA_ARGS__)
 #define mavlink_log_critical(publication, format, ...) (*(publication) = nullptr, consolePrintf("GCS: " format "\n", ##__VA_ARGS__))
+#define mavlink_log_warning(publication, format, ...) mavlink_log_critical(publication, format, ##__VA_ARGS__)
 typedef void *orb_advert_t;
 
 // Time, in microseconds

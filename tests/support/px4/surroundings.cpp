@@ -7,6 +7,7 @@
 extern "C" {
 #include "controller.h"
 #include "controller_pid.h"
+#include "desk.h"
 #include "log.h"
 #include "supervisor.h"
 #include "task.h"
@@ -36,6 +37,7 @@ static uint8_t nav_state = POSITION, can_run;
 static uint32_t heard; // attitude set-points, by PX4's attitude controller
 static float roll_setpoint, pitch_setpoint, yaw_setpoint, throttle; // rad, share
 static float offset[3], offset_velocity[3], offset_heading;         // of the estimator's frame, in PX4's
+static float unseen[3];                                             // roll, pitch, yaw that the drone's estimator does not see, rad
 static hrt_abstime delay; // what steps that take long have cost
 static setpoint_t hold;
 static uORB::Subscription attitude_setpoint{&topic_vehicle_attitude_setpoint};
@@ -168,6 +170,19 @@ static void detect_landing(const state_t &state)
 	publish(topic_vehicle_land_detected, land);
 }
 
+// The Crazyflie's estimator takes a drone that leans against the air for level, or turned, which PX4's does not; its noise stays.
+static void find_unseen(const attitude_t &attitude)
+{
+	const float seen[] {attitude.roll, attitude.pitch, attitude.yaw};
+	desk_state_t truth;
+
+	desk_state(&truth);
+
+	for (int i = 0; i < 3; i++) {
+		unseen[i] += 0.01f * matrix::wrap_pi(static_cast<float>(truth.angles_rad[i]) - seen[i] / DEG - unseen[i]);
+	}
+}
+
 static void estimate(const state_t &state)
 {
 	vehicle_local_position_s &at = data_vehicle_local_position;
@@ -202,10 +217,10 @@ static void estimate(const state_t &state)
 	at.vx = state.velocity.x + offset_velocity[0];
 	at.vy = -state.velocity.y + offset_velocity[1];
 	at.vz = -state.velocity.z + offset_velocity[2];
-	at.heading = matrix::wrap_pi(-state.attitude.yaw / DEG + offset_heading);
+	at.heading = matrix::wrap_pi(-state.attitude.yaw / DEG - unseen[2] + offset_heading);
 	at.xy_valid = at.z_valid = at.v_xy_valid = at.v_z_valid = at.heading_good_for_control = !is_invalid;
 	at.timestamp_sample = now();
-	matrix::Quatf(matrix::Eulerf(state.attitude.roll / DEG + roll_error, state.attitude.pitch / DEG, at.heading)).copyTo(data_vehicle_attitude.q);
+	matrix::Quatf(matrix::Eulerf(state.attitude.roll / DEG + unseen[0] + roll_error, state.attitude.pitch / DEG + unseen[1], at.heading)).copyTo(data_vehicle_attitude.q);
 	publish(topic_vehicle_attitude, data_vehicle_attitude);
 	publish(topic_vehicle_local_position, at);
 }
@@ -259,7 +274,7 @@ static setpoint_t flown(const setpoint_t &setpoint)
 	const matrix::Eulerf tilt{wanted * matrix::Quatf{matrix::Eulerf{0, 0, data_vehicle_local_position.heading - euler.psi()}}};
 
 	to.mode = {modeDisable, modeDisable, modeDisable, modeAbs, modeAbs, modeAbs, modeDisable};
-	to.attitude = {setpoint.timestamp, DEG * tilt.phi(), DEG * tilt.theta(), -DEG * matrix::wrap_pi(euler.psi() - offset_heading)};
+	to.attitude = {setpoint.timestamp, DEG * (tilt.phi() - unseen[0]), DEG * (tilt.theta() - unseen[1]), -DEG * matrix::wrap_pi(euler.psi() - offset_heading + unseen[2])};
 	to.thrust = math::min(-data_vehicle_attitude_setpoint.thrust_body[2] * strength, 1.f) * FULL;
 	return to;
 }
@@ -287,6 +302,7 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 {
 	const uint8_t before = nav_state;
 
+	find_unseen(state->attitude);
 	detect_landing(*state);
 	receive(*setpoint);
 
@@ -320,7 +336,7 @@ extern "C" void controllerOutOfTree(control_t *control, const setpoint_t *setpoi
 	throttle = control->thrust / FULL / strength;
 
 	if (nav_state != MPC && !flies_rates) { // PX4's own controllers publish too, but those of rates alone
-		matrix::Quatf(matrix::Eulerf(state->attitude.roll / DEG, state->attitude.pitch / DEG, data_vehicle_local_position.heading))
+		matrix::Quatf(matrix::Eulerf(state->attitude.roll / DEG + unseen[0], state->attitude.pitch / DEG + unseen[1], data_vehicle_local_position.heading))
 		.copyTo(data_vehicle_attitude_setpoint.q_d);
 		data_vehicle_attitude_setpoint.thrust_body[2] = -throttle;
 		publish(topic_vehicle_attitude_setpoint, data_vehicle_attitude_setpoint);
