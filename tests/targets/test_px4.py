@@ -51,6 +51,11 @@ def test_the_mode_is_there_in_the_air_and_takes_position_control(module: Path) -
     desk.run(4000)
     assert (desk["landed"], desk["can_run"], desk["s.refusal"]) == (1.0, 0.0, 4.0)
     assert desk.select(MPC)["mode"] == POSITION
+    assert desk.console == ""
+    desk.stop()
+    desk.select(POSITION, 3000).select(MPC, 500)
+    assert (desk["mode"], desk["can_run"], desk["s.active"]) == (MPC, 0.0, 0.0)
+    assert desk.console == "GCS: MPC not available: take off in another mode\n"
 
 
 @pytest.mark.parametrize(
@@ -59,12 +64,14 @@ def test_the_mode_is_there_in_the_air_and_takes_position_control(module: Path) -
 def test_a_mode_that_cannot_fly_is_refused_and_offered_again(
     name: str, value: float, reason: float, module: Path
 ) -> None:
-    """An estimate that is not valid; a drone with less thrust than the settings count on."""
+    """An estimate that is not valid; less thrust than the settings count on: the ground station says so."""
     desk = Px4Desk(module)
     before = {"invalid": 0.0, "hover": desk["throttle"]}[name]
     desk.set(f"px4.{name}", value)
     desk.run(700)
     assert (desk.select(MPC)["mode"], desk["s.refusal"]) == (POSITION, reason)
+    words = {2.0: "estimate not valid", 3.0: "less thrust than in the settings"}[reason]
+    assert desk.console == f"GCS: MPC not available: {words}\n"
     desk.set(f"px4.{name}", before)
     desk.select(POSITION, 700)
     assert desk.select(MPC)["mode"] == MPC
@@ -339,6 +346,20 @@ def test_parameters_hold_each_by_itself(module: Path) -> None:
     assert fastest < 0.6
     assert desk.state.position_m[0] < 1.0
     assert int(desk["s.limits"]) & 4
+
+
+def test_a_parameter_of_0_is_none(module: Path) -> None:
+    """Each limit is then that of the settings, as with PX4's own parameters; nothing moves."""
+    desk = Px4Desk(module).select(MPC, 500)
+    for name in ("SPEED", "BRAKE", "TILT", "CLIMB", "DESCENT", "X_MIN", "X_MAX", "Z_MIN", "Z_MAX"):
+        desk.set(f"px4.{name}", 0.0)
+    desk.run(3000)
+    assert desk["s.bad_limits"] == desk["s.limits"] == 0.0
+    assert np.abs(desk.state.position_m - [0.0, 0.0, 1.0]).max() < 0.05
+    desk.set("px4.sticks", 1)
+    desk.set("px4.pitch", 1.0)
+    desk.run(3000)
+    assert desk.state.velocity_m_s[0] > 3.0
 
 
 def test_a_module_that_stops_takes_its_mode_away_and_nothing_else(module: Path) -> None:

@@ -122,7 +122,7 @@ static void command()
 
 	if (wanted_mode != last_wanted) { // the pilot's switch
 		last_wanted = wanted_mode;
-		intention = (wanted_mode != MPC || can_run) ? wanted_mode : intention;
+		intention = (wanted_mode != MPC || can_run || !supervisorIsFlying()) ? wanted_mode : intention;
 	}
 
 	if (obeyed != topic_vehicle_command.generation) {
