@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Circle
 from tests.support.px4 import HOLD, MPC, Px4Desk, build_px4, px4_settings
@@ -133,6 +134,35 @@ def test_a_thrust_of_hover_that_is_far_off_is_said_once(share: float, is_said: b
     words = "GCS: MPC: thrust 0.70 times as in the settings: identify this drone"
     assert desk.console.count(words) == is_said
     assert desk["mode"] == MPC
+
+
+TRIM = with_option(px4_settings(), "model.roll_trim_rad", math.radians(0.9))
+TURNS = (0.0, 1.5, -1.5, 3.0)
+"""Rates of the heading in rad/s, on a circle at 1.5 rad/s."""
+
+
+def turning_cm(library: Path) -> dict[float, float]:
+    """Return the RMS distance from the circle in cm by the rate of the heading, from 5 s on."""
+    found = {}
+    for rate_rad_s in TURNS:
+        desk = Px4Desk(library).select(MPC, 500)
+        desk.set("px4.trajectory", 1)
+        distances = []
+        for k in range(1200):
+            motion = around(0.0, 0.0)(0.01 * k)
+            distances.append(math.hypot(*(desk.state.position_m - motion[0])[:2]))
+            desk.full_state(motion, math.remainder(0.01 * rate_rad_s * k, 2.0 * math.pi))
+            desk.run(10)
+        found[rate_rad_s] = 100.0 * math.sqrt(np.mean(np.square(distances[500:])))
+    return found
+
+
+def test_a_heading_that_turns_costs_little_unless_the_settings_have_a_trim_of_their_own() -> None:
+    """A trim that the drone has not is learnt as wind is, but it turns with the drone."""
+    right, wrong = turning_cm(build_px4(px4_settings())), turning_cm(build_px4(TRIM))
+    assert max(right.values()) < 1.3
+    assert wrong[0.0] == pytest.approx(right[0.0], abs=0.05)
+    assert all(wrong[rate] > right[rate] + 0.2 for rate in TURNS[1:])
 
 
 LATE = {500: (12.0, 0.4), 200: (10.0, 0.12), 50: (2.0, 0.04)}
