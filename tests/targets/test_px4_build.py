@@ -45,7 +45,7 @@ SUBJECTS = {
     "fixed": height_settings("fixed"),
     "prefix": with_option(height_settings(), "code.prefix", "left"),
 }
-LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 10240, 12288
+LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 10240, 12800
 
 
 def own_flags(name: str) -> list[str]:
