@@ -43,6 +43,7 @@ SUBJECTS = {
     "tracked": height_settings(),
     "float64": height_settings("float64"),
     "fixed": height_settings("fixed"),
+    "learnt": with_option(height_settings(), "observer.tilt_gain", "learnt"),
     "prefix": with_option(height_settings(), "code.prefix", "left"),
 }
 LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 10240, 12800

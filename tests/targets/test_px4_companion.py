@@ -136,6 +136,16 @@ def test_a_thrust_of_hover_that_is_far_off_is_said_once(share: float, is_said: b
     assert desk["mode"] == MPC
 
 
+def test_a_learnt_gain_that_is_far_off_is_said_once() -> None:
+    """A drone that rolls 1.43 times as far as the settings say."""
+    learns = with_option(px4_settings(), "observer.tilt_gain", "learnt")
+    desk = Px4Desk(build_px4(with_option(learns, "model.roll_gain", 0.7))).select(MPC, 500)
+    send(desk, around(0.0, 0.0), 15.0)
+    assert desk["s.roll_gain"] == pytest.approx(1.0 / 0.7, abs=0.03)
+    assert desk["s.differences"] == 4.0
+    assert desk.console.count("GCS: MPC: roll 1.4") == desk.console.count("GCS") == 1
+
+
 TRIM = with_option(px4_settings(), "model.roll_trim_rad", math.radians(0.9))
 TURNS = (0.0, 1.5, -1.5, 3.0)
 """Rates of the heading in rad/s, on a circle at 1.5 rad/s."""
