@@ -1,7 +1,8 @@
-"""What the replayed commands may be off because a log rounds its columns and has lost rows.
+"""What the replayed commands may be off because of what a log does not have.
 
-The log is replayed with inputs and commands that may have been: drawn within the rounding of each column, and
-on lost rows within the spread of what is interpolated.
+The log is replayed as it may have been: with inputs and commands drawn within the rounding of each column, on
+lost rows within the spread of what is filled, and, where the log does not have the state in which the
+controller begins, with one that begins up to `SETTLING_S` later.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,9 +18,11 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.resolution import Resolution, hardly_changes
 from mambo_sil.model.identify.signals import COMMANDS, THRUST
 from mambo_sil.model.replay.logged_inputs import LoggedInputs
-from mambo_sil.model.replay.lost_inputs import ESTIMATED, Block, spread_of
-from mambo_sil.model.replay.replay_step import begin, command_of, step
+from mambo_sil.model.replay.lost_inputs import ESTIMATED, Block
+from mambo_sil.model.replay.replay_step import begin, begin_late, command_of, step
 
+SETTLING_S: Final = 2.0
+"""Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
 DRAWS: Final = 12
 """Flights that are drawn."""
 
@@ -54,16 +57,23 @@ class InputErrors:
 
 
 def input_errors(
-    inputs: LoggedInputs, filled: Filled, settings: Settings, blocks: Sequence[Block]
+    inputs: LoggedInputs,
+    filled: Filled,
+    settings: Settings,
+    blocks: Sequence[Block],
+    is_unknown: NDArray[np.bool_],
 ) -> InputErrors | None:
-    """Return what a replay may be off; None for a log with all rows and all digits."""
+    """Return what a replay may be off; None for a log that has all that the commands depend on.
+
+    `is_unknown` says where the controller begins in a state that the log does not have (k,).
+    """
     state = filled.state
     values = np.column_stack([_measured(inputs, state), inputs.target, inputs.command])
     resolutions = _resolutions(inputs, values)
     is_lost = bool((~inputs.is_logged).any())
-    if not resolutions and not is_lost:
+    if not resolutions and not is_lost and not is_unknown.any():
         return None
-    spread = spread_of(values, inputs.is_logged)
+    spread = inputs.spread.copy()
     spread[:, len(values[0]) - inputs.command.shape[1] :] = 0.0
     if filled.left is not None:
         spread[:, :ESTIMATED] = filled.left
@@ -71,25 +81,41 @@ def input_errors(
     batch = CompiledController(settings, 1 + DRAWS + len(columns))
     errors = np.zeros((batch.n - 1, *inputs.command.shape))
     generator = np.random.default_rng(0)
+    late = _late_beginnings(is_unknown, round(SETTLING_S / settings.horizon.update_period_s))
     for first, end, _ in blocks:
         noise = np.zeros((batch.n, end - first, values.shape[1]))
-        noise[1 : DRAWS + 1] = spread[first:end] * generator.normal(size=(DRAWS, *spread[first:end].shape))
+        noise[1 : DRAWS + 1] = spread[first:end] * _normal(~inputs.is_logged[first:end], values, generator)
         for number, column in enumerate(columns):
             drawn = _drawn(values[first:end, column], resolutions[inputs.names[column]], generator)
             noise[1 : DRAWS + 1, :, column] += drawn[:DRAWS]
             noise[1 + DRAWS + number, :, column] = drawn[DRAWS]
         if inputs.begins[first]:
             begin(batch, inputs, first)
-        errors[:, first:end] = _replay(batch, inputs, state, range(first, end), noise)
+        errors[:, first:end] = _replay(batch, inputs, state, late, range(first, end), noise)
     alone = {inputs.names[column]: errors[DRAWS + number] for number, column in enumerate(columns)}
     return InputErrors(errors[:DRAWS], alone, resolutions)
 
 
+def _late_beginnings(is_unknown: NDArray[np.bool_], most: int) -> dict[int, list[int]]:
+    """Return the drawn flights that begin at an update, up to `most` updates behind an unknown beginning."""
+    found: dict[int, list[int]] = {}
+    for last in np.flatnonzero(is_unknown & ~np.append(is_unknown[1:], values=False)).tolist():
+        for draw in range(1, DRAWS + 1):
+            found.setdefault(last + max(draw * most // DRAWS, 1), []).append(draw)
+    return found
+
+
 def _replay(
-    batch: CompiledController, inputs: LoggedInputs, state: FloatArray, updates: range, noise: FloatArray
+    batch: CompiledController,
+    inputs: LoggedInputs,
+    state: FloatArray,
+    late: Mapping[int, list[int]],
+    updates: range,
+    noise: FloatArray,
 ) -> FloatArray:
     """Step through `updates` with `noise` (n, k, columns), which the first has none of.
 
+    Some begin at updates in `late`, and every other one is told of the floor where the drone may lie on it.
     Returns by what the commands of the others would be off (n - 1, k, axes).
     """
     measured, wanted = _measured(inputs, state).shape[1], inputs.target.shape[1]
@@ -98,7 +124,11 @@ def _replay(
     errors = noise[1:, :, sent:].copy()
     for number, k in enumerate(updates):
         now = noise[:, number]
+        if k in late:
+            begin_late(batch, inputs, k, late[k])
         states[:] = state[k]
+        if inputs.may_lie[k]:
+            states[1 : DRAWS + 1 : 2, -1] = 1.0
         states[:, :measured] += now[:, :measured]
         others = (inputs.target[k] + now[:, measured:sent], inputs.command[k] + now[:, sent:])
         command = command_of(step(batch, inputs, k, states, others), inputs)
@@ -127,6 +157,18 @@ def _resolutions(inputs: LoggedInputs, values: FloatArray) -> dict[str, Resoluti
         if name not in found and name not in (*COMMANDS, THRUST) and hardly_changes(column)
     ]
     return found | dict.fromkeys(few, coarsest)
+
+
+def _normal(is_lost: NDArray[np.bool_], values: FloatArray, generator: np.random.Generator) -> FloatArray:
+    """Return draws (draws, k, columns) with a standard deviation of 1, for `values` (.., columns).
+
+    Half of the variance of a gap is one of all its updates, as of a motion that curves.
+    """
+    gap = np.cumsum(np.diff(is_lost, prepend=False))
+    own = generator.normal(size=(DRAWS, len(is_lost), values.shape[1]))
+    shared = generator.normal(size=(DRAWS, int(gap[-1]) + 1, values.shape[1]))[:, gap]
+    shared[:, :, :ESTIMATED] = generator.normal(size=(DRAWS, len(is_lost), ESTIMATED))
+    return np.asarray(np.sqrt(0.5) * (own + shared))
 
 
 def _drawn(values: FloatArray, resolution: Resolution, generator: np.random.Generator) -> FloatArray:

@@ -15,7 +15,7 @@ from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.errors import ResultsError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.columns import Column
-from mambo_sil.model.replay.input_errors import Filled, InputErrors, input_errors
+from mambo_sil.model.replay.input_errors import SETTLING_S, Filled, InputErrors, input_errors
 from mambo_sil.model.replay.logged_inputs import LoggedInputs, read_inputs
 from mambo_sil.model.replay.lost_inputs import LostInputs, blocks_of
 from mambo_sil.model.replay.replay_step import begin, command_of, step
@@ -39,8 +39,8 @@ _JUMP_RAD: Final = 0.2
 """Least change of a command from one update to the next with which a mixer may cap the thrust."""
 _TOLD_BEHIND: Final = 3
 """Updates within which a capped thrust changes a command."""
-SETTLING_S: Final = 2.0
-"""Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
+LARGEST: Final = 0.999
+"""Share of the tilt limit from which on a command says nothing: others have it there, too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     """
     inputs = read_inputs(path, columns, settings)
     there = inputs.is_logged
-    is_whole, is_quadratic = bool(there.all()), settings.cost.norm == "quadratic"
+    is_whole, is_quadratic, own = bool(there.all()), settings.cost.norm == "quadratic", settings
     if not is_whole and is_quadratic and settings.code.scalar == "fixed":
         settings = with_option(settings, "code.scalar", "float64")  # slopes are differences of commands
         inputs = replace(inputs, from_start=False)  # another type has other bits from the start on
@@ -134,12 +134,13 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
             done = step(controller, inputs, k, state[k : k + 1])
             replayed[k], status[k] = command_of(done, inputs)[0], done.status[0]
     filled = Filled(state, None if lost is None else lost.left)
-    errors = input_errors(inputs, filled, settings, blocks)
+    is_unknown = _begins_unknown(inputs, replayed, settings.limits.tilt_rad)
+    errors = input_errors(inputs, filled, settings, blocks, is_unknown)
     is_filled = np.zeros(len(there), bool)
     for first, end, _ in blocks:
         is_filled[first:end] = ~there[first:end]
     is_capped = np.zeros_like(is_filled) if settings.height is None else _may_be_capped(inputs, replayed)
-    begun_s = _since_s(inputs.time_s, _begins_unknown(inputs, replayed))
+    begun_s = _since_s(inputs.time_s, is_unknown)
     return LogReplay(
         time_s=inputs.time_s[there],
         logged=inputs.command[there],
@@ -157,20 +158,22 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         is_exact=inputs.is_exact,
         resampled=inputs.resampled,
         input_errors=None if errors is None else errors.at(there),
-        settings=settings,
+        settings=own,
         remarks=inputs.remarks,
     )
 
 
-def _begins_unknown(inputs: LoggedInputs, replayed: FloatArray) -> NDArray[np.bool_]:
+def _begins_unknown(inputs: LoggedInputs, replayed: FloatArray, tilt_rad: float) -> NDArray[np.bool_]:
     """Return whether the controller begins at an update (k,) in a state that the log does not have.
 
-    It has it where the log begins with the first update, or where the first command is that of the log.
+    It has it where the log begins with the first update, or where the first command, of a tilt below the
+    limit, is that of the log.
     """
     first = np.flatnonzero(inputs.is_logged)[0]
     begins = inputs.begins.copy()
     begins[first] = not inputs.from_start
-    is_known = (replayed == inputs.command).all(axis=1) & inputs.command_rad.any(axis=1)
+    is_free = (np.abs(inputs.command_rad) < LARGEST * tilt_rad).all(axis=1)
+    is_known = (replayed == inputs.command).all(axis=1) & inputs.command_rad.any(axis=1) & is_free
     return np.asarray(begins & ~is_known | inputs.may_lie)
 
 

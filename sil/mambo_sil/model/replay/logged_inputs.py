@@ -31,11 +31,13 @@ from mambo_sil.model.identify.signals import (
     TARGET_ACCELERATION,
     THRUST,
     UPDATE,
+    VELOCITY,
     YAW,
     FlightLog,
 )
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
 from mambo_sil.model.replay.beginning import is_from_start, is_simulated
+from mambo_sil.model.replay.interpolation import fill
 from mambo_sil.model.replay.logged_columns import (
     APP_GROUP,
     ASKED,
@@ -104,6 +106,8 @@ class LoggedInputs:
     """Whether the rows of the log are not the updates: inputs are interpolated, commands held."""
     names: tuple[str, ...]
     """Signals of the columns of state, target and command, in this order."""
+    spread: FloatArray
+    """Standard deviations (k, columns) of what is filled of them, 0 where it is logged."""
     resolutions: Mapping[str, Resolution]
     """How signals are rounded, by name; one with all digits is left out."""
     remarks: tuple[str, ...]
@@ -140,7 +144,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     is_logged: NDArray[np.bool_] = np.isfinite(np.sum(found, axis=1))
     if is_logged.sum() < 2:
         raise LogError((f"{log.name}: has no two updates with all inputs and commands",))
-    filled = np.stack([_filled(name, found[:, k]) for k, name in enumerate(needed)], axis=1)
+    filled, spread = _filled(needed, found)
     state, target, command = np.split(filled, [len(measured), len(inputs)], axis=1)
     if commands_thrust:
         own = -state[:, len(STATE) :]
@@ -155,6 +159,8 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     shift = np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1)
     is_steady = ~(jump.any(axis=1) | shift.any(axis=1))
     restarts = clock.restarts | _elsewhere(state, is_logged & is_steady, time_s)
+    if all(log.signals[name].resolution is None for name in VELOCITY):
+        restarts |= _at_rest(state)
     begins |= restarts
     begins |= np.diff(time_s, prepend=time_s[0]) > _PAUSE_UPDATES * period_s
     return LoggedInputs(
@@ -181,6 +187,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         command=command,
         resampled=clock.resampled,
         names=needed,
+        spread=spread,
         resolutions={
             name: signal.resolution for name, signal in log.signals.items() if signal.resolution is not None
         },
@@ -241,11 +248,19 @@ def _placed(log: FlightLog, name: str, clock: UpdateClock) -> FloatArray:
     return found
 
 
-def _filled(name: str, value: FloatArray) -> FloatArray:
-    """Return a signal (k,) with what is NaN interpolated."""
-    number, there = np.arange(len(value)), np.isfinite(value)
-    known = np.unwrap(value[there]) if name == YAW and not there.all() else value[there]
-    return np.where(there, value, np.interp(number, number[there], known))
+def _filled(names: tuple[str, ...], found: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return signals (k, n) with what is NaN filled, and the standard deviations (k, n) of that."""
+    columns = []
+    for name, value in zip(names, found.T, strict=True):
+        there = np.isfinite(value)
+        if there.all():
+            columns.append((value, np.zeros(len(value))))
+            continue
+        known = value.copy()
+        known[there] = np.unwrap(value[there]) if name == YAW else value[there]
+        columns.append(fill(known, there))
+    filled, spread = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
+    return filled, spread
 
 
 def _near_floor(height_m: FloatArray, floor_m: float) -> NDArray[np.bool_]:
@@ -284,6 +299,12 @@ def _elsewhere(state: FloatArray, is_told: NDArray[np.bool_], time_s: FloatArray
     pair = is_told & np.append(False, is_told[:-1])
     usual_m = float(np.median(off_m[pair])) if pair.any() else 0.0
     return np.asarray(pair & (off_m > max(_ELSEWHERE_M, _UNUSUAL * usual_m)))
+
+
+def _at_rest(state: FloatArray) -> NDArray[np.bool_]:
+    """Return whether both velocities are 0 in every bit and were not before (k,), as where a flight begins."""
+    moves: NDArray[np.bool_] = state[:, 2:4].any(axis=1)
+    return ~moves & np.append(False, moves[:-1])
 
 
 def _jumps(log: FlightLog, time_s: FloatArray) -> FloatArray:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -19,8 +18,9 @@ AHEAD: Final = 50
 ESTIMATED: Final = 4
 """Numbers of a state: position and velocity along x and y. Angles and height are slower, and interpolated."""
 _LEAST_SPREAD: Final = 1e-6
-COMMAND_NOISE_RAD: Final = 2e-5
-"""Standard deviation of what the model leaves of a command."""
+COMMAND_NOISE_RAD: Final = 2e-4
+"""Standard deviation of what the model leaves of a command: slopes are of small changes, and the other
+columns of a lost row are interpolated."""
 
 Block = tuple[int, int, int]
 """First and end of the updates to replay, and the end of those to estimate the lost states by."""
@@ -38,7 +38,7 @@ class LostInputs:
         """Take a log that has lost `most` updates in the worst block."""
         self._inputs = inputs
         self._batch = CompiledController(settings, 1 + ESTIMATED * most)
-        spread = spread_of(inputs.state[:, :ESTIMATED], inputs.is_logged)
+        spread = inputs.spread[:, :ESTIMATED].copy()
         self._deviation = np.maximum(spread, _LEAST_SPREAD)
         self.left = spread
         """Standard deviations (k, 4) that the commands leave of the numbers of a state."""
@@ -71,22 +71,6 @@ class LostInputs:
         estimated = state.copy()
         estimated[lost, :ESTIMATED] += change.reshape(-1, ESTIMATED) * self._deviation[lost]
         return estimated
-
-
-def spread_of(values: FloatArray, there: NDArray[np.bool_]) -> FloatArray:
-    """Return the standard deviations (k, n) of interpolated `values` (k, n), 0 for rows that are `there`.
-
-    They are those of rows that are there from the mean of the rows beside them, times the distance to the
-    next row that is there.
-    """
-    middle = there[:-2] & there[1:-1] & there[2:]
-    error = (values[1:-1] - 0.5 * (values[:-2] + values[2:]))[middle]
-    spread = np.sqrt((error * error).mean(axis=0)) if len(error) else np.zeros(values.shape[1])
-    rows, places = np.arange(len(there)), np.flatnonzero(there)
-    after = places[np.minimum(np.searchsorted(places, rows), len(places) - 1)]
-    before = places[np.maximum(np.searchsorted(places, rows, side="right") - 1, 0)]
-    distance = np.minimum(np.abs(after - rows), np.abs(rows - before))
-    return np.asarray(spread * distance[:, np.newaxis])
 
 
 def blocks_of(inputs: LoggedInputs) -> Iterator[Block]:

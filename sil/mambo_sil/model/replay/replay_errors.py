@@ -1,7 +1,7 @@
-"""The errors of a replay by axis: its worst second, and what is tolerated there."""
+"""The errors of a replay by axis: its worst second and its trends, and what is tolerated of them."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -10,79 +10,44 @@ from numpy.typing import NDArray
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
-from mambo_sil.model.replay.log_replay import SETTLING_S, LoggedAxis, LogReplay
+from mambo_sil.model.replay.log_replay import LARGEST, LoggedAxis, LogReplay
 
 Axes = tuple[float, float, float]
 
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Largest median error of a second, of roll, pitch and thrust: in rad, rad and m/s^2.
-
-    known:   where the log has all that the command depends on.
-    begun:   in addition behind a beginning in a state that the log does not have.
-    lost:    likewise behind a row that the log has lost; the larger one counts.
-    capped:  likewise behind a thrust that a mixer may have capped.
-    begun_fades_s, lost_fades_s: time constants with which the controller forgets it.
-    for_good: what it never forgets of either.
-    """
-
-    known: Axes
-    begun: Axes
-    begun_fades_s: Axes
-    lost: Axes
-    lost_fades_s: Axes
-    capped: Axes = (0.004, 0.004, 0.1)
-    for_good: Axes = (0.0, 0.0, 0.0)
-
-    def at(self, axis: int, begun_s: float, capped_s: float, complete_s: float) -> float:
-        """Return the tolerance of an axis at times since a beginning, a capped thrust, and a lost row."""
-        added = (
-            largest[axis] * math.exp(-since_s / fades_s[axis]) if since_s < _NEVER_S else 0.0
-            for largest, fades_s, since_s in (
-                (self.begun, self.begun_fades_s, begun_s),
-                (self.capped, self.begun_fades_s, capped_s),
-                (self.lost, self.lost_fades_s, complete_s),
-            )
-        )
-        for_good = self.for_good[axis] if min(begun_s, capped_s, complete_s) < _NEVER_S else 0.0
-        return self.known[axis] + max(added) + for_good
-
-
-_NEVER_S: Final = 1e6
-QUADRATIC: Final = Tolerance(
-    known=(8e-6, 8e-6, 2e-4),
-    begun=(0.01, 0.01, 0.1),
-    begun_fades_s=(2.0, 2.0, 1.0),
-    lost=(4e-4, 4e-4, 0.1),
-    lost_fades_s=(3.0, 3.0, 1.0),
-)
-"""Right logs: 0 where all is known. Behind a beginning in flight with wind 2.9 mrad after 1.25 s, which falls
-with a time constant of 2.0 s; the thrust .04 mm/s^2 after 2 s. Between lost rows .13 mrad and .05 m/s^2.
-Of faults the least are a velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad
-in a hover; in curves a gain off by 2 %: .6 mrad."""
-FIXED: Final = replace(QUADRATIC, known=(4e-5, 4e-5, 2e-3), for_good=(3e-5, 3e-5, 0.0))
-"""In fixed point commands are multiples of 15 microradians and .6 mm/s^2. Right logs differ by up to four of
-them for good behind a beginning in flight; faults as above by four or more."""
-ONE_NORM: Final = Tolerance(
-    known=(8e-6, 8e-6, 2e-4),
-    begun=(0.045, 0.045, 0.1),
-    begun_fades_s=(math.inf, math.inf, math.inf),
-    lost=(0.045, 0.045, 0.1),
-    lost_fades_s=(math.inf, math.inf, math.inf),
-)
-"""Its search never forgets: after one other bit right logs are up to 33 mrad off, for good."""
-FILLED: Final = 2.0
-"""How many times the largest of what is drawn for a second its error may be."""
+KNOWN: Final[Axes] = (3e-6, 3e-6, 6e-5)
+"""Largest median error of a second, of roll, pitch and thrust in rad, rad and m/s^2, where the log has all
+that the command depends on. Right logs: 0; with another type of float 1.2e-6 and 2.8e-5. Of faults the least are a
+velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad in a hover."""
+FIXED_POINT: Final[Axes] = (7e-5, 7e-5, 2e-3)
+"""The same in fixed point, whose commands are multiples of 15 microradians and .6 mm/s^2, where the log lacks
+something: right logs then differ by up to four of them for good."""
+CAPPED: Final[Axes] = (0.004, 0.004, 0.1)
+"""Allowed in addition behind a thrust that a mixer may have capped; it fades with `CAPPED_FADES_S`."""
+CAPPED_FADES_S: Final[Axes] = (2.0, 2.0, 1.0)
+SPREADS: Final = 5.0
+"""How many standard deviations, by what is drawn, a right log may be off."""
+LEAST_TRENDS: Final = {"gain": 5e-4, "offset": 2e-5, "delay": 5e-4}
+"""Trends that are no fault: a gain, an offset in rad (of the thrust 100 times that), and a delay in s."""
 SECOND_S: Final = 1.0
-BEGUN: Final = 2.0
-"""How many times what is left of a beginning an error may be, by those of the first second that is judged:
-in right logs without rounding it fades by that time constant, and by nothing else."""
-_LARGEST: Final = 0.999
 _LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
 """Least shares of a second's updates that can be judged, and that are not at the tilt limit."""
 CALM_RAD: Final = 1e-3
 """Standard deviation of a command up to which an axis is at rest, and says nothing."""
+_CALM_M_S2: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Trend:
+    """What a whole log has of one kind of error, a gain, an offset or a delay, and what is tolerated."""
+
+    kind: str
+    value: float
+    tolerated: float
+
+    @property
+    def is_off(self) -> bool:
+        """Whether it is more than tolerated."""
+        return abs(self.value) > self.tolerated
 
 
 @dataclass(frozen=True)
@@ -92,10 +57,9 @@ class AxisErrors:
     worst:    the largest median error of a second, over what is tolerated there 1 or more is too much.
     from_s, until_s: times since the beginning of the log: of the seconds around the worst that are too far
               off, or of the worst alone.
-    expected: the largest median error by what is drawn, of the whole flight.
+    expected: the median error by what is drawn, of the whole flight.
     spread:   standard deviation of the logged command.
-    miss:     change of the error over the change from one command to the next; half of the motion has less.
-    expected_miss: the largest of what is drawn.
+    trends:   of the whole log; none of one that lacks nothing.
     """
 
     axis: LoggedAxis
@@ -105,8 +69,7 @@ class AxisErrors:
     until_s: float
     expected: float
     spread: float
-    miss: float
-    expected_miss: float
+    trends: tuple[Trend, ...]
 
     @property
     def is_tilt(self) -> bool:
@@ -122,12 +85,20 @@ class AxisErrors:
         """Return a value of the command in words."""
         return f"{1e3 * value:.2g} mrad" if self.is_tilt else f"{value:.2g} {self.axis.unit}"
 
+    def trend_text(self, trend: Trend) -> str:
+        """Return a trend in words."""
+        if trend.kind == "offset":
+            return f"{self.text(abs(trend.value))} off in the mean, {self.text(trend.tolerated)} allowed"
+        if trend.kind == "delay":
+            way = "late" if trend.value > 0.0 else "early"
+            return f"{1e3 * abs(trend.value):.2g} ms {way}, {1e3 * trend.tolerated:.2g} ms allowed"
+        way = "larger" if trend.value > 0.0 else "less"
+        return f"{100.0 * abs(trend.value):.2g} % {way}, {100.0 * trend.tolerated:.2g} % allowed"
 
-def tolerance_of(settings: Settings) -> Tolerance:
-    """Return the tolerance for controllers of these settings."""
-    if settings.cost.norm != "quadratic":
-        return ONE_NORM
-    return FIXED if settings.code.scalar == "fixed" else QUADRATIC
+
+def known_of(settings: Settings, k: int, *, lacks: bool) -> float:
+    """Return what is tolerated of an axis, of a log that lacks something or not."""
+    return FIXED_POINT[k] if lacks and settings.code.scalar == "fixed" else KNOWN[k]
 
 
 def errors_of(replay: LogReplay) -> tuple[AxisErrors, ...]:
@@ -138,28 +109,54 @@ def errors_of(replay: LogReplay) -> tuple[AxisErrors, ...]:
 def _axis(replay: LogReplay, k: int) -> AxisErrors:
     """Return the errors of one axis."""
     settled, logged = replay.settled, replay.logged[:, k]
-    error = np.abs(replay.replayed[:, k] - logged)
+    error = replay.replayed[:, k] - logged
     draws = replay.input_errors
-    drawn = np.abs(draws.drawn[:, :, k]) if draws is not None else np.zeros((1, len(error)))
-    worst, tolerated, from_s, until_s = _worst_second(replay, k, error, drawn)
+    drawn = draws.drawn[:, :, k] if draws is not None else np.zeros((1, len(error)))
+    worst, tolerated, from_s, until_s = _worst_second(replay, k, np.abs(error), np.abs(drawn))
     none = not settled.any()
-    misses = [_miss(one, logged, settled) for one in (replay.replayed[:, k] - logged, *_signed(replay, k))]
     return AxisErrors(
         axis=replay.axes[k],
         worst=worst,
         tolerated=tolerated,
         from_s=from_s,
         until_s=until_s,
-        expected=0.0 if none else float(np.median(drawn[:, settled], axis=1).max()),
+        expected=0.0 if none else _open(np.abs(drawn[:, settled])),
         spread=0.0 if none else float(logged[settled].std()),
-        miss=misses[0],
-        expected_miss=max(misses[1:], default=0.0),
+        trends=() if none or draws is None else _trends(replay, k, error, drawn),
     )
 
 
-def _signed(replay: LogReplay, k: int) -> FloatArray:
-    """Return the drawn errors (draws, k) of an axis with their sign."""
-    return np.zeros((0, 0)) if replay.input_errors is None else replay.input_errors.drawn[:, :, k]
+def _open(drawn: FloatArray) -> float:
+    """Return the root mean square, over draws, of median errors (draws, k)."""
+    return float(np.sqrt((np.median(drawn, axis=1) ** 2).mean()))
+
+
+def _trends(replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray) -> tuple[Trend, ...]:
+    """Return the trends of an error (k,) of an axis, and what those (draws, k) that are drawn allow."""
+    rows = replay.settled & ~_limited(replay, k)
+    if not rows.any():
+        return ()
+    logged, is_tilt = replay.logged[:, k], k < len(TILTS)
+    shapes = {"offset": np.ones(len(logged))}
+    if logged[rows].std() >= (CALM_RAD if is_tilt else _CALM_M_S2):
+        shapes["gain"] = logged - logged[rows].mean()
+        shapes["delay"] = -np.gradient(logged, replay.time_s)
+    trends = []
+    for kind, shape in shapes.items():
+        value, *others = (-_share(one[rows], shape[rows]) for one in (error, *drawn))
+        least = LEAST_TRENDS[kind] * (100.0 if kind == "offset" and not is_tilt else 1.0)
+        spread = float(np.sqrt(np.square(others).mean()))
+        trends.append(Trend(kind, value, least + SPREADS * spread))
+    return tuple(trends)
+
+
+def _share(error: FloatArray, shape: FloatArray) -> float:
+    """Return how much of a shape (k,) an error (k,) has: half of the shape has less."""
+    there = shape != 0.0
+    weight, values = np.abs(shape[there]), error[there] / shape[there]
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _worst_second(
@@ -168,18 +165,16 @@ def _worst_second(
     """Return median error and tolerance of the second that is farthest off, and from when to when."""
     length = round(SECOND_S / replay.update_period_s)
     free = replay.settled & ~_limited(replay, k)
-    tolerance = _tolerance(replay, k, free)
+    known = known_of(replay.settings, k, lacks=replay.input_errors is not None)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
         judged = free[rows]
         if replay.settled[rows].sum() < _LEAST_JUDGED * length or judged.sum() < _LEAST_FREE * length:
             continue
-        begun_s, capped_s, complete_s = (
-            float(one[rows][judged].min()) for one in (replay.begun_s, replay.capped_s, replay.complete_s)
-        )
-        open_by_draws = FILLED * float(np.median(drawn[:, rows][:, judged], axis=1).max())
-        tolerated = max(tolerance.at(k, begun_s, capped_s, complete_s), open_by_draws)
+        since_s = float(replay.capped_s[rows][judged].min())
+        capped = CAPPED[k] * math.exp(-since_s / CAPPED_FADES_S[k])
+        tolerated = known + capped + SPREADS * _open(drawn[:, rows][:, judged])
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan
@@ -189,45 +184,13 @@ def _worst_second(
         begin -= 1
     while end + 1 < len(off) and off[end + 1] > 1.0 and off[at] > 1.0:
         end += 1
-    since_s = replay.time_s - replay.time_s[0]
-    until = min(found[end][2] + length, len(since_s)) - 1
-    return found[at][0], found[at][1], float(since_s[found[begin][2]]), float(since_s[until])
-
-
-def _tolerance(replay: LogReplay, k: int, free: NDArray[np.bool_]) -> Tolerance:
-    """Return the tolerance of an axis, whose updates in `free` (k,) are judged.
-
-    Of a log that lacks nothing but its beginning, the first second that is judged says how large the errors
-    may be: the largest tenth of them is left out. That of roll and pitch is one, as a heading mixes them.
-    """
-    tolerance, since_s = tolerance_of(replay.settings), replay.time_s - replay.time_s[0]
-    fades_s = tolerance.begun_fades_s[k]
-    is_capped_later = (since_s - replay.capped_s).max() >= SETTLING_S
-    lacks_more = replay.input_errors is not None or is_capped_later
-    first = free & (since_s < SETTLING_S + SECOND_S)
-    if lacks_more or math.isinf(fades_s) or not first.any() or (replay.begun_s != since_s).any():
-        return tolerance
-    errors = np.abs(replay.replayed - replay.logged)
-    largest = errors[:, :2].max(axis=1) if k < len(TILTS) else errors[:, k]
-    grown = largest * np.exp(since_s / fades_s)
-    left = min(tolerance.begun[k], BEGUN * float(np.quantile(grown[first], 0.9)))
-    return replace(tolerance, begun=(left, left, left), capped=(left, left, left))
+    since = replay.time_s - replay.time_s[0]
+    until = min(found[end][2] + length, len(since)) - 1
+    return found[at][0], found[at][1], float(since[found[begin][2]]), float(since[until])
 
 
 def _limited(replay: LogReplay, k: int) -> NDArray[np.bool_]:
     """Return whether a tilt of log and controller is the limit (k,), which is that of others, too."""
     logged, most = replay.logged[:, k], replay.settings.limits.tilt_rad
-    is_largest = np.abs(logged) >= _LARGEST * most if k < len(TILTS) else np.zeros(len(logged), bool)
+    is_largest = np.abs(logged) >= LARGEST * most if k < len(TILTS) else np.zeros(len(logged), bool)
     return np.asarray(is_largest & (replay.replayed[:, k] == logged))
-
-
-def _miss(error: FloatArray, logged: FloatArray, settled: NDArray[np.bool_]) -> float:
-    """Return the change of an error over the change of the logged command: half of the motion has less."""
-    change, jump = (np.abs(np.diff(one, prepend=np.nan)) for one in (logged, error))
-    moving = settled & (change > 0.0)
-    if not moving.any():
-        return 0.0
-    weight, values = change[moving], jump[moving] / change[moving]
-    order = np.argsort(values)
-    total = np.cumsum(weight[order])
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])

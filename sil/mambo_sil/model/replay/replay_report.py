@@ -8,7 +8,8 @@ from markupsafe import Markup
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
-from mambo_sil.model.replay.log_replay import AXES, SETTLING_S, LogReplay
+from mambo_sil.model.replay.input_errors import SETTLING_S
+from mambo_sil.model.replay.log_replay import AXES, LogReplay
 from mambo_sil.model.replay.replay_errors import errors_of
 from mambo_sil.model.replay.replay_verdict import ReplayVerdict, judge
 from mambo_sil.results.blocks import CommandResult, Facts, Picture, ResultTable, Sentence

@@ -52,6 +52,17 @@ def begin(controller: CompiledController, inputs: LoggedInputs, k: int) -> None:
     controller.reset(np.repeat(held, controller.n, axis=0))
 
 
+def begin_late(controller: CompiledController, inputs: LoggedInputs, k: int, numbers: list[int]) -> None:
+    """Begin some of the controllers anew at update `k`, at the attitude as measured and the logged thrust."""
+    held = inputs.state[k : k + 1, 4:6]
+    if controller.settings.height is not None:
+        held = np.column_stack([held, inputs.thrust_m_s2[k : k + 1]])
+    before = controller.instances.copy()
+    controller.reset(np.repeat(held, controller.n, axis=0))
+    others = np.setdiff1d(np.arange(controller.n), numbers)
+    controller.instances[others] = before[others]
+
+
 def command_of(done: Any, inputs: LoggedInputs) -> FloatArray:
     """Return the commands (n, axes) of a step that the log has: roll and pitch, and the thrust over mass."""
     if not inputs.has_thrust:

@@ -8,25 +8,17 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.model.identify.signals import THRUST, TILTS
+from mambo_sil.model.identify.signals import THRUST
 from mambo_sil.model.replay.log_replay import LogReplay
-from mambo_sil.model.replay.replay_errors import CALM_RAD, AxisErrors
+from mambo_sil.model.replay.replay_errors import CALM_RAD, AxisErrors, Trend
 
-SAME: Final = 0.008
-"""Largest miss of the controller that flew between lost rows: half of the motion misses less of it."""
-OTHER: Final = 0.013
-"""Least miss of another controller there."""
-TELLS: Final = 0.03
-"""Largest error that rounding and lost rows may make, over the standard deviation of the command, with which
-a log tells controllers apart that differ by a few percent."""
-TELLS_ONE_NORM: Final = 0.4
+TELLS: Final = 0.02
+"""Least gain of another controller that a log must tell from 1."""
 TELLS_M_S2: Final = 0.1
-"""The same of the thrust, absolute: 1 % of the weight."""
+"""Least offset of another controller's thrust that a log must tell: 1 % of the weight."""
 FAR: Final = 0.5
 """Least error of another controller, over the command's standard deviation, where the log does not say which
 inputs a step read."""
-LAST_DIGITS_RAD: Final = 2e-6
-"""Largest error of a tilt that is one of the last digits of single precision."""
 LEAST_UPDATES: Final = 150
 """Least number of updates to judge by."""
 MOST_FILLED: Final = 0.3
@@ -86,28 +78,20 @@ class Evidence:
         return any(one.moves and one.worst >= FAR * one.spread for one in self.axes)
 
     @property
-    def misses(self) -> bool:
-        """Whether it counts what is missed between lost rows."""
-        return self.replay.filled > 0 and self.replay.settings.cost.norm == "quadratic"
+    def trend(self) -> tuple[AxisErrors, Trend] | None:
+        """An axis, and the trend of its errors that is farthest beyond what is tolerated, if there is one."""
+        off = [(one, trend) for one in self.axes for trend in one.trends if trend.is_off]
+        return max(off, key=lambda each: abs(each[1].value) / each[1].tolerated, default=None)
 
     @property
-    def blurred(self) -> AxisErrors | None:
-        """The first axis of which rounding and lost rows leave too much open, if there is one."""
-        quadratic = self.replay.settings.cost.norm == "quadratic"
-        share = TELLS if quadratic else TELLS_ONE_NORM
+    def blurred(self) -> tuple[AxisErrors, float] | None:
+        """The first axis that the log tells too little of, if there is one, and how many times too little."""
         for one in self.axes:
-            most = share * one.spread if one.is_tilt else TELLS_M_S2
-            if (one.moves or not one.is_tilt) and one.expected > most:
-                return one
+            for trend in one.trends:
+                kind, most = ("gain", TELLS) if one.is_tilt else ("offset", TELLS_M_S2)
+                if trend.kind == kind and trend.tolerated > most:
+                    return one, trend.tolerated / most
         return None
-
-
-def _missed(evidence: Evidence, least: float) -> AxisErrors | None:
-    """Return an axis that misses `least` of its motion or more, and more than rounding and lost rows do."""
-    if not evidence.misses:
-        return None
-    tilts = [one for one in evidence.axes if one.moves]
-    return next((one for one in tilts if one.miss >= max(least, 1.5 * one.expected_miss)), None)
 
 
 def _farthest(evidence: Evidence) -> AxisErrors:
@@ -132,48 +116,30 @@ def _off(evidence: Evidence) -> str:
     )
 
 
-def _missing(evidence: Evidence, least: float) -> str:
-    """Say how much of its motion an axis misses."""
-    one = _missed(evidence, least)
-    return "" if one is None else f"{one.axis.name} misses {100.0 * one.miss:.2g} % of its motion"
+def _trend(evidence: Evidence) -> str:
+    """Say which trend the errors of the whole log have."""
+    if evidence.trend is None:
+        return ""
+    one, trend = evidence.trend
+    return f"in the whole log {one.axis.name} is {one.trend_text(trend)}"
 
 
 def _blur(evidence: Evidence) -> str:
-    """Say which column has too few digits, or that the lost rows leave too much open."""
-    one, errors = evidence.blurred, evidence.replay.input_errors
-    if one is None or errors is None:
+    """Say which column has too few digits, or that lost rows or a beginning leave too much open."""
+    errors = evidence.replay.input_errors
+    if evidence.blurred is None or errors is None:
         return ""
+    one, times = evidence.blurred
     k, settled = evidence.axes.index(one), evidence.replay.settled
     alone = {name: float(np.median(np.abs(each[settled, k]))) for name, each in errors.alone.items()}
     name = max(alone, key=lambda each: alone[each], default="")
-    if not name or alone[name] < 0.3 * one.expected:
-        return (
-            f"the rows that are lost leave {one.axis.name} open by {one.text(one.expected)}: log more of them"
-        )
-    most = TELLS * one.spread if one.is_tilt else TELLS_M_S2
-    resolution = errors.resolutions[name]
-    column = "thrust" if name == THRUST else name
-    return f"{column} has {resolution.text}, log {resolution.finer(one.expected / most)}"
-
-
-def _has_other_bits(evidence: Evidence) -> bool:
-    """Return whether the bits of a log that lacks nothing are those of another controller.
-
-    That is known where the log begins with the controller: if no command is equal, and not only the last
-    digits differ as in another type of float; of a 1-norm if the first one is not equal.
-    """
-    replay = evidence.replay
-    if replay.filled or replay.gaps or replay.input_errors is not None:
-        return False
-    known = np.isinf(replay.begun_s)
-    if not (replay.from_start and replay.is_exact and known[0]):
-        return False
-    error = np.abs((replay.replayed - replay.logged)[known])
-    differs = np.asarray(error.max(axis=1) > 0.0)
-    if replay.settings.cost.norm != "quadratic":
-        return bool(differs[0])
-    is_more = replay.settings.code.scalar == "fixed" or error[:, : len(TILTS)].max() > LAST_DIGITS_RAD
-    return bool(differs.all() and is_more)
+    if name and alone[name] >= 0.3 * one.expected:
+        resolution = errors.resolutions[name]
+        column = "thrust" if name == THRUST else name
+        return f"{column} has {resolution.text}, log {resolution.finer(times)}"
+    if evidence.replay.lost:
+        return f"the rows that are lost leave too much of {one.axis.name} open: log more of them"
+    return f"an unknown beginning leaves too much of {one.axis.name} open: log from the first command on"
 
 
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
@@ -197,11 +163,6 @@ BRANCHES: Final[tuple[Branch, ...]] = (
         _off,
     ),
     (
-        ReplayVerdict.NO,
-        _has_other_bits,
-        lambda _: "the log has all digits from its start on, and the bits are others",
-    ),
-    (
         ReplayVerdict.CANNOT_TELL,
         lambda e: e.is_rare,
         lambda _: "the log lacks most updates: log every one",
@@ -216,17 +177,8 @@ BRANCHES: Final[tuple[Branch, ...]] = (
         lambda e: e.is_off,  # of a log that is not exact: exact ones were judged above
         lambda _: "which inputs a step read is not in its row: log those of the step",
     ),
+    (ReplayVerdict.NO, lambda e: e.trend is not None, _trend),
     (ReplayVerdict.CANNOT_TELL, lambda e: e.blurred is not None, _blur),
-    (
-        ReplayVerdict.NO,
-        lambda e: _missed(e, OTHER) is not None,
-        lambda e: f"{_missing(e, OTHER)}, more than the {100.0 * OTHER:g} % that lost rows may cost",
-    ),
-    (
-        ReplayVerdict.CANNOT_TELL,
-        lambda e: _missed(e, SAME) is not None,
-        lambda e: f"{_missing(e, SAME)}, and lost rows may cost that: log more of them, or a faster curve",
-    ),
     (ReplayVerdict.YES, lambda _: True, _near),
 )
 """Verdict, whether it holds, and its reason; the first that holds is that of a log."""

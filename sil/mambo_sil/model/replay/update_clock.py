@@ -16,6 +16,8 @@ _MOST_BETWEEN: Final = 2
 """Largest such multiple."""
 _LEARNS: Final = 0.1
 """Share of a row's delay by which the clock of the updates follows: it drifts, but does not jitter."""
+_MOST_ALIKE: Final = 0.1
+"""Largest share of rows with the count of the row before of a count that tells the updates apart."""
 _FIRST_ROWS, _ALL_THERE = 5, 1.7
 """Rows by which that clock begins, if no two of them are more than these periods apart."""
 
@@ -68,11 +70,16 @@ def read_clock(log: FlightLog, period_s: float) -> UpdateClock:
         end_s = min(log.signals[name].time_s[-1] for name in (*COMMANDS, *STATE, *TARGET))
         time_s = begin_s + period_s * np.arange(1 + max(int((end_s - begin_s) / period_s), -1))
         return UpdateClock(time_s, np.zeros(len(time_s), bool))
-    if UPDATE in log.signals:
+    if UPDATE in log.signals and _counts_each(log.signals[UPDATE]):
         return _counted(log.signals[UPDATE], period_s)
     number = _numbers(row_s, period_s)
     time_s = np.interp(np.arange(number[-1] + 1), number, row_s)
     return UpdateClock(time_s, np.zeros(len(time_s), bool), row_s, number)
+
+
+def _counts_each(count: Signal) -> bool:
+    """Return whether a count tells the updates apart: one of half precision does not."""
+    return bool((np.diff(count.value) == 0.0).mean() < _MOST_ALIKE)
 
 
 def _counted(count: Signal, period_s: float) -> UpdateClock:
