@@ -6,7 +6,7 @@ controller begins, with one that begins up to `SETTLING_S` later.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -67,7 +67,7 @@ def input_errors(
 
     `is_unknown` says where the controller begins in a state that the log does not have (k,).
     """
-    state = filled.state
+    inputs, state = replace(inputs, state=filled.state), filled.state
     values = np.column_stack([_measured(inputs, state), inputs.target, inputs.command])
     resolutions = _resolutions(inputs, values)
     is_lost = bool((~inputs.is_logged).any())
@@ -91,7 +91,7 @@ def input_errors(
             noise[1 + DRAWS + number, :, column] = drawn[DRAWS]
         if inputs.begins[first]:
             begin(batch, inputs, first)
-        errors[:, first:end] = _replay(batch, inputs, state, late, range(first, end), noise)
+        errors[:, first:end] = _replay(batch, inputs, late, range(first, end), noise)
     alone = {inputs.names[column]: errors[DRAWS + number] for number, column in enumerate(columns)}
     return InputErrors(errors[:DRAWS], alone, resolutions)
 
@@ -108,7 +108,6 @@ def _late_beginnings(is_unknown: NDArray[np.bool_], most: int) -> dict[int, list
 def _replay(
     batch: CompiledController,
     inputs: LoggedInputs,
-    state: FloatArray,
     late: Mapping[int, list[int]],
     updates: range,
     noise: FloatArray,
@@ -118,15 +117,15 @@ def _replay(
     Some begin at updates in `late`, and every other one is told of the floor where the drone may lie on it.
     Returns by what the commands of the others would be off (n - 1, k, axes).
     """
-    measured, wanted = _measured(inputs, state).shape[1], inputs.target.shape[1]
+    measured, wanted = _measured(inputs, inputs.state).shape[1], inputs.target.shape[1]
     sent = measured + wanted
-    states = np.zeros((batch.n, state.shape[1]))
+    states = np.zeros((batch.n, inputs.state.shape[1]))
     errors = noise[1:, :, sent:].copy()
     for number, k in enumerate(updates):
         now = noise[:, number]
         if k in late:
             begin_late(batch, inputs, k, late[k])
-        states[:] = state[k]
+        states[:] = inputs.state[k]
         if inputs.may_lie[k]:
             states[1 : DRAWS + 1 : 2, -1] = 1.0
         states[:, :measured] += now[:, :measured]

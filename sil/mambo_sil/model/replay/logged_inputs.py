@@ -302,9 +302,9 @@ def _elsewhere(state: FloatArray, is_told: NDArray[np.bool_], time_s: FloatArray
 
 
 def _at_rest(state: FloatArray) -> NDArray[np.bool_]:
-    """Return whether both velocities are 0 in every bit and were not before (k,), as where a flight begins."""
-    moves: NDArray[np.bool_] = state[:, 2:4].any(axis=1)
-    return ~moves & np.append(False, moves[:-1])
+    """Return whether both velocities are 0 in every bit and were not before (k,): a flight begins."""
+    moves = np.asarray(state[:, 2:4].any(axis=1))
+    return np.asarray(~moves & np.append([False], moves[:-1]))
 
 
 def _jumps(log: FlightLog, time_s: FloatArray) -> FloatArray:

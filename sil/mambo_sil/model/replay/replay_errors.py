@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
 from mambo_sil.model.replay.log_replay import LARGEST, LoggedAxis, LogReplay
@@ -16,11 +15,11 @@ Axes = tuple[float, float, float]
 
 KNOWN: Final[Axes] = (3e-6, 3e-6, 6e-5)
 """Largest median error of a second, of roll, pitch and thrust in rad, rad and m/s^2, where the log has all
-that the command depends on. Right logs: 0; with another type of float 1.2e-6 and 2.8e-5. Of faults the least are a
-velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad in a hover."""
+that the command depends on. Right logs: 0; with another type of float 1.2e-6 and 2.8e-5. Of faults the least
+are a velocity noise, a drag or a delay that is off by 10 to 20 %: .015, .02 and .09 mrad in a hover."""
 FIXED_POINT: Final[Axes] = (7e-5, 7e-5, 2e-3)
 """The same in fixed point, whose commands are multiples of 15 microradians and .6 mm/s^2, where the log lacks
-something: right logs then differ by up to four of them for good."""
+something, if only the digits beyond single precision: right logs differ by up to four of them for good."""
 CAPPED: Final[Axes] = (0.004, 0.004, 0.1)
 """Allowed in addition behind a thrust that a mixer may have capped; it fades with `CAPPED_FADES_S`."""
 CAPPED_FADES_S: Final[Axes] = (2.0, 2.0, 1.0)
@@ -96,9 +95,10 @@ class AxisErrors:
         return f"{100.0 * abs(trend.value):.2g} % {way}, {100.0 * trend.tolerated:.2g} % allowed"
 
 
-def known_of(settings: Settings, k: int, *, lacks: bool) -> float:
-    """Return what is tolerated of an axis, of a log that lacks something or not."""
-    return FIXED_POINT[k] if lacks and settings.code.scalar == "fixed" else KNOWN[k]
+def known_of(replay: LogReplay, k: int) -> float:
+    """Return what is tolerated of an axis besides what is drawn."""
+    has_all = replay.input_errors is None and not replay.is_single
+    return KNOWN[k] if has_all or replay.settings.code.scalar != "fixed" else FIXED_POINT[k]
 
 
 def errors_of(replay: LogReplay) -> tuple[AxisErrors, ...]:
@@ -145,8 +145,9 @@ def _trends(replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray) -> 
     for kind, shape in shapes.items():
         value, *others = (-_share(one[rows], shape[rows]) for one in (error, *drawn))
         least = LEAST_TRENDS[kind] * (100.0 if kind == "offset" and not is_tilt else 1.0)
+        known = known_of(replay, k) / float(np.sqrt(np.square(shape[rows]).mean()))
         spread = float(np.sqrt(np.square(others).mean()))
-        trends.append(Trend(kind, value, least + SPREADS * spread))
+        trends.append(Trend(kind, value, least + known + SPREADS * spread))
     return tuple(trends)
 
 
@@ -165,7 +166,7 @@ def _worst_second(
     """Return median error and tolerance of the second that is farthest off, and from when to when."""
     length = round(SECOND_S / replay.update_period_s)
     free = replay.settled & ~_limited(replay, k)
-    known = known_of(replay.settings, k, lacks=replay.input_errors is not None)
+    known = known_of(replay, k)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
