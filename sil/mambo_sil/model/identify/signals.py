@@ -46,6 +46,8 @@ LEVELLED: Final = "levelled"
 SHIFT: Final = "shift"
 """By what the frame of a controller of the height jumped before the step: shift_0 .. shift_6, of position,
 velocity (each x, y, up) and heading."""
+PARAMETER: Final = "parameter_"
+"""How signals of the parameters of our own flight mode begin; what follows is MC_NMPC_ in the log."""
 OF_HEIGHTS: Final = (*START_TILTS, START_THRUST, GROUNDED, LEVELLED)
 UPDATE: Final = "update"
 """The number of the update that the row is of, counted modulo `UPDATES`."""

@@ -1,6 +1,6 @@
 """Read a flight log of PX4 in the format ULog, with the optional package pyulog."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from mambo_sil.model.identify.signals import (
     GROUNDED,
     HEIGHT,
     LEVELLED,
+    PARAMETER,
     SEEN,
     SHIFT,
     START_THRUST,
@@ -83,6 +84,8 @@ _STEPS: Final[dict[str, tuple[str, float]]] = {
     **{f"{SHIFT}_{3 + k}": (f"velocity_shift[{k}]", 1.0) for k in range(3)},
     f"{SHIFT}_6": ("heading_shift", 1.0),
 }
+_PARAMETERS: Final = "MC_NMPC_"
+"""How the names of the module's parameters begin."""
 _DAMAGED: Final = "the log is damaged, or of another version; log another flight"
 _FASTER: Final = (
     "log at 50 Hz or more: SDLOG_PROFILE with high rate, or these lines, of topic and interval in ms, in "
@@ -98,11 +101,13 @@ def read_ulog(path: Path, longest_period_s: float = LONGEST_PERIOD_S) -> FlightL
     Raises LogError for a file that is no ULog or lacks a topic or a field, or whose angles come less often
     than every `longest_period_s`, and if pyulog is not installed.
     """
-    topics = _topics(path)
+    topics, parameters = _read(path)
     name = echo(str(path))
     steps = topics.get(STEPS)
     if steps is not None and (flies := steps["active"] > 0.0).any():
-        return demand_one_clock(FlightLog(name, _steps(steps, flies)), _CLOCK, f"log {STEPS} 0")
+        lacks = f"{name}: has no parameters {_PARAMETERS}*: replayed with the limits of the settings"
+        log = FlightLog(name, _steps(steps, flies) | parameters, () if parameters else (lacks,))
+        return demand_one_clock(log, _CLOCK, f"log {STEPS} 0")
     return demand_one_clock(FlightLog(name, _signals(topics, name)), _CLOCK, _FASTER, longest_period_s)
 
 
@@ -157,8 +162,8 @@ class Topic(dict[str, FloatArray]):
         raise LogError((f"{self._said} {field}; {_DAMAGED}",))
 
 
-def _topics(path: Path) -> dict[str, Topic]:
-    """Return the fields of the first instance of each topic.
+def _read(path: Path) -> tuple[dict[str, Topic], dict[str, Signal]]:
+    """Return the fields of the first instance of each topic, and the parameters of our own flight mode.
 
     A topic without time stamps makes pyulog lose other topics; so it is looked for before.
     """
@@ -171,7 +176,25 @@ def _topics(path: Path) -> dict[str, Topic]:
             fields = getattr(log.message_formats.get(topic), "fields", [(_CLOCK,)])
             if _CLOCK not in (field[-1] for field in fields):
                 raise LogError((f"{name}: {topic} has no field {_CLOCK}; {_DAMAGED}",))
-        return {each.name: Topic(name, each.name, each.data) for each in log.data_list if each.multi_id == 0}
+        topics = {
+            each.name: Topic(name, each.name, each.data) for each in log.data_list if each.multi_id == 0
+        }
+        return topics, _parameters(log.initial_parameters, log.changed_parameters)
+
+
+def _parameters(initial: Mapping[str, float], changes: Sequence[tuple[int, str, float]]) -> dict[str, Signal]:
+    """Return the parameters of our own flight mode, at first from time 0 on, and at each change.
+
+    A change has the time of the last sample before it.
+    """
+    found = {}
+    for name, value in initial.items():
+        if name.startswith(_PARAMETERS):
+            later = {1e-6 * at_us: new for at_us, changed, new in changes if changed == name}
+            times_s, values = zip(*sorted(({0.0: value} | later).items()), strict=True)
+            signal = f"{PARAMETER}{name.removeprefix(_PARAMETERS)}"
+            found[signal] = Signal(np.array(times_s), np.array(values, np.float64), name)
+    return found
 
 
 def _steps(steps: Mapping[str, FloatArray], flies: NDArray[np.bool_]) -> dict[str, Signal]:

@@ -15,6 +15,7 @@ from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.errors import ResultsError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.columns import Column
+from mambo_sil.model.replay.changed_limits import place_changes
 from mambo_sil.model.replay.input_errors import SETTLING_S, Filled, InputErrors, input_errors
 from mambo_sil.model.replay.logged_inputs import LoggedInputs, read_inputs
 from mambo_sil.model.replay.lost_inputs import LostInputs, blocks_of
@@ -114,7 +115,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     it. One of the height is in the air where the log does not say that it was on the floor, and is not told
     what a mixer made of its thrust, which no log shows. Raises LogError.
     """
-    inputs = read_inputs(path, columns, settings)
+    inputs = place_changes(read_inputs(path, columns, settings), settings)
     there = inputs.is_logged
     is_whole, is_quadratic, own = bool(there.all()), settings.cost.norm == "quadratic", settings
     if not is_whole and is_quadratic and settings.code.scalar == "fixed":

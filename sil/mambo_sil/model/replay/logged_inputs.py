@@ -23,6 +23,7 @@ from mambo_sil.model.identify.signals import (
     JUMP,
     JUMPS,
     LEVELLED,
+    PARAMETER,
     SHIFT,
     START_THRUST,
     START_TILTS,
@@ -37,6 +38,7 @@ from mambo_sil.model.identify.signals import (
 )
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
 from mambo_sil.model.replay.beginning import is_from_start, is_simulated
+from mambo_sil.model.replay.flown_limits import Limits, flown_limits
 from mambo_sil.model.replay.interpolation import fill
 from mambo_sil.model.replay.logged_columns import (
     APP_GROUP,
@@ -104,6 +106,10 @@ class LoggedInputs:
     """Roll and pitch (k, 2), and the thrust over mass (k, 3) where `has_thrust`."""
     resampled: bool
     """Whether the rows of the log are not the updates: inputs are interpolated, commands held."""
+    limits: Limits
+    """The limits that are set before an update."""
+    changes: tuple[int, ...]
+    """Updates at about which they change in flight."""
     names: tuple[str, ...]
     """Signals of the columns of state, target and command, in this order."""
     spread: FloatArray
@@ -186,6 +192,8 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         is_exact=not clock.resampled and _is_of_rows(log, needed),
         command=command,
         resampled=clock.resampled,
+        limits=_limits(log, settings, time_s, begins),
+        changes=tuple(_changes(log, time_s)),
         names=needed,
         spread=spread,
         resolutions={
@@ -261,6 +269,29 @@ def _filled(names: tuple[str, ...], found: FloatArray) -> tuple[FloatArray, Floa
         columns.append(fill(known, there))
     filled, spread = (np.stack(each, axis=1) for each in zip(*columns, strict=True))
     return filled, spread
+
+
+def _changes(log: FlightLog, time_s: FloatArray) -> list[int]:
+    """Return the updates at which parameters of our own flight mode change."""
+    times_s = {at_s for name in _parameters(log) for at_s in log.signals[name].time_s[1:].tolist()}
+    return [int(np.searchsorted(time_s, at_s)) for at_s in sorted(times_s) if time_s[0] < at_s < time_s[-1]]
+
+
+def _parameters(log: FlightLog) -> list[str]:
+    """Return the signals of parameters."""
+    return [name for name in log.signals if name.startswith(PARAMETER)]
+
+
+def _limits(log: FlightLog, settings: Settings, time_s: FloatArray, begins: NDArray[np.bool_]) -> Limits:
+    """Return the limits by the parameters of our own flight mode: at beginnings, and where they change."""
+    names, found = _parameters(log), {}
+    for k in sorted({0, *_changes(log, time_s), *np.flatnonzero(begins).tolist()}) if names else ():
+        values = _held(log, tuple(names), time_s[k : k + 1])[0].tolist()
+        written = dict(zip((name.removeprefix(PARAMETER) for name in names), values, strict=True))
+        limits = flown_limits(settings, written)
+        if limits is not None:
+            found[k] = limits
+    return found
 
 
 def _near_floor(height_m: FloatArray, floor_m: float) -> NDArray[np.bool_]:

@@ -28,6 +28,10 @@ SPREADS: Final = 5.0
 LEAST_TRENDS: Final = {"gain": 5e-4, "offset": 2e-5, "delay": 5e-4}
 """Trends that are no fault: a gain, an offset in rad (of the thrust 100 times that), and a delay in s."""
 SECOND_S: Final = 1.0
+MOMENT: Final = 5
+MOMENT_FACTOR: Final = 30.0
+"""Updates of a moment, and what is tolerated of one, over that of a second: last digits differ by a tenth of
+that, a limit that acts by more."""
 _LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
 """Least shares of a second's updates that can be judged, and that are not at the tilt limit."""
 CALM_RAD: Final = 1e-3
@@ -112,7 +116,7 @@ def _axis(replay: LogReplay, k: int) -> AxisErrors:
     error = replay.replayed[:, k] - logged
     draws = replay.input_errors
     drawn = draws.drawn[:, :, k] if draws is not None else np.zeros((1, len(error)))
-    worst, tolerated, from_s, until_s = _worst_second(replay, k, np.abs(error), np.abs(drawn))
+    worst, tolerated, from_s, until_s = _worst(replay, k, np.abs(error), np.abs(drawn))
     none = not settled.any()
     return AxisErrors(
         axis=replay.axes[k],
@@ -160,13 +164,25 @@ def _share(error: FloatArray, shape: FloatArray) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def _worst_second(
+def _worst(
     replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray
 ) -> tuple[float, float, float, float]:
-    """Return median error and tolerance of the second that is farthest off, and from when to when."""
-    length = round(SECOND_S / replay.update_period_s)
-    free = replay.settled & ~_limited(replay, k)
-    known = known_of(replay, k)
+    """Return median error and tolerance of the second that is farthest off, and from when to when.
+
+    Of a log that lacks nothing, likewise of a few updates in which more than the last digits differ.
+    """
+    second = _worst_window(replay, k, (error, drawn), round(SECOND_S / replay.update_period_s), 1.0)
+    if replay.input_errors is not None or np.isfinite(replay.capped_s).any() or not second[0] <= second[1]:
+        return second
+    moment = _worst_window(replay, k, (error, drawn), MOMENT, MOMENT_FACTOR)
+    return moment if moment[0] > moment[1] else second
+
+
+def _worst_window(
+    replay: LogReplay, k: int, errors: tuple[FloatArray, FloatArray], length: int, factor: float
+) -> tuple[float, float, float, float]:
+    """Return the same for windows of `length` updates, with `factor` times what is tolerated."""
+    (error, drawn), free = errors, replay.settled & ~_limited(replay, k)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
@@ -175,7 +191,7 @@ def _worst_second(
             continue
         since_s = float(replay.capped_s[rows][judged].min())
         capped = CAPPED[k] * math.exp(-since_s / CAPPED_FADES_S[k])
-        tolerated = known + capped + SPREADS * _open(drawn[:, rows][:, judged])
+        tolerated = factor * known_of(replay, k) + capped + SPREADS * _open(drawn[:, rows][:, judged])
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan

@@ -27,6 +27,8 @@ def step(
     command is none of the next ones. `others` replaces targets (n, j) and commands (n, axes) of the log.
     """
     n, settings = len(states), controller.settings
+    if k in inputs.limits:
+        controller.set_limits(np.repeat(inputs.limits[k][np.newaxis], n, axis=0))
     commands_thrust = settings.height is not None
     if inputs.jump[k].any():
         change = inputs.jump[k] * _UPWARDS if commands_thrust else inputs.jump[k][_LEVEL]
