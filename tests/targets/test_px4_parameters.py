@@ -24,7 +24,7 @@ LACKS: Final = "flight.ulg: has no parameters MC_NMPC_*: replayed with the limit
 
 @cache
 def flown(*changes: Change) -> bytes:
-    """Fly to and fro by the sticks, with tight parameters and changes of them; return the ULog without them."""
+    """Fly to and fro by the sticks, with tight parameters and changes of them; return a ULog without them."""
     desk = Px4Desk(build_px4(px4_settings()))
     for name, value in TIGHT.items():
         desk.set(f"px4.{name}", value)

@@ -33,6 +33,8 @@ SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.025
 would be read as a late one."""
 
 
+_SCRAMBLED: Final = 0.1
+"""Least share of rows that are earlier than the row before, of rows in another order."""
 COUNTER_BITS: Final = (24, 32)
 """Counters of ms: in the Crazyflie's log packets, which ends after 4.7 hours, and of its clock."""
 WRAP_SHARE: Final = 64.0
@@ -162,6 +164,10 @@ def _log(
 ) -> FlightLog:
     """Return the log of the columns' values with `remarks` on its rows; raises LogError."""
     time_s = columns[TIME].factor * _unwrapped(values[TIME])
+    if _is_scrambled(time_s):
+        order = np.argsort(time_s)  # what has no time is last
+        time_s, values = time_s[order], {signal: each[order] for signal, each in values.items()}
+        remarks.append(f"{name}: the rows are in another order than their times: sorted")
     timed = np.isfinite(time_s)
     faults, signals = [], {}
     for signal, column in columns.items():
@@ -180,6 +186,18 @@ def _log(
     if faults:
         raise LogError(tuple(faults))
     return FlightLog(name, signals, tuple(remarks))
+
+
+def _is_scrambled(time_s: FloatArray) -> bool:
+    """Return whether rows with times (k,) are those of one clock, in another order.
+
+    Times of two flights fall once, and those of two clocks are uneven when sorted.
+    """
+    steps = np.diff(time_s[np.isfinite(time_s)])
+    if len(steps) == 0 or (steps < 0.0).mean() < _SCRAMBLED:
+        return False
+    apart = np.diff(np.sort(time_s[np.isfinite(time_s)]))
+    return bool(apart.min() > 0.5 * np.median(apart))
 
 
 def _unwrapped(ticks: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 The log is replayed as it may have been: with inputs and commands drawn within the rounding of each column, on
 lost rows within the spread of what is filled, and, where the log does not have the state in which the
-controller begins, with one that begins up to `SETTLING_S` later.
+controller begins, with one that begins up to `LATEST_S` later.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,6 +25,10 @@ SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
 DRAWS: Final = 12
 """Flights that are drawn."""
+LATE: Final = DRAWS // 2
+"""Those of them, the first ones, that begin later than the log where its beginning is unknown."""
+LATEST_S: Final = 1.5
+"""By how much the last of them does: what the controller did not know fades with about 2 s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +85,7 @@ def input_errors(
     batch = CompiledController(settings, 1 + DRAWS + len(columns))
     errors = np.zeros((batch.n - 1, *inputs.command.shape))
     generator = np.random.default_rng(0)
-    late = _late_beginnings(is_unknown, round(SETTLING_S / settings.horizon.update_period_s))
+    late = _late_beginnings(is_unknown, round(LATEST_S / settings.horizon.update_period_s))
     for first, end, _ in blocks:
         noise = np.zeros((batch.n, end - first, values.shape[1]))
         noise[1 : DRAWS + 1] = spread[first:end] * _normal(~inputs.is_logged[first:end], values, generator)
@@ -100,8 +104,8 @@ def _late_beginnings(is_unknown: NDArray[np.bool_], most: int) -> dict[int, list
     """Return the drawn flights that begin at an update, up to `most` updates behind an unknown beginning."""
     found: dict[int, list[int]] = {}
     for last in np.flatnonzero(is_unknown & ~np.append(is_unknown[1:], values=False)).tolist():
-        for draw in range(1, DRAWS + 1):
-            found.setdefault(last + max(draw * most // DRAWS, 1), []).append(draw)
+        for draw in range(1, LATE + 1):
+            found.setdefault(last + max(draw * most // LATE, 1), []).append(draw)
     return found
 
 

@@ -167,14 +167,15 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
 def _begins_unknown(inputs: LoggedInputs, replayed: FloatArray, tilt_rad: float) -> NDArray[np.bool_]:
     """Return whether the controller begins at an update (k,) in a state that the log does not have.
 
-    It has it where the log begins with the first update, or where the first command, of a tilt below the
-    limit, is that of the log.
+    It has it where the log begins with the first update, or where the first roll or pitch, other than 0 and
+    below the limit, is that of the log.
     """
     first = np.flatnonzero(inputs.is_logged)[0]
     begins = inputs.begins.copy()
     begins[first] = not inputs.from_start
-    is_free = (np.abs(inputs.command_rad) < LARGEST * tilt_rad).all(axis=1)
-    is_known = (replayed == inputs.command).all(axis=1) & inputs.command_rad.any(axis=1) & is_free
+    size_rad = np.abs(inputs.command_rad)
+    tells = (size_rad > 0.0) & (size_rad < LARGEST * tilt_rad)
+    is_known = (tells & (replayed[:, :2] == inputs.command_rad)).any(axis=1)
     return np.asarray(begins & ~is_known | inputs.may_lie)
 
 

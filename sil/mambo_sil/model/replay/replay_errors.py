@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.model.identify.signals import TILTS
+from mambo_sil.model.replay.input_errors import LATE
 from mambo_sil.model.replay.log_replay import LARGEST, LoggedAxis, LogReplay
 
 Axes = tuple[float, float, float]
@@ -28,10 +29,9 @@ SPREADS: Final = 5.0
 LEAST_TRENDS: Final = {"gain": 5e-4, "offset": 2e-5, "delay": 5e-4}
 """Trends that are no fault: a gain, an offset in rad (of the thrust 100 times that), and a delay in s."""
 SECOND_S: Final = 1.0
-MOMENT: Final = 5
-MOMENT_FACTOR: Final = 30.0
-"""Updates of a moment, and what is tolerated of one, over that of a second: last digits differ by a tenth of
-that, a limit that acts by more."""
+MOMENT_FACTOR: Final = 50.0
+"""What is tolerated of one update, over that of a second: last digits are off by up to half of that, and a
+limit that acts by much more."""
 _LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
 """Least shares of a second's updates that can be judged, and that are not at the tilt limit."""
 CALM_RAD: Final = 1e-3
@@ -41,11 +41,15 @@ _CALM_M_S2: Final = 0.05
 
 @dataclass(frozen=True)
 class Trend:
-    """What a whole log has of one kind of error, a gain, an offset or a delay, and what is tolerated."""
+    """What a whole log has of one kind of error, a gain, an offset or a delay, and what is tolerated.
+
+    open: what is tolerated because of few digits and lost rows, without an unknown beginning.
+    """
 
     kind: str
     value: float
     tolerated: float
+    open: float
 
     @property
     def is_off(self) -> bool:
@@ -136,23 +140,36 @@ def _open(drawn: FloatArray) -> float:
 
 
 def _trends(replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray) -> tuple[Trend, ...]:
-    """Return the trends of an error (k,) of an axis, and what those (draws, k) that are drawn allow."""
+    """Return the trends of an error (k,) of an axis, and what those (draws, k) that are drawn allow.
+
+    A draw is a log that may have been: its commands are those of the replay without the error.
+    """
     rows = replay.settled & ~_limited(replay, k)
     if not rows.any():
         return ()
-    logged, is_tilt = replay.logged[:, k], k < len(TILTS)
-    shapes = {"offset": np.ones(len(logged))}
-    if logged[rows].std() >= (CALM_RAD if is_tilt else _CALM_M_S2):
-        shapes["gain"] = logged - logged[rows].mean()
-        shapes["delay"] = -np.gradient(logged, replay.time_s)
+    shapes = _shapes(replay, k, rows, error)
+    others = [(_shapes(replay, k, rows, one), one) for one in drawn]
     trends = []
     for kind, shape in shapes.items():
-        value, *others = (-_share(one[rows], shape[rows]) for one in (error, *drawn))
-        least = LEAST_TRENDS[kind] * (100.0 if kind == "offset" and not is_tilt else 1.0)
-        known = known_of(replay, k) / float(np.sqrt(np.square(shape[rows]).mean()))
-        spread = float(np.sqrt(np.square(others).mean()))
-        trends.append(Trend(kind, value, least + known + SPREADS * spread))
+        least = LEAST_TRENDS[kind] * (100.0 if kind == "offset" and k >= len(TILTS) else 1.0)
+        known = known_of(replay, k) / float(np.sqrt(np.square(shape).mean()))
+        squares = np.square([_share(one[rows], each[kind]) for each, one in others])
+        tolerated, left = (least + known + SPREADS * math.sqrt(s.mean()) for s in (squares, squares[LATE:]))
+        trends.append(Trend(kind, -_share(error[rows], shape), tolerated, left))
     return tuple(trends)
+
+
+def _shapes(replay: LogReplay, k: int, rows: NDArray[np.bool_], error: FloatArray) -> dict[str, FloatArray]:
+    """Return what an offset, a gain and a delay of 1 take from the commands of a log with an error (k,).
+
+    A log at rest has no gain and no delay; all are at `rows`.
+    """
+    logged = replay.replayed[:, k] - error
+    shapes = {"offset": np.ones(int(rows.sum()))}
+    if replay.logged[rows, k].std() >= (CALM_RAD if k < len(TILTS) else _CALM_M_S2):
+        shapes["gain"] = logged[rows] - logged[rows].mean()
+        shapes["delay"] = -np.gradient(logged, replay.time_s)[rows]
+    return shapes
 
 
 def _share(error: FloatArray, shape: FloatArray) -> float:
@@ -169,20 +186,25 @@ def _worst(
 ) -> tuple[float, float, float, float]:
     """Return median error and tolerance of the second that is farthest off, and from when to when.
 
-    Of a log that lacks nothing, likewise of a few updates in which more than the last digits differ.
+    Of a log that lacks nothing, likewise of one update where that is off by more than last digits.
     """
-    second = _worst_window(replay, k, (error, drawn), round(SECOND_S / replay.update_period_s), 1.0)
-    if replay.input_errors is not None or np.isfinite(replay.capped_s).any() or not second[0] <= second[1]:
-        return second
-    moment = _worst_window(replay, k, (error, drawn), MOMENT, MOMENT_FACTOR)
-    return moment if moment[0] > moment[1] else second
+    free = replay.settled & ~_limited(replay, k)
+    lacks = replay.input_errors is not None or np.isfinite(replay.capped_s).any()
+    at = int(np.argmax(np.where(free, error, 0.0)))
+    most = MOMENT_FACTOR * known_of(replay, k)
+    worst = _worst_second(replay, k, error, drawn)
+    if lacks or error[at] <= most or worst[0] > worst[1]:
+        return worst
+    at_s = float(replay.time_s[at] - replay.time_s[0])
+    return float(error[at]), most, at_s, at_s
 
 
-def _worst_window(
-    replay: LogReplay, k: int, errors: tuple[FloatArray, FloatArray], length: int, factor: float
+def _worst_second(
+    replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray
 ) -> tuple[float, float, float, float]:
-    """Return the same for windows of `length` updates, with `factor` times what is tolerated."""
-    (error, drawn), free = errors, replay.settled & ~_limited(replay, k)
+    """Return the same of seconds alone."""
+    length, known = round(SECOND_S / replay.update_period_s), known_of(replay, k)
+    free = replay.settled & ~_limited(replay, k)
     found = []
     for first in range(0, max(len(error) - length // 2, 1), max(length // 2, 1)):
         rows = slice(first, first + length)
@@ -191,7 +213,7 @@ def _worst_window(
             continue
         since_s = float(replay.capped_s[rows][judged].min())
         capped = CAPPED[k] * math.exp(-since_s / CAPPED_FADES_S[k])
-        tolerated = factor * known_of(replay, k) + capped + SPREADS * _open(drawn[:, rows][:, judged])
+        tolerated = known + capped + SPREADS * _open(drawn[:, rows][:, judged])
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan

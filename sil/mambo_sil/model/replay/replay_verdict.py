@@ -13,7 +13,9 @@ from mambo_sil.model.replay.log_replay import LogReplay
 from mambo_sil.model.replay.replay_errors import CALM_RAD, AxisErrors, Trend
 
 TELLS: Final = 0.02
-"""Least gain of another controller that a log must tell from 1."""
+"""Gain of another controller that a log with few digits or lost rows must tell from 1."""
+TELLS_ONE_NORM: Final = 0.2
+"""The same of a 1-norm, whose search never forgets."""
 TELLS_M_S2: Final = 0.1
 """Least offset of another controller's thrust that a log must tell: 1 % of the weight."""
 FAR: Final = 0.5
@@ -21,6 +23,8 @@ FAR: Final = 0.5
 inputs a step read."""
 LEAST_UPDATES: Final = 150
 """Least number of updates to judge by."""
+MOST_REFUSED: Final = 0.5
+"""Largest share of updates whose inputs the controller refuses, of one that flew."""
 MOST_FILLED: Final = 0.3
 """Largest share of filled updates among which the others tell controllers apart."""
 
@@ -68,6 +72,11 @@ class Evidence:
         )
 
     @property
+    def refused(self) -> float:
+        """Share of updates whose inputs the controller refuses."""
+        return float((self.replay.status != 0).mean())
+
+    @property
     def is_off(self) -> bool:
         """Whether a second is farther off than tolerated."""
         return any(one.worst > one.tolerated for one in self.axes)
@@ -85,12 +94,16 @@ class Evidence:
 
     @property
     def blurred(self) -> tuple[AxisErrors, float] | None:
-        """The first axis that the log tells too little of, if there is one, and how many times too little."""
+        """The first axis that few digits or lost rows tell too little of, and how many times too little."""
+        errors = self.replay.input_errors
+        if errors is None or not (errors.resolutions or self.replay.lost):
+            return None
+        tells = TELLS if self.replay.settings.cost.norm == "quadratic" else TELLS_ONE_NORM
         for one in self.axes:
             for trend in one.trends:
-                kind, most = ("gain", TELLS) if one.is_tilt else ("offset", TELLS_M_S2)
-                if trend.kind == kind and trend.tolerated > most:
-                    return one, trend.tolerated / most
+                kind, most = ("gain", tells) if one.is_tilt else ("offset", TELLS_M_S2)
+                if trend.kind == kind and trend.open > most:
+                    return one, trend.open / most
         return None
 
 
@@ -111,8 +124,8 @@ def _off(evidence: Evidence) -> str:
     """Say from when to when the axis that is farthest off is."""
     one = _farthest(evidence)
     return (
-        f"from {one.from_s:.1f} to {one.until_s:.1f} s {one.axis.name} is {one.text(one.worst)} off "
-        f"in the worst second, more than the {one.text(one.tolerated)} allowed"
+        f"from {one.from_s:.1f} to {one.until_s:.1f} s {one.axis.name} is {one.text(one.worst)} off, "
+        f"more than the {one.text(one.tolerated)} allowed"
     )
 
 
@@ -125,7 +138,7 @@ def _trend(evidence: Evidence) -> str:
 
 
 def _blur(evidence: Evidence) -> str:
-    """Say which column has too few digits, or that lost rows or a beginning leave too much open."""
+    """Say which column has too few digits, or that lost rows leave too much open."""
     errors = evidence.replay.input_errors
     if evidence.blurred is None or errors is None:
         return ""
@@ -137,14 +150,17 @@ def _blur(evidence: Evidence) -> str:
         resolution = errors.resolutions[name]
         column = "thrust" if name == THRUST else name
         return f"{column} has {resolution.text}, log {resolution.finer(times)}"
-    if evidence.replay.lost:
-        return f"the rows that are lost leave too much of {one.axis.name} open: log more of them"
-    return f"an unknown beginning leaves too much of {one.axis.name} open: log from the first command on"
+    return f"the rows that are lost leave too much of {one.axis.name} open: log more of them"
 
 
 Branch = tuple[ReplayVerdict, Callable[[Evidence], bool], Callable[[Evidence], str]]
 BRANCHES: Final[tuple[Branch, ...]] = (
     (ReplayVerdict.YES, lambda e: e.is_equal and e.moves, lambda _: "no bit differs"),
+    (
+        ReplayVerdict.NO,
+        lambda e: e.refused > MOST_REFUSED and e.moves,
+        lambda e: f"the controller refuses {100.0 * e.refused:.0f} % of the inputs of the log",
+    ),
     (
         ReplayVerdict.CANNOT_TELL,
         lambda e: e.judged < LEAST_UPDATES,
@@ -177,8 +193,8 @@ BRANCHES: Final[tuple[Branch, ...]] = (
         lambda e: e.is_off,  # of a log that is not exact: exact ones were judged above
         lambda _: "which inputs a step read is not in its row: log those of the step",
     ),
-    (ReplayVerdict.NO, lambda e: e.trend is not None, _trend),
     (ReplayVerdict.CANNOT_TELL, lambda e: e.blurred is not None, _blur),
+    (ReplayVerdict.NO, lambda e: e.trend is not None, _trend),
     (ReplayVerdict.YES, lambda _: True, _near),
 )
 """Verdict, whether it holds, and its reason; the first that holds is that of a log."""
