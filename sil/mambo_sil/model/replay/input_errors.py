@@ -18,28 +18,26 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.resolution import Resolution, hardly_changes
 from mambo_sil.model.identify.signals import COMMANDS, THRUST
 from mambo_sil.model.replay.logged_inputs import LoggedInputs
-from mambo_sil.model.replay.lost_inputs import ESTIMATED, Block
+from mambo_sil.model.replay.lost_inputs import DRAWS, ESTIMATED, Block
 from mambo_sil.model.replay.replay_step import begin, begin_late, command_of, step
 
 SETTLING_S: Final = 2.0
 """Time from a beginning of the controller in which its estimates approach the estimates of the flight."""
-DRAWS: Final = 12
-"""Flights that are drawn."""
 LATE: Final = DRAWS // 2
-"""Those of them, the first ones, that begin later than the log where its beginning is unknown."""
+"""Drawn flights, the first ones, that begin later than the log where its beginning is unknown."""
 LATEST_S: Final = 1.5
 """By how much the last of them does: what the controller did not know fades with about 2 s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Filled:
-    """The states (k, m) of a log, and what the commands leave of their first numbers (k, 4).
+    """The states (k, m) of a log, and drawn errors (draws, k, 4) of their first numbers.
 
     None where the lost ones are interpolated.
     """
 
     state: FloatArray
-    left: FloatArray | None
+    drawn: FloatArray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +77,6 @@ def input_errors(
         return None
     spread = inputs.spread.copy()
     spread[:, len(values[0]) - inputs.command.shape[1] :] = 0.0
-    if filled.left is not None:
-        spread[:, :ESTIMATED] = filled.left
     columns = [k for k, name in enumerate(inputs.names) if name in resolutions]
     batch = CompiledController(settings, 1 + DRAWS + len(columns))
     errors = np.zeros((batch.n - 1, *inputs.command.shape))
@@ -89,6 +85,8 @@ def input_errors(
     for first, end, _ in blocks:
         noise = np.zeros((batch.n, end - first, values.shape[1]))
         noise[1 : DRAWS + 1] = spread[first:end] * _normal(~inputs.is_logged[first:end], values, generator)
+        if filled.drawn is not None:
+            noise[1 : DRAWS + 1, :, :ESTIMATED] = filled.drawn[:, first:end]
         for number, column in enumerate(columns):
             drawn = _drawn(values[first:end, column], resolutions[inputs.names[column]], generator)
             noise[1 : DRAWS + 1, :, column] += drawn[:DRAWS]
@@ -170,7 +168,6 @@ def _normal(is_lost: NDArray[np.bool_], values: FloatArray, generator: np.random
     gap = np.cumsum(np.diff(is_lost, prepend=False))
     own = generator.normal(size=(DRAWS, len(is_lost), values.shape[1]))
     shared = generator.normal(size=(DRAWS, int(gap[-1]) + 1, values.shape[1]))[:, gap]
-    shared[:, :, :ESTIMATED] = generator.normal(size=(DRAWS, len(is_lost), ESTIMATED))
     return np.asarray(np.sqrt(0.5) * (own + shared))
 
 

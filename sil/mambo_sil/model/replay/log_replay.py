@@ -134,7 +134,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         for k in range(first, end):
             done = step(controller, inputs, k, state[k : k + 1])
             replayed[k], status[k] = command_of(done, inputs)[0], done.status[0]
-    filled = Filled(state, None if lost is None else lost.left)
+    filled = Filled(state, None if lost is None else lost.drawn)
     is_unknown = _begins_unknown(inputs, replayed, settings.limits.tilt_rad)
     errors = input_errors(inputs, filled, settings, blocks, is_unknown)
     is_filled = np.zeros(len(there), bool)

@@ -15,6 +15,8 @@ BLOCK: Final = 100
 """Updates whose lost states are estimated at once."""
 AHEAD: Final = 50
 """Further updates whose commands are read for that."""
+DRAWS: Final = 12
+"""Flights that are drawn, of those that the log may be of."""
 ESTIMATED: Final = 4
 """Numbers of a state: position and velocity along x and y. Angles and height are slower, and interpolated."""
 _LEAST_SPREAD: Final = 1e-6
@@ -40,8 +42,9 @@ class LostInputs:
         self._batch = CompiledController(settings, 1 + ESTIMATED * most)
         spread = inputs.spread[:, :ESTIMATED].copy()
         self._deviation = np.maximum(spread, _LEAST_SPREAD)
-        self.left = spread
-        """Standard deviations (k, 4) that the commands leave of the numbers of a state."""
+        self.drawn = np.zeros((DRAWS, *spread.shape))
+        """Errors (draws, k, 4) of the numbers of a state that the commands leave possible."""
+        self._random = np.random.default_rng(1)
 
     def estimate(self, first: int, end: int, controller: CompiledController, state: FloatArray) -> FloatArray:
         """Return `state` (k, n) with the lost rows of first..end - 1 and of what follows estimated.
@@ -65,9 +68,10 @@ class LostInputs:
         found = np.asarray(commands, np.float64)[there]
         slopes = (found[:, 1:] - found[:, :1]).transpose(0, 2, 1).reshape(-1, count) / COMMAND_NOISE_RAD
         left = (inputs.command_rad[first:end][there] - found[:, 0]).reshape(-1) / COMMAND_NOISE_RAD
-        covariance = np.linalg.inv(slopes.T @ slopes + np.eye(count))
-        change = covariance @ (slopes.T @ left)
-        self.left[lost] = np.sqrt(np.diag(covariance)).reshape(-1, ESTIMATED) * self._deviation[lost]
+        precision = slopes.T @ slopes + np.eye(count)
+        change = np.linalg.solve(precision, slopes.T @ left)
+        drawn = np.linalg.solve(np.linalg.cholesky(precision).T, self._random.normal(size=(count, DRAWS)))
+        self.drawn[:, lost] = drawn.T.reshape(DRAWS, -1, ESTIMATED) * self._deviation[lost]
         estimated = state.copy()
         estimated[lost, :ESTIMATED] += change.reshape(-1, ESTIMATED) * self._deviation[lost]
         return estimated

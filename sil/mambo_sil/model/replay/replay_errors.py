@@ -37,6 +37,7 @@ _LEAST_JUDGED, _LEAST_FREE = 0.8, 0.1
 CALM_RAD: Final = 1e-3
 """Standard deviation of a command up to which an axis is at rest, and says nothing."""
 _CALM_M_S2: Final = 0.05
+_LEAST_SHAPE: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ def _trends(replay: LogReplay, k: int, error: FloatArray, drawn: FloatArray) -> 
     trends = []
     for kind, shape in shapes.items():
         least = LEAST_TRENDS[kind] * (100.0 if kind == "offset" and k >= len(TILTS) else 1.0)
-        known = known_of(replay, k) / float(np.sqrt(np.square(shape).mean()))
+        known = known_of(replay, k) / max(float(np.sqrt(np.square(shape).mean())), _LEAST_SHAPE)
         squares = np.square([_share(one[rows], each[kind]) for each, one in others])
         tolerated, left = (least + known + SPREADS * math.sqrt(s.mean()) for s in (squares, squares[LATE:]))
         trends.append(Trend(kind, -_share(error[rows], shape), tolerated, left))
@@ -173,8 +174,10 @@ def _shapes(replay: LogReplay, k: int, rows: NDArray[np.bool_], error: FloatArra
 
 
 def _share(error: FloatArray, shape: FloatArray) -> float:
-    """Return how much of a shape (k,) an error (k,) has: half of the shape has less."""
+    """Return how much of a shape (k,) an error (k,) has: half of the shape has less; 0 of one that is 0."""
     there = shape != 0.0
+    if not there.any():
+        return 0.0
     weight, values = np.abs(shape[there]), error[there] / shape[there]
     order = np.argsort(values)
     total = np.cumsum(weight[order])
