@@ -2,7 +2,7 @@
 
 import csv
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -120,7 +120,6 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     is_whole, is_quadratic, own = bool(there.all()), settings.cost.norm == "quadratic", settings
     if not is_whole and is_quadratic and settings.code.scalar == "fixed":
         settings = with_option(settings, "code.scalar", "float64")  # slopes are differences of commands
-        inputs = replace(inputs, from_start=False)  # another type has other bits from the start on
     controller, state = CompiledController(settings), inputs.state
     blocks = list(blocks_of(inputs))
     most = max(int((~there[first:last]).sum()) for first, _, last in blocks)

@@ -24,6 +24,8 @@ something, if only the digits beyond single precision: right logs differ by up t
 CAPPED: Final[Axes] = (0.004, 0.004, 0.1)
 """Allowed in addition behind a thrust that a mixer may have capped; it fades with `CAPPED_FADES_S`."""
 CAPPED_FADES_S: Final[Axes] = (2.0, 2.0, 1.0)
+ESTIMATED: Final[Axes] = (1e-4, 1e-4, 0.0)
+"""Allowed in addition behind a lost row: what an estimate by slopes of small changes leaves."""
 SPREADS: Final = 5.0
 """How many standard deviations, by what is drawn, a right log may be off."""
 LEAST_TRENDS: Final = {"gain": 5e-4, "offset": 2e-5, "delay": 5e-4}
@@ -216,7 +218,8 @@ def _worst_second(
             continue
         since_s = float(replay.capped_s[rows][judged].min())
         capped = CAPPED[k] * math.exp(-since_s / CAPPED_FADES_S[k])
-        tolerated = known + capped + SPREADS * _open(drawn[:, rows][:, judged])
+        estimated = ESTIMATED[k] if np.isfinite(replay.complete_s[rows]).any() else 0.0
+        tolerated = known + capped + estimated + SPREADS * _open(drawn[:, rows][:, judged])
         found.append((float(np.median(error[rows][judged])), tolerated, first))
     if not found:
         return np.nan, np.nan, np.nan, np.nan
