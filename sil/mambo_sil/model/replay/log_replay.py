@@ -67,6 +67,8 @@ class LogReplay:
     """Time (k,) since a mixer may have capped the thrust, which no log shows, likewise."""
     complete_s: FloatArray
     """Time (k,) since the last update that the log has lost, likewise."""
+    from_start: bool
+    """Whether the log certainly begins with the first update of the controller."""
     is_single: bool
     """Whether the inputs have no more digits than single precision."""
     update_period_s: float
@@ -150,6 +152,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         begun_s=begun_s[there],
         capped_s=_since_s(inputs.time_s, is_capped)[there],
         complete_s=_since_s(inputs.time_s, is_filled)[there],
+        from_start=inputs.from_start,
         is_single=bool((inputs.state.astype(np.float32) == inputs.state).all()),
         update_period_s=settings.horizon.update_period_s,
         lost=int((~there).sum()),
