@@ -14,6 +14,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.model.derive.derived_settings import controller_text
 from mambo_sil.model.replay.log_replay import LARGEST
 from tests.support.damaged_flights import (
+    PITCH,
     ROLL,
     THRUST,
     Columns,
@@ -167,3 +168,38 @@ def test_fixed_point_has_a_tolerance_where_the_log_lacks_something(
     columns, settings = fly("fixed")
     summary = judged(damage(columns), settings, tmp_path)
     assert summary.verdict == "yes", summary.reason
+
+
+def apart(columns: Columns) -> Columns:
+    """Return a log that has the commands in rows of their own, 2 ms behind the inputs."""
+    commands = (ROLL, PITCH, THRUST)
+    table = {}
+    for name, value in columns.items():
+        own, other = value, np.full(len(value), np.nan)
+        rows = (other, own) if name in commands else (own, other)
+        table[name] = np.stack((value, value + 0.002) if name == "time_s" else rows, axis=1).reshape(-1)
+    return table
+
+
+def every_second(columns: Columns) -> Columns:
+    """Return a log with every second row."""
+    return {name: value[::2] for name, value in columns.items()}
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda columns: apart(gained(columns)), "which inputs a step read is not in its row"),
+        (every_second, "the log lacks most updates: log every one"),
+        (lambda columns: lossy(rounded(lambda value: np.round(value, 2))(columns)), " has 2 decimals, log "),
+    ],
+    ids=["apart", "rare", "coarse"],
+)
+def test_what_a_log_lacks_is_the_reason_that_replay_cannot_tell(
+    damage: Damage, reason: str, fly: Fly, tmp_path: Path
+) -> None:
+    """Each with its own."""
+    columns, settings = fly("eight")
+    summary = judged(damage(columns), settings, tmp_path)
+    assert summary.verdict == "cannot tell", summary.reason
+    assert reason in summary.reason

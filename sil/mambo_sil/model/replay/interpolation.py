@@ -11,6 +11,9 @@ from mambo_sil.drone.plant.arrays import FloatArray
 _FEW: Final = 10
 """Samples without which nothing says how well a gap is filled: then it is held to be as bad as the spread."""
 
+_TIMES: Final = (1, 2, 3, 4)
+"""How many times as long a gap may be that shows how well another one is filled."""
+
 
 def fill(values: FloatArray, there: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
     """Return a column (k,) filled where it is not `there` (k,), and the standard deviations (k,) of that.
@@ -49,11 +52,17 @@ def _weights(length: int, at: int, *, cubic: bool) -> tuple[NDArray[np.int64], F
 
 
 def _error(known: FloatArray, length: int, at: int, cubic: bool, largest: float) -> float:
-    """Return the root mean square error of filling in one way what the log `known` (k,) has."""
+    """Return the root mean square error of filling in one way what the log `known` (k,) has.
+
+    Where it has no rows to try that, of filling a gap that is some times as long.
+    """
     offsets, weights = _weights(length, at, cubic=cubic)
-    first, last = -int(offsets[0]), len(known) - int(offsets[-1])
-    starts = np.arange(first, max(last, first))
-    guesses = sum(weight * known[starts + offset] for offset, weight in zip(offsets, weights, strict=True))
-    errors = known[starts + at] - guesses
-    errors = errors[np.isfinite(errors)]
-    return float(np.sqrt((errors * errors).mean())) if len(errors) >= _FEW else largest
+    for times in _TIMES:
+        places = times * offsets
+        starts = np.arange(-int(places[0]), max(len(known) - int(places[-1]), -int(places[0])))
+        guesses = sum(weight * known[starts + place] for place, weight in zip(places, weights, strict=True))
+        errors = known[starts + times * at] - guesses
+        errors = errors[np.isfinite(errors)]
+        if len(errors) >= _FEW:
+            return float(np.sqrt((errors * errors).mean()))
+    return largest
