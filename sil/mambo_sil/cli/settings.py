@@ -244,12 +244,14 @@ def _judgement(settings: "Settings", drone: "VehicleFile", bar: Bar) -> tuple[li
     nothing is flown, and nothing refused.
     """
     from mambo_sil.api.app_flights import app_flight_of
-    from mambo_sil.model.derive.derived_flight import fly_derived
+    from mambo_sil.model.derive.derived_flight import fly_derived, fly_pushed
     from mambo_sil.model.derive.derived_margins import judge_margins
 
     fly_app = app_flight_of(drone)
     try:
         flown = [fly_derived(settings, drone)]
+        bar.stage("flying in wind")
+        flown += [fly_pushed(settings, drone)] if flown[0].good else []
         if fly_app is not None:
             bar.stage("flying the app on the desk")
             flown.append(fly_app(settings, drone))

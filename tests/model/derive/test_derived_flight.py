@@ -14,7 +14,10 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.model.derive.derived_flight import (
     _fault,
@@ -22,6 +25,7 @@ from mambo_sil.model.derive.derived_flight import (
     chosen_text,
     flies_quick_circle,
     fly_derived,
+    fly_pushed,
     quick_rate_rad_s,
 )
 from mambo_sil.model.derive.derived_settings import controller_text, wants_exact
@@ -72,6 +76,43 @@ def test_a_drone_that_oscillates_is_seen() -> None:
     assert not found.good
     assert found.words.startswith("flown for 10 s: OSCILLATES, by 0.")
     assert found.words.endswith(f"(through sensors {SENSORS_OF['mambo'][-1]})")
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("name", "exact", "borne_m_s2"), [("x500", True, 7.0), ("crazyflie", False, 4.0), ("mambo", False, 3.0)]
+)
+def test_a_push_is_borne_nearly_as_far_as_the_tilt_limit_holds(
+    name: str, exact: bool, borne_m_s2: float
+) -> None:
+    """Flown here once more: what is borne is held within 2 cm, with a smaller limit it is not."""
+    drone = vehicle_toml.preset(name)
+    settings = settings_for(drone, exact=exact, acceleration="given" if exact else "tracked")
+    found = fly_pushed(settings, drone)
+    assert found.good
+    assert found.words == f"bears a steady push of {borne_m_s2:g} m/s^2 from every side"
+    assert borne_m_s2 < settings.observer.disturbance_limit_m_s2 < borne_m_s2 + 1.0
+    pushed = Scenario(vehicle=drone, duration_s=15.0, trajectory="hover", push_m_s2=(0.0, -borne_m_s2))
+    off_m = []
+    for limit_m_s2 in (settings.observer.disturbance_limit_m_s2, borne_m_s2 - 1.0):
+        flown = with_option(settings, "observer.disturbance_limit_m_s2", limit_m_s2)
+        trace = fly(flight_of([pushed], settings.horizon.update_period_s), CompiledController(flown, 1))
+        off_m.append(np.abs(trace.position_m[trace.time_s > 12.0, 0, 1]).max())
+    assert off_m[0] < 0.02
+    assert off_m[1] > 0.03
+
+
+def test_a_push_that_is_not_learnt_is_seen() -> None:
+    """Before it says which one the drone bears; beyond what good settings bear it only ends the search."""
+    settings = with_option(settings_for(CRAZYFLIE), "observer.disturbance_noise", 0.001)
+    found = fly_pushed(settings, CRAZYFLIE)
+    assert not found.good
+    assert re.fullmatch(r"pushed by 0.5 m/s\^2: FAR OFF, \d+ mm along [xy] in the mean", found.words)
+    strong = with_option(settings_for(CRAZYFLIE), "observer.disturbance_limit_m_s2", 6.5)
+    assert fly_pushed(strong, CRAZYFLIE).words == "bears a steady push of 4 m/s^2 from every side"
+    assert not fly_pushed(with_option(strong, "observer.disturbance_limit_m_s2", 8.5), CRAZYFLIE).good
+    weak = with_option(strong, "observer.disturbance_limit_m_s2", 0.4)
+    assert fly_pushed(weak, CRAZYFLIE).words == "bears no steady push: its tilt limit holds 0.4 m/s^2"
 
 
 @pytest.mark.parametrize(

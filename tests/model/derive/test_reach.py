@@ -48,4 +48,5 @@ def test_a_far_target_is_flown_to_with_it(
     gained_m_s = (speed_m_s[20:] - speed_m_s[:-20]).max(axis=0)
     found_m_s2 = gained_m_s.min() / (trace.time_s[20] - trace.time_s[0])
     assert largest_acceleration_m_s2(settings) == pytest.approx(found_m_s2, rel=0.08)
+    assert settings.observer.disturbance_limit_m_s2 == pytest.approx(found_m_s2, rel=0.08)
     assert reach_words(settings).endswith(f"by limits.tilt_rad = {settings.limits.tilt_rad:g}")

@@ -163,10 +163,21 @@ def test_the_thrust_of_the_crazyflie_bounds_its_tilt() -> None:
         assert settings_for(vehicle_toml.preset(name)).limits.tilt_rad == tilt_rad
 
 
+def test_the_disturbance_is_at_most_what_a_setting_may_be() -> None:
+    """Of a drone that tilts by twice the command; of one that hardly lifts itself less than the default."""
+    strong = changed(
+        FLOWN, attitude={"roll": {"gain": 2.0}, "pitch": {"gain": 2.0}, "acceleration_per_tilt_g": 1.4}
+    )
+    most = settings_for(strong).observer.disturbance_limit_m_s2
+    weak = settings_for(changed(CRAZYFLIE, altitude={"thrust_max_n": 1.05 * CRAZYFLIE.weight_n}))
+    assert (most, weak.observer.disturbance_limit_m_s2) == (20.0, 1.53)
+
+
 def test_the_instruments_of_the_mambo_have_the_defaults_of_its_preset() -> None:
     """And its optical flow lowers the tilt limit, for which its thrust would allow more."""
     found = settings_for(vehicle_toml.preset("mambo"))
-    assert found.observer == type(found.observer)()
+    limit_m_s2 = found.observer.disturbance_limit_m_s2
+    assert found.observer == type(found.observer)(disturbance_limit_m_s2=limit_m_s2)
     assert found.limits.tilt_rad == 0.35
 
 

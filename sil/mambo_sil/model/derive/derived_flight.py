@@ -1,4 +1,4 @@
-"""Flights of derived settings on their drone: whether it keeps its place calmly, and survives exact tilts."""
+"""Flights of derived settings on their drone: it keeps its place, also if pushed, and survives tilts."""
 
 import math
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -32,6 +33,8 @@ HEADINGS: Final = 4
 START: Final = Offset((-0.7, 0.7, 0.3))
 """Where the drone starts: a metre beside its target, and below it."""
 
+CALM: Final = Disturbances()
+
 FAR_M: Final = 0.05
 """A drone whose mean place is farther from its target is not there: 12 mm is the most of shipped ones."""
 SWINGING_RAD: Final = 0.15
@@ -40,6 +43,12 @@ QUICK_CIRCLE: Final = 1.2
 """Rate of a circle over the one that takes the whole tilt limit."""
 SLOWER_ROTORS: Final = 1.5
 LOST_HEIGHT_M: Final = 1.0
+
+PUSHES_M_S2: Final = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
+"""Steady accelerations from the side, as of wind of as many m/s on a drone with a drag of 1 1/s."""
+PUSHED_S: Final = 15.0
+BORNE_SHARE, BORNE_M_S2 = 0.6, 5.0
+"""Push that good settings bear: that share of what the tilt limit holds, at most so much."""
 
 SWINGING_M_S: Final = 0.2
 """Rms of a velocity that oscillates: 0.03 is the most of shipped drones, 0.05 that with 2 cm of noise."""
@@ -65,6 +74,30 @@ def fly_derived(settings: Settings, drone: VehicleFile) -> FlownSettings:
     if fault is not None:
         return FlownSettings(good=False, words=f"flown for {DURATION_S:g} s: {fault} ({where})")
     return FlownSettings(good=True, words=f"flown for {DURATION_S:g} s: stays at its target ({where})")
+
+
+def fly_pushed(settings: Settings, drone: VehicleFile) -> FlownSettings:
+    """Push a drone that hovers, more and more, along each axis of its heading and between them.
+
+    It bears a push if it returns to its target and stays there. Raises BuildError, CacheError.
+    """
+    holds_m_s2 = settings.observer.disturbance_limit_m_s2
+    wanted_m_s2 = min(BORNE_M_S2, BORNE_SHARE * holds_m_s2)
+    borne_m_s2, axes = 0.0, 2 if settings.height is None else 3
+    for push_m_s2 in (one for one in PUSHES_M_S2 if one < holds_m_s2):
+        world = Disturbances(push_m_s2=(push_m_s2, 0.0))
+        trace = _flown(settings, drone, Hover(), Offset(), world, duration_s=PUSHED_S)
+        fault = _fault(trace, drone, axes)
+        if fault is None:
+            borne_m_s2 = push_m_s2
+        elif push_m_s2 > wanted_m_s2:
+            break
+        else:
+            return FlownSettings(good=False, words=f"pushed by {push_m_s2:g} m/s^2: {fault}")
+    words = f"bears a steady push of {borne_m_s2:g} m/s^2 from every side"
+    if not borne_m_s2:
+        words = f"bears no steady push: its tilt limit holds {holds_m_s2:g} m/s^2"
+    return FlownSettings(good=True, words=words)
 
 
 def quick_rate_rad_s(tilt_rad: float) -> float:
@@ -93,17 +126,26 @@ def _own_sensors(drone: VehicleFile) -> SensorsName:
     return SENSORS_OF[drone.sensors.kind][-1]
 
 
-def _flown(settings: Settings, drone: VehicleFile, trajectory: Trajectory, offset: Offset) -> Trace:
+def _flown(
+    settings: Settings,
+    drone: VehicleFile,
+    trajectory: Trajectory,
+    offset: Offset,
+    disturbances: Disturbances = CALM,
+    *,
+    duration_s: float = DURATION_S,
+) -> Trace:
     """Return flights at headings around the whole turn, through the drone's own sensors."""
     flight = Flight(
         trajectory,
-        duration_s=DURATION_S,
+        duration_s=duration_s,
         flights=HEADINGS,
         yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,
         vehicle=Vehicle.of(drone),
         update_period_s=settings.horizon.update_period_s,
         seeds=tuple(range(HEADINGS)),
         offset=offset,
+        disturbances=disturbances,
         sensors=choose_sensors(_own_sensors(drone), drone),
     )
     return fly(flight, CompiledController(settings, HEADINGS))
@@ -116,7 +158,7 @@ def _fault(trace: Trace, drone: VehicleFile, axes: int) -> str | None:
     if crashed:
         crash = min(crashed, key=lambda one: one.time_s)
         return f"CRASHES after {crash.time_s:.3g} s, {crash.how}"
-    judged = trace.time_s >= DURATION_S - JUDGED_S
+    judged = trace.time_s >= trace.time_s[-1] - JUDGED_S
     # The estimates of sensors drift; the settings hold the place that is seen.
     seen_m = trace.seen_position_m if isinstance(trace, SensedTrace) else trace.position_m
     off_m = (seen_m[judged] - _target_m(trace)[judged]).mean(axis=0)[:, :axes]

@@ -23,6 +23,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     TrueState,
 )
 from mambo_sil.flight.names import TargetAcceleration
+from mambo_sil.model.derive.reach import tilted_m_s2
 from mambo_sil.model.derive.step_response import fit_steps
 
 UPDATE_PERIOD_S: Final = 0.01
@@ -32,6 +33,8 @@ SPEED_LIMIT_M_S: Final = 5.0
 BRAKING_SHARE: Final = 0.65
 """Braking limit over what the tilt limit gives: the rest is left for wind and lag."""
 LEAST_BRAKING_M_S2: Final = 0.1
+MOST_DISTURBANCE_M_S2: Final = 20.0
+"""Largest observer.disturbance_limit_m_s2."""
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
@@ -123,6 +126,7 @@ def derive(
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0),
         *_observer(drone),
+        _disturbance_limit(drone, float(tilt.value)),
         *_limits(drone, tilt),
         *_thrust_range(drone),
         *(height := list(_height(drone))),
@@ -269,6 +273,18 @@ def _age(sensors: MocapSensors) -> Derived:
         most_s = LONGEST_GYROSCOPE_AGE_S
         words += f"; at most {most_s:g}, since the estimator makes up for the rest by its gyroscope"
     return Derived("observer", "age_s", _round(min(age_s, most_s)), words)
+
+
+def _disturbance_limit(drone: VehicleFile, tilt_rad: float) -> Derived:
+    """Return the push that the tilt limit holds in level flight."""
+    held_m_s2 = tilted_m_s2(tilt_rad, ((1.0, 0.0),))
+    if isinstance(drone.attitude, FirstOrderAttitude):
+        attitude = drone.attitude
+        axes = (attitude.roll.gain, attitude.roll_trim_rad), (attitude.pitch.gain, attitude.pitch_trim_rad)
+        held_m_s2 = tilted_m_s2(tilt_rad, axes, attitude.acceleration_per_tilt_g)
+    words = "The push that limits.tilt_rad holds; a stronger one carries the drone away"
+    limit_m_s2 = min(_round(held_m_s2), MOST_DISTURBANCE_M_S2)
+    return Derived("observer", "disturbance_limit_m_s2", limit_m_s2, words)
 
 
 def _limits(drone: VehicleFile, tilt: Derived) -> Iterator[Derived]:
