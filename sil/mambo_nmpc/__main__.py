@@ -14,6 +14,7 @@ def main() -> None:
     """Run the command line; before a command runs Ctrl-C exits with 130 and SIGTERM with 143, at once."""
     gc.set_threshold(_COLLECTION)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # pydantic reads the metadata of every package
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads cost more than such small matrices
     signal.signal(signal.SIGTERM, lambda *_: os._exit(143))
     try:
         from mambo_sil.cli import app  # noqa: PLC0415 - Ctrl-C during the import must exit with 130

@@ -261,7 +261,7 @@ def _judgement(settings: "Settings", drone: "VehicleFile", bar: Bar) -> tuple[li
     good, said = all(one.good for one in flown), [one.words for one in flown]
     bar.stage("measuring margins")
     try:
-        judged = judge_margins(settings, drone)
+        judged = judge_margins(settings, drone, bar)
         said += judged.lines() if good or judged.warning else []
     except FlightError as error:
         said.append(f"no margins: {error}")

@@ -18,7 +18,7 @@ from mambo_sil.experiment.margins.hover_loop import (
     choose,
     close_loop,
 )
-from mambo_sil.experiment.margins.loop_margins import open_loop, sensitivity
+from mambo_sil.experiment.margins.loop_margins import open_loop, sensitivity, sensitivity_of
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Hover
 from tests.support.height_settings import height_settings
@@ -93,6 +93,32 @@ def test_choosing_leaves_out_only_what_does_not_matter() -> None:
         expected = whole.response(frequencies)[:, rows][..., columns]
         assert small.response(frequencies) == pytest.approx(expected, rel=1e-9)
     assert choose(whole, [0], [0]).transition.shape[1] < K
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_poles_and_zeros_give_the_sensitivity(seed: int) -> None:
+    """Of a loop that is broken and looked at in the first of its ticks; another one is left to `response`."""
+    drawn, first = drawn_loop(seed), np.array([[1], [0], [0]], np.bool_)
+    parts = drawn.inputs[..., :1], drawn.outputs[:, :1], drawn.feed[:, :1, :1]
+    once = PeriodicLoop(0.01, drawn.transition, *(one * first[:, :, np.newaxis] for one in parts), first)
+    rad_s = np.array([0.1, 3.0, 20.0, 100.0])
+    assert sensitivity_of(once)(rad_s) == pytest.approx(sensitivity(once, rad_s), rel=1e-9)
+    always = PeriodicLoop(0.01, drawn.transition, *parts, first)
+    assert sensitivity_of(always)(rad_s) == pytest.approx(sensitivity(always, rad_s), rel=1e-9)
+    assert abs(sensitivity(always, rad_s) - sensitivity(once, rad_s)).max() > 0.01
+
+
+def test_a_drift_that_nothing_moves_is_at_rest() -> None:
+    """Also at the frequency at which it would ring, pi in a step: the rest of the loop answers as alone."""
+    loop = drawn_loop(0)
+    shape = (TICKS, K + 1, K + 1)
+    whole = np.zeros(shape)
+    whole[:, :K, :K], whole[:, K, K], whole[:, :K, K] = loop.transition, -1.0, 0.3
+    inputs = np.concatenate([loop.inputs, np.zeros((TICKS, 1, INPUTS))], axis=1)
+    outputs = np.concatenate([loop.outputs, np.ones((TICKS, OUTPUTS, 1))], axis=2)
+    drifting = PeriodicLoop(0.01, whole, inputs, outputs, loop.feed, loop.sampled)
+    rad_s = np.array([1.0, np.pi / 0.01])
+    assert drifting.response(rad_s) == pytest.approx(loop.response(rad_s), rel=1e-9)
 
 
 @pytest.mark.parametrize("updates", [1, 3])

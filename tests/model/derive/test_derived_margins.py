@@ -217,7 +217,9 @@ def test_drones_are_judged_at_the_worst_ends_of_intervals(gain_width: float, dea
     sections = {"attitude": {"roll": axis, "pitch": axis}, "uncertainty": uncertainty}
     drone = blind(**sections)
     settings = settings_for(drone)
-    found, ends = judge_margins(settings, drone), list(corners(drone))
+    shares: list[float] = []
+    found, ends = judge_margins(settings, drone, shares.append), list(corners(drone))
+    assert shares == [number / len(ends) for number in range(1, len(ends) + 1)]
     measured = [measure_drone(settings, at_ends(drone, one), "true") for one in ends]
     assert [_reserve(axis) for axis in found.axes] == [
         min(map(_reserve, of_one)) for of_one in zip(*measured, strict=True)

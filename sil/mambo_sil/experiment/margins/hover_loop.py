@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import schur
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -64,22 +66,59 @@ class PeriodicLoop:
         Other frequencies, which sampling adds, are left out. It is the mean over the ticks at which the
         output is sampled; a system that is the same in each of them gives its transfer function.
         """
-        z = np.exp(1j * rad_s * self.step_s)[:, np.newaxis, np.newaxis]
+        lifted = self._lifted
+        z = np.exp(1j * rad_s * self.step_s)
+        turns = z[:, np.newaxis] ** np.arange(len(self.transition))
+        forced = np.tensordot(turns, lifted.inputs, axes=1)
+        state = _solve_triangular(lifted.triangle, turns[:, -1] * z, forced)
+        shown = np.tensordot(turns.conj(), lifted.outputs, axes=1)
+        return np.asarray(shown @ state + np.tensordot(turns.conj(), lifted.impulse, axes=1), np.complex128)
+
+    @cached_property
+    def _lifted(self) -> "_LiftedLoop":
+        """The loop over one period, from the state at its beginning."""
+        shares = (self.sampled / self.sampled.sum(axis=0))[:, :, np.newaxis]
+        outputs, feed = shares * self.outputs, shares * self.feed
+        triangle, turned = schur(self.monodromy(), output="complex")
         ticks, k = self.transition.shape[:2]
-        forced: ComplexArray = np.zeros((len(rad_s), k, self.inputs.shape[2]), np.complex128)
-        turn = np.ones_like(z)
-        for transition, inputs in zip(self.transition, self.inputs, strict=True):
-            forced = np.asarray(transition @ forced + inputs * turn, np.complex128)
-            turn = turn * z
-        state = np.linalg.solve(turn * np.eye(k) - self.monodromy(), forced)
-        answer, turn = 0.0, np.ones_like(z)
-        counts = self.sampled.sum(axis=0)
+        before = np.eye(k, dtype=np.complex128) @ turned
+        shown, moved, impulse = [], np.zeros((0, k, self.inputs.shape[2])), np.zeros_like(feed)
+        impulse[0] = feed.sum(axis=0)
         for tick in range(ticks):
-            share = (self.sampled[tick] / counts)[:, np.newaxis]
-            answer = answer + share * (self.outputs[tick] @ (state / turn) + self.feed[tick])
-            state = self.transition[tick] @ state + self.inputs[tick] * turn
-            turn = turn * z
-        return np.asarray(answer, np.complex128)
+            shown.append(outputs[tick] @ before)
+            impulse[1 : tick + 1] += (outputs[tick] @ moved)[::-1]
+            before = self.transition[tick] @ before
+            moved = np.concatenate([self.transition[tick] @ moved, self.inputs[tick : tick + 1]])
+        return _LiftedLoop(triangle, turned.conj().T @ moved, np.array(shown), impulse)
+
+
+@dataclass(frozen=True, eq=False)
+class _LiftedLoop:
+    """A loop over one period: triangle (k, k) is its transition, from a state that is turned to make it one.
+
+    inputs (ticks, k, m): what an input in each tick does to the state at the end of the period;
+    outputs (ticks, l, k): each share of the mean output by the state at the beginning;
+    impulse (ticks, l, m): the mean output that many ticks after an input, within the period.
+    """
+
+    triangle: ComplexArray
+    inputs: ComplexArray
+    outputs: ComplexArray
+    impulse: FloatArray
+
+
+def _solve_triangular(triangle: ComplexArray, z: ComplexArray, forced: ComplexArray) -> ComplexArray:
+    """Return x (f, k, m) of (z I - triangle) x = forced, for every z (f,).
+
+    A pole at z itself is one that drifts: what neither moves nor shows it counts as at rest.
+    """
+    x = np.empty_like(forced)
+    for row in range(len(triangle) - 1, -1, -1):
+        above = np.tensordot(x[:, row + 1 :], triangle[row, row + 1 :], axes=(1, 0))
+        away = z - triangle[row, row]
+        share = np.where(np.abs(away) > _NEGLIGIBLE, 1.0, 0.0) / np.where(away == 0.0, 1.0, away)
+        x[:, row] = (forced[:, row] + above) * share[:, np.newaxis]
+    return x
 
 
 Loops = tuple[PeriodicLoop, ...]

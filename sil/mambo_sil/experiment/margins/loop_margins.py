@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -47,6 +48,29 @@ def sensitivity(loop: PeriodicLoop, rad_s: FloatArray) -> ComplexArray:
     return answer
 
 
+def sensitivity_of(loop: PeriodicLoop) -> Callable[[FloatArray], ComplexArray]:
+    """Return S as a function of frequencies (f,), as `sensitivity` has it.
+
+    By poles and zeros, which is quick, if the loop is broken and looked at in the first tick of a period only.
+    """
+    acting = np.flatnonzero(np.abs(loop.inputs).max(axis=(1, 2)) + np.abs(loop.feed).max(axis=(1, 2)))
+    sampled = np.flatnonzero(loop.sampled[:, 0])
+    if sampled.tolist() != [0] or not set(acting.tolist()) <= {0}:
+        return partial(sensitivity, loop)
+    transition, feed = loop.monodromy(), 1.0 + float(loop.feed[0, 0, 0])
+    moved = loop.inputs[0]
+    for one in loop.transition[1:]:
+        moved = one @ moved
+    poles = np.linalg.eigvals(transition)
+    zeros = np.linalg.eigvals(transition - moved @ loop.outputs[0] / feed)
+
+    def by_factors(rad_s: FloatArray) -> ComplexArray:
+        z = np.exp(1j * rad_s * loop.period_s)[:, np.newaxis]
+        return np.asarray(feed * np.prod((z - zeros) / (z - poles), axis=1), np.complex128)
+
+    return by_factors
+
+
 def open_loop(sensitivity: ComplexArray) -> ComplexArray:
     """Return L = 1 / S - 1, of negative feedback."""
     return 1.0 / sensitivity - 1.0
@@ -57,9 +81,10 @@ def measure_loop(loop: PeriodicLoop, rad_s: FloatArray, update_period_s: float) 
 
     It looks at frequencies (f,), which increase, and between them where a margin lies.
     """
+    sensed = sensitivity_of(loop)
 
     def opened(at: FloatArray) -> ComplexArray:
-        return open_loop(sensitivity(loop, at.reshape(-1))).reshape(at.shape)
+        return open_loop(sensed(at.reshape(-1))).reshape(at.shape)
 
     def at_roots(
         function: Callable[[FloatArray], FloatArray], values: FloatArray, ok: FloatArray
@@ -80,7 +105,7 @@ def measure_loop(loop: PeriodicLoop, rad_s: FloatArray, update_period_s: float) 
         )
         return -float(found.f_x), float(found.x)
 
-    s = sensitivity(loop, rad_s)
+    s = sensed(rad_s)
     grid, all_of_it = open_loop(s), np.ones(len(rad_s))
     crossovers = at_roots(
         lambda at: np.log(np.abs(opened(at))), np.log(np.maximum(np.abs(grid), 1e-300)), all_of_it

@@ -1,7 +1,7 @@
 """The margins of derived settings on their drone, what is in the way of more, and why a height is missing."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -45,11 +45,13 @@ class JudgedMargins:
         return [*said, *([] if self.warning is None else [f"warning: {self.warning}"])]
 
 
-def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
+def judge_margins(
+    settings: Settings, drone: VehicleFile, progress: Callable[[float], None] = lambda _: None
+) -> JudgedMargins:
     """Return the margins of derived settings on their drone, through its own sensors.
 
-    Of a drone with intervals, which `identify` writes, each axis has the margins of the worst of their ends.
-    Raises BuildError, CacheError.
+    Of a drone with intervals, which `identify` writes, each axis has the margins of the worst of their ends;
+    `progress` is called with the share of these that is measured. Raises BuildError, CacheError.
     """
     sensors = SENSORS_OF[drone.sensors.kind][-1]
     where = "true state" if sensors == "true" else f"through sensors {sensors}"
@@ -57,7 +59,10 @@ def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
         where = f"{where}, at the worst of the intervals in [uncertainty]"
     drone = uncertain(drone, height=settings.height is not None)
     given = list(corners(drone)) if drone.uncertainty else [{}]
-    found = [(ends, measure_drone(settings, _at(drone, ends), sensors)) for ends in given]
+    found = []
+    for ends in given:
+        found.append((ends, measure_drone(settings, _at(drone, ends), sensors)))
+        progress(len(found) / len(given))
     axes = [min(of_one, key=_reserve) for of_one in zip(*(measured for _, measured in found), strict=True)]
     if min(map(_reserve, axes)) >= 1.0:
         return JudgedMargins(where, axes, None)
