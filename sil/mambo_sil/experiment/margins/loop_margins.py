@@ -51,7 +51,7 @@ def sensitivity(loop: PeriodicLoop, rad_s: FloatArray) -> ComplexArray:
 def sensitivity_of(loop: PeriodicLoop) -> Callable[[FloatArray], ComplexArray]:
     """Return S as a function of frequencies (f,), as `sensitivity` has it.
 
-    By poles and zeros, which is quick, if the loop is broken and looked at in the first tick of a period only.
+    By poles and zeros, which is quick, if the loop is broken and looked at in the first tick of a period.
     """
     acting = np.flatnonzero(np.abs(loop.inputs).max(axis=(1, 2)) + np.abs(loop.feed).max(axis=(1, 2)))
     sampled = np.flatnonzero(loop.sampled[:, 0])
