@@ -197,6 +197,22 @@ def test_a_filtered_velocity_does_not_hide_the_drag(drag_1_s: float, rate_rad_s:
         assert abs(motion.velocity_lag_s.value - 0.03) < motion.velocity_lag_s.within + 0.01
 
 
+def test_a_drag_that_is_hardly_told_from_the_tilt_has_a_wide_interval() -> None:
+    """With 3 1/s the velocity follows the tilt: the bias by gusts is six times what is left, and is held.
+
+    With a drag of 0.33 the two differ, and the interval is narrow.
+    """
+    wide, narrow = (replace(TRUTH, lag_s=(0.147, 0.157), drag_1_s=drag_1_s) for drag_1_s in (3.0, 0.33))
+    flown = Flown(duration_s=60.0, size_m=1.5, rate_rad_s=0.8, slow_rad=0.002)
+    for truth, least, most in ((wide, 0.6, 1.5), (narrow, 0.03, 0.1)):
+        for log in fly(truth, flown, 4, 7):
+            motion = motion_of(log)
+            share, drag = motion.acceleration_per_tilt, motion.drag_1_s
+            assert abs(drag.value - truth.drag_1_s) < drag.within
+            assert abs(share.value - truth.acceleration_per_tilt) < share.within
+            assert least < drag.within < most
+
+
 @pytest.mark.long
 def test_many_logs_do_not_remove_the_bias_of_gusts() -> None:
     """A controller tilts against gusts: the interval of acceleration per tilt holds what that hides."""

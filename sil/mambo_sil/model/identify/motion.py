@@ -108,9 +108,10 @@ def explained(segments: Sequence[Segment], hypothesis: Hypothesis = AS_LOGGED) -
 def fit_motion(segments: Sequence[Segment]) -> Motion:
     """Fit the parameters on all stretches that have velocities; raises ValueError if there is none.
 
-    A controller tilts against gusts, which biases the share of g and the drag by up to about what the fit
-    leaves unexplained; their intervals are widened by that. At a constant heading a steady wind looks like a
-    trim, and an attitude that is measured wrong always does.
+    A controller tilts against gusts and an estimator's errors, which biases the share of g and the drag by up
+    to about what the fit leaves unexplained, times the inflation of their variances: with much drag the
+    velocity follows the tilt, and the two hardly differ. Their intervals are widened by that. At a constant
+    heading a steady wind looks like a trim, and an attitude that is measured wrong always does.
     """
     moved = [(each, _rates(each, AS_LOGGED)) for each in _moved(segments)]
 
@@ -139,12 +140,13 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     share, drag, *trims = found.tolist()
     error = np.concatenate(errors)
     left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
+    biased = left * _inflation(slopes)
     surplus_rad = ATTITUDE_RAD
     if heading_range_rad([each for each, _ in moved]) < TURNED_RAD:
         surplus_rad += abs(drag) * DRAUGHT_M_S / (abs(share) * GRAVITY_M_S2)
     return Motion(
-        Interval(share, within[0] + left * abs(share)),
-        Interval(drag, within[1] + left * abs(drag)),
+        Interval(share, within[0] + biased * abs(share)),
+        Interval(drag, within[1] + biased * abs(drag)),
         (
             Interval(trims[0] / share, abs(within[2] / share) + surplus_rad),
             Interval(trims[1] / share, abs(within[3] / share) + surplus_rad),
@@ -153,6 +155,15 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
         1.0 - left,
         float(np.sqrt(np.mean(error**2))) / SPAN_S,
     )
+
+
+def _inflation(slopes: FloatArray) -> float:
+    """Return 1 / (1 - rho^2), rho the correlation of what tilt and drag do (k, 4) beside the trims."""
+    tilt, drag = (
+        slopes[:, :2] - slopes[:, 2:] @ np.linalg.lstsq(slopes[:, 2:], slopes[:, :2], rcond=None)[0]
+    ).T
+    common = float(tilt @ drag) ** 2 / max(float(tilt @ tilt) * float(drag @ drag), 1e-300)
+    return 1.0 / max(1.0 - common, 1e-3)
 
 
 def heading_range_rad(segments: Sequence[Segment]) -> float:
