@@ -99,11 +99,12 @@ def test_choosing_leaves_out_only_what_does_not_matter() -> None:
 def test_poles_and_zeros_give_the_sensitivity(seed: int) -> None:
     """Of a loop that is broken and looked at in the first of its ticks; another one is left to `response`."""
     drawn, first = drawn_loop(seed), np.array([[1], [0], [0]], np.bool_)
-    parts = drawn.inputs[..., :1], drawn.outputs[:, :1], drawn.feed[:, :1, :1]
-    once = PeriodicLoop(0.01, drawn.transition, *(one * first[:, :, np.newaxis] for one in parts), first)
+    inputs, outputs, feed = drawn.inputs[..., :1], drawn.outputs[:, :1], drawn.feed[:, :1, :1]
+    only = first[:, :, np.newaxis]
+    once = PeriodicLoop(0.01, drawn.transition, inputs * only, outputs * only, feed * only, first)
     rad_s = np.array([0.1, 3.0, 20.0, 100.0])
     assert sensitivity_of(once)(rad_s) == pytest.approx(sensitivity(once, rad_s), rel=1e-9)
-    always = PeriodicLoop(0.01, drawn.transition, *parts, first)
+    always = PeriodicLoop(0.01, drawn.transition, inputs, outputs, feed, first)
     assert sensitivity_of(always)(rad_s) == pytest.approx(sensitivity(always, rad_s), rel=1e-9)
     assert abs(sensitivity(always, rad_s) - sensitivity(once, rad_s)).max() > 0.01
 
