@@ -116,7 +116,8 @@ def _solve_triangular(triangle: ComplexArray, z: ComplexArray, forced: ComplexAr
     for row in range(len(triangle) - 1, -1, -1):
         above = np.tensordot(x[:, row + 1 :], triangle[row, row + 1 :], axes=(1, 0))
         away = z - triangle[row, row]
-        share = np.where(np.abs(away) > _NEGLIGIBLE, 1.0, 0.0) / np.where(away == 0.0, 1.0, away)
+        drifts = np.abs(away) < _NEGLIGIBLE
+        share = np.where(drifts, 0.0, 1.0 / np.where(drifts, 1.0, away))
         x[:, row] = (forced[:, row] + above) * share[:, np.newaxis]
     return x
 
