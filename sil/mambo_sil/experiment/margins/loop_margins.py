@@ -94,7 +94,9 @@ def measure_loop(loop: PeriodicLoop, rad_s: FloatArray, update_period_s: float) 
         if not len(left):
             return np.zeros(0)
         found = elementwise.find_root(function, (rad_s[left], rad_s[left + 1]))
-        return np.asarray(found.x)
+        # A value that is 0 but for rounding may have another sign alone than among others.
+        nearer = np.where(np.abs(values[left]) < np.abs(values[left + 1]), rad_s[left], rad_s[left + 1])
+        return np.where(np.isfinite(found.x), found.x, nearer)
 
     def peak(function: Callable[[FloatArray], FloatArray], values: FloatArray) -> tuple[float, float]:
         top = int(np.argmax(values))
