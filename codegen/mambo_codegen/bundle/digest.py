@@ -28,7 +28,6 @@ from mambo_codegen.kept import keep
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.methods.shared.inputs import Rows, Status, choose
-from mambo_codegen.methods.shared.limits import ActiveLimit
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.settings.model import Settings
 
@@ -39,11 +38,11 @@ START_UP_STEPS: Final = 1 + (10 * TICKS_PER_INPUT)
 
 _FLAGS: Final = 64
 """More than all flags of a step together, and than a status."""
-_AIMED_ELSEWHERE: Final = int(ActiveLimit.SPEED | ActiveLimit.BRAKING | ActiveLimit.FENCE)
-"""Limits with which no position error counts."""
 _OFTEN: Final = 3
-"""So many moves of a row are enough: a guard may hide some."""
-_CANDIDATES: Final = 64
+"""So many uses of a row are enough."""
+_MOST_USED: Final = 1 << 10
+"""More than _OFTEN times the rows of all tables."""
+_CANDIDATES: Final = 512
 """The start-up test is one of so many episodes."""
 _MOST_EPISODES: Final = 1000
 _USUAL_WORK: Final = 100
@@ -100,7 +99,7 @@ def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
 
 @lru_cache(maxsize=64)
 def start_up_test(settings: Settings) -> StartUpTest:
-    """Return the self-test at start-up: of some episodes the first with the most rows and ways to end.
+    """Return the self-test at start-up: of some episodes the first with the most rows, uses and ways to end.
 
     Its first step has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails.
@@ -108,13 +107,15 @@ def start_up_test(settings: Settings) -> StartUpTest:
     method = method_of(settings)
     run, episodes = _Run(method, _CANDIDATES), Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32))
     run.make_tiny()
-    digests, ways = [run.digests], list[NDArray[Any]]()
+    digests, ways, uses = [run.digests], list[NDArray[Any]](), list[NDArray[Any]]()
     for step in episodes.steps(START_UP_STEPS - 1):
         ways += run.make(step)
+        uses.append(run.rows_used)
         digests.append(run.digests)
-    kinds = [len(set(one)) for one in np.array(ways).T.tolist()]
-    rows = np.minimum(run.rows, _OFTEN)
-    best = int(np.argmax((_FLAGS * np.sum(rows, axis=1)) + kinds))
+    kinds = np.array([len(set(one)) for one in np.array(ways).T.tolist()])
+    often = np.minimum(np.sum(uses, axis=0), _OFTEN)
+    found = (_MOST_USED * np.sum(often > 0, axis=1)) + np.sum(often, axis=1)
+    best = int(np.argmax((_FLAGS * found) + kinds))
     return StartUpTest(best, tuple(int(one[best]) for one in digests))
 
 
@@ -122,13 +123,12 @@ class _Run:
     """n reference controllers in their episodes.
 
     digests: (n,) of all results so far.
-    rows:    (n, k) how many moves each row of the law has decided so far.
     """
 
     def __init__(self, method: Method, n: int) -> None:
         self._method, self._controller = method, method.reference_controller(n)
         self.digests: Words = np.zeros(n, np.uint32)
-        self.rows: NDArray[Any] = np.zeros((n, 1), np.int64)
+        self._is_good: Rows = np.zeros(n, np.bool_)
         self._fresh = self._controller.outcome
         self._quantities = {one.name: one.quantities for one in method.results}
 
@@ -153,6 +153,11 @@ class _Run:
             self._fold(status)
             self._fold_controller(self._controller.outcome)
         return [*ways, self._step(step.state, step.target, step.thrust)]
+
+    @property
+    def rows_used(self) -> NDArray[np.bool_]:
+        """Which rows of the tables show in the last step (n, k)."""
+        return self._controller.deciding & self._is_good[:, None]
 
     def _refuse_nulls(self, is_made: Rows) -> None:
         """Make the calls with null pointers: a step without a controller commands what a new one holds."""
@@ -190,8 +195,7 @@ class _Run:
         self._fold_command(left)
         flags = self._fold_controller(left)
         ways: NDArray[Any] = (_FLAGS * (1 + CALLS_IN_TURN)) + (_FLAGS * status) + flags
-        follows = (status == Status.OK) & (flags & _AIMED_ELSEWHERE == 0)
-        self.rows = self.rows + (self._controller.deciding & follows[:, None])
+        self._is_good = status == Status.OK
         return ways
 
     def _fold_command(self, left: Outcome) -> None:

@@ -20,6 +20,10 @@ _UNIT: Final = 1 << _UNIT_BITS
 """Random numbers are integers in -_UNIT.._UNIT - 1, which every scalar type represents exactly."""
 _MULTIPLIER: Final = 2654435761
 """The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
+_EXACT: Final = (0, -1, -_UNIT)
+"""Integers that are drawn more often."""
+_OTHER_SIGN: Final = 32
+"""The first of the cases that change a sign."""
 _LARGE: Final = 1e9
 """Out of every range, as NaN is."""
 _LARGEST_TURN_RAD: Final = 4.0
@@ -31,7 +35,7 @@ Words = NDArray[np.uint32]
 
 @dataclass(frozen=True)
 class InputScales:
-    """Factors from random integers to inputs; errors between drone and target have four sizes.
+    """Factors from random integers to inputs; errors between drone and target have four sizes, and none.
 
     In floating point an input is integer x factor. In fixed point, whose formats cannot represent factors
     that small, it is integer x factor / _UNIT.
@@ -64,7 +68,7 @@ def input_scales(method: Method) -> InputScales:
     settings = method.settings
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
-    near = 0.5, 0.05, 0.0025
+    near = 0.5, 0.05, 0.0025, 0.0
     fixed, most_m_s2 = settings.code.scalar == "fixed", settings.ranges.thrust_acceleration_max_m_s2
     hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
@@ -172,18 +176,20 @@ class EpisodeDraws:
         self.last = np.where(rows, before, self.last)
 
     def draw(self, scale: Real) -> Real:
-        """Return the upper 24 of the next 32 bits as a signed integer times `scale`, rounded once."""
-        return self._scaled((self.next() >> 8).astype(np.int32) - _UNIT, scale)
+        """Return the next integer of 24 bits with a sign times `scale`, rounded once."""
+        return self._scaled(self._integers(), scale)
 
     def share(self, scale: Real) -> Real:
-        """Return the upper 23 bits times `scale`."""
-        return self._scaled((self.next() >> 9).astype(np.int32), scale)
+        """Return such an integer without its sign times `scale`."""
+        return self._scaled(np.abs(self._integers()), scale)
 
     def spoil(self, numbers: Real) -> Real:
-        """Return numbers (n, k) with each of the k out of range in one of 64 cases."""
+        """Return numbers (n, k), each of the k out of range in one of 64 cases, of the other sign in another."""
         choice = self.next()
-        which = (choice & 63)[:, None] == np.arange(numbers.shape[1])
-        spoilt: Real = np.where(which, self.beyond(choice >> 6)[:, None], numbers)
+        which, column = (choice & 63)[:, None], np.arange(numbers.shape[1])
+        is_turned = (which == _OTHER_SIGN + column) & (which >= len(column))
+        turned = np.where(is_turned, -numbers, numbers)
+        spoilt: Real = np.where(which == column, self.beyond(choice >> 6)[:, None], turned)
         return spoilt
 
     def beyond(self, choice: NDArray[Any]) -> Any:
@@ -193,6 +199,16 @@ class EpisodeDraws:
             return sign * (LARGEST - 1)
         scalar = self._numbers.scalar
         return np.where(choice & 1 == 0, scalar(np.nan), (sign * _LARGE).astype(scalar))
+
+    def _integers(self) -> NDArray[np.int32]:
+        """Return the upper 24 of the next 32 bits with a sign; 0, -1 or the least in three of 128 cases."""
+        word = self.next()
+        which = word & 127
+        drawn = (word >> 8).astype(np.int32) - _UNIT
+        integers: NDArray[np.int32] = np.select(
+            [which == k for k in range(len(_EXACT))], np.array(_EXACT, np.int32), drawn
+        )
+        return integers
 
     def _scaled(self, whole: NDArray[np.int32], scale: Real) -> Real:
         integers = whole.astype(self._numbers.computed)

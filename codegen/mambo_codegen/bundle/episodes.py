@@ -1,5 +1,6 @@
 """Episodes of the self-test: the inputs of their control steps, and the other calls between them."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -67,9 +68,12 @@ class _Input:
     change: Real
 
 
-def lost_inputs(method: Method) -> int:
-    """Return how many inputs in a row have no good state in an outage; few for a method that holds on."""
-    return _MOST_LOST if method.outage_steps else _FEWEST_LOST
+def lost_inputs(method: Method) -> tuple[int, int]:
+    """Return how many inputs in a row have no good state in an outage: many, few; one if commands hold."""
+    steps = method.outage_steps
+    if not steps:
+        return _FEWEST_LOST, _FEWEST_LOST
+    return _MOST_LOST, min(_MOST_LOST, 1 + math.ceil(steps / TICKS_PER_INPUT))
 
 
 def null_calls(method: Method) -> int:
@@ -88,6 +92,7 @@ class Episodes:
         self._draws = EpisodeDraws(episodes, method.numbers)
         self._lost = lost_inputs(method)
         self._is_lost = episodes % 8 == 7
+        self._is_brief = self._is_lost & (episodes & 8 != 0) & (self._lost[0] != self._lost[1])
         self._aim: Real = np.zeros(0)
         """Place and velocity of the targets along each axis when their input began (k, n)."""
 
@@ -98,7 +103,7 @@ class Episodes:
             given = self._next_input(index)
             headings, call = self._next_headings(), self._next_call(index)
             for tick in range(TICKS_PER_INPUT):
-                if tick == TICKS_PER_INPUT - 1:
+                if (tick + (2 * index)) % TICKS_PER_INPUT == TICKS_PER_INPUT - 1:
                     given = self._spoilt(given)
                 yield EpisodeStep(
                     self._numbers.to_si(given.state, *method.state),
@@ -115,16 +120,21 @@ class Episodes:
     def _next_input(self, index: int) -> _Input:
         """Draw the next inputs.
 
-        The target's velocity changes for a tracker that measures the acceleration by it. With a height one
-        drone in eight touches the floor.
+        The target's velocity changes for a tracker that measures the acceleration by it. One drone in 16 is
+        at its target, and level. With a height one in eight touches the floor.
         """
         method, scales, choice = self._method, self._scales, self._draws.next()
-        rests = self._is_lost & (index < FIRST_LOST + self._lost)
-        size = np.where(rests, 3, choice & 3)
+        early = [index < FIRST_LOST + lost for lost in self._lost]
+        rests = self._is_lost & ~self._is_brief & early[0]
+        is_early = rests | (self._is_brief & early[1])
+        is_there = (choice >> 2) & 15 == 0
+        size = np.where(rests, 3, np.where(is_there, 4, choice & 3))
         self._aim = self._next_aim(rests, (size == 0) | (index == 0))
         target = [*self._aim[0:4:2], *self._aim[1:4:2]]
         state = self._beside(target, size)
-        state += [self._draw(scales.attitude_rad, "angle") for _ in range(2)]
+        attitude_rad = self._numbers.constant(scales.attitude_rad, "angle")
+        tilts_rad = np.where(is_there, np.zeros_like(attitude_rad), attitude_rad)
+        state += [self._draws.draw(tilts_rad) for _ in range(2)]
         state += [self._draw(scales.yaw_rad, "yaw")]
         thrust = self._next_thrust(state[0])
         change = [np.zeros_like(thrust)] * len(method.target)
@@ -144,7 +154,7 @@ class Episodes:
             else:
                 change[-1:] = vertical or change[-1:]
         if index >= FIRST_LOST:
-            state[0] = np.where(rests, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
+            state[0] = np.where(is_early, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
         return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
 
     @property
@@ -238,7 +248,7 @@ class Episodes:
 
     def _weights(self) -> Real:
         quantities = self._method.setter_quantities
-        columns = [self._share(*one) for one in zip(self._scales.weights, quantities, strict=True)]
+        columns = [self._draw(*one) for one in zip(self._scales.weights, quantities, strict=True)]
         return self._arguments(columns, quantities)
 
     def _shift(self, *, turns: bool) -> Real:

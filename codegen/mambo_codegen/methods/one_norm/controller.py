@@ -96,6 +96,8 @@ class OneNormController:
         self._outage_steps = constants.outage_steps
         self._rprop = Rprop(settings, products)
         self._minimize = minimize
+        self._evaluated: tuple[Prediction, Real] | None = None
+        """The plans (n, control, 2) that were evaluated last."""
         self.scalar = self._numbers.scalar
         control, computed = settings.horizon.control, self._numbers.computed
         weights = [settings.cost.tracking_weight, settings.cost.effort_weight]
@@ -236,8 +238,9 @@ class OneNormController:
 
     @property
     def deciding(self) -> NDArray[np.bool_]:
-        """No rows (n, 0): the moves are searched."""
-        return np.zeros((len(self.memory.command_rad), 0), np.bool_)
+        """Of which rows of `response_sum` the last gradients consist (n, prediction)."""
+        assert self._evaluated is not None, "asked for behind a step"
+        return cost.rows_used(self._predictor.errors(*self._evaluated))
 
     @property
     def has_estimate(self) -> NDArray[np.bool_]:
@@ -306,6 +309,7 @@ class OneNormController:
         prediction = self._predictor.prepare(state, target, thrust, acceleration)
 
         def evaluate(moves_rad: Real) -> tuple[Real, Real]:
+            self._evaluated = prediction, moves_rad
             return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)
 
         start = memory.plan_rad

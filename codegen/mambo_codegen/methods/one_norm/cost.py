@@ -1,6 +1,7 @@
 """Cost function: the Manhattan distance to the target and the change of the moves (eq 12)."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.methods.one_norm.predictor import Prediction, Predictor
 from mambo_codegen.methods.shared.math import Real, ordered_sum, sign
@@ -48,7 +49,7 @@ def distance_subgradient(predictor: Predictor, errors_m: Real) -> tuple[Real, Re
     """
     scalar = errors_m.dtype.type
     distance = ordered_sum(np.abs(errors_m), axis=0)
-    negative = np.signbit(errors_m) if errors_m.dtype.kind == "f" else errors_m < 0
+    negative = _is_negative(errors_m)
     changes = negative[1:] != negative[:-1]
     subgradient = np.tile(predictor.response_sum[-1], (*distance.shape, 1))
     rows = subgradient.reshape(-1, subgradient.shape[-1])
@@ -57,3 +58,19 @@ def distance_subgradient(predictor: Predictor, errors_m: Real) -> tuple[Real, Re
         rows[changed] = predictor.response_sum[step] - rows[changed]
     first_sign = np.where(distance == 0, scalar(0), np.where(negative[0], scalar(-1), scalar(1)))
     return distance[:, 0] + distance[:, 1], first_sign[..., None] * subgradient
+
+
+def rows_used(errors_m: Real) -> NDArray[np.bool_]:
+    """Return of which rows of `response_sum` the subgradient for errors (prediction, n, 2) consists.
+
+    The shape is (n, prediction).
+    """
+    negative = _is_negative(errors_m)
+    last = np.ones_like(negative[:1])
+    used = np.concatenate([negative[1:] != negative[:-1], last]) & np.any(errors_m != 0, axis=0)
+    return np.any(used, axis=2).T
+
+
+def _is_negative(errors_m: Real) -> NDArray[np.bool_]:
+    """Return the sign bits of errors."""
+    return np.signbit(errors_m) if errors_m.dtype.kind == "f" else errors_m < 0

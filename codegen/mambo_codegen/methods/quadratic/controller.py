@@ -13,11 +13,14 @@ from mambo_codegen.methods.quadratic.observer import Estimate
 from mambo_codegen.methods.quadratic.step import CheckedInputs, ControlStep, QuadraticMemory
 from mambo_codegen.methods.quadratic.tilt_gain import unknown_gain
 from mambo_codegen.methods.shared.inputs import Inputs, Rows, Status, choose, within
-from mambo_codegen.methods.shared.limits import LimitsMemory
+from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory
 from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, THRUST
+
+_AIMED_ELSEWHERE = int(ActiveLimit.SPEED | ActiveLimit.BRAKING | ActiveLimit.FENCE)
+"""Limits with which no position error counts."""
 
 
 @dataclass(frozen=True)
@@ -241,9 +244,14 @@ class QuadraticController:
 
     @property
     def deciding(self) -> NDArray[np.bool_]:
-        """Which rows of the law decided the last moves (n, k), in place of a limit."""
-        plane, height = self.parts.optimizer.deciding, self._height.deciding
-        return np.concatenate([plane, np.broadcast_to(height, (len(plane), height.shape[1]))], axis=1)
+        """Which rows of the law decided the last moves (n, k), in place of a limit; last the coarse gains."""
+        memory, plane, height = self.memory, self.parts.optimizer.deciding, self._height.deciding
+        plane = plane & (memory.limits.active & _AIMED_ELSEWHERE == 0)[:, None]
+        if self.parts.tilt_budget is not None:
+            plane = plane & np.tile(self.parts.tilt_budget.is_enough, 4)
+        is_free = self.parts.observer.is_free(memory.estimate)
+        coarse = memory.is_coarse & (memory.missed == 0) & is_free
+        return np.column_stack([plane, np.broadcast_to(height, (len(plane), height.shape[1])), coarse])
 
     @property
     def has_estimate(self) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.shared.math import Real, clamp
@@ -14,6 +15,8 @@ class VariationBudget:
     def __init__(self, arithmetic: QuadraticArithmetic, full: float, growth: float, quantity: str) -> None:
         self.full: Any = arithmetic.numbers.constant(full, quantity)
         self._growth = arithmetic.numbers.constant(growth, quantity)
+        self.is_enough: NDArray[np.bool_] = np.ones(1, np.bool_)
+        """Whether the last commands are those wanted."""
 
     def spend(self, budget: Real, before: Real, wanted: Real) -> tuple[Real, Real]:
         """Return the commands nearest to those wanted that the budgets allow, and what is left of these.
@@ -22,5 +25,6 @@ class VariationBudget:
         """
         allowed = np.minimum(budget + self._growth, self.full)
         change = clamp(wanted - before, allowed)
-        command = np.where(np.abs(wanted - before) <= allowed, wanted, before + change)
+        self.is_enough = np.abs(wanted - before) <= allowed
+        command = np.where(self.is_enough, wanted, before + change)
         return command, allowed - np.abs(change)

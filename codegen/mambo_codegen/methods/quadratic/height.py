@@ -106,8 +106,9 @@ class HeightAxis:
             for row in found.rows
         ]
         self._ratio = constant(found.ratio, "ratio")
-        self.deciding: Rows = np.zeros((0, 2), np.bool_)
-        """Of the last moves (n, 2): whether no limit decided, and whether the second row did."""
+        self.deciding: Rows = np.zeros((0, 4), np.bool_)
+        """Of the last thrusts (n, 4): whether no limit, floor or guard decided, and whether the second row did;
+        the same where no state was 0."""
         self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
         self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)
         self._least_cosine = constant(LEAST_COSINE, "sine")
@@ -270,10 +271,12 @@ class HeightAxis:
         command = self._minimize(values, least, most)
         rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)
         command = np.where(rests, least, command)
+        self.deciding = self.deciding & ~rests[:, None]
         thrust = products.factor_product(self._gravity + command, self._inverse("thrust", share))
         thrust = self.limited(products.thrust_product(self._steps2, thrust))
         if self._budget is not None:
             thrust, budget = self._budget.spend(state.budget_m_s2, state.commanded_m_s2, thrust)
+            self.deciding = self.deciding & self._budget.is_enough[:, None]
             thrust = self.limited(thrust)
             state = replace(state, commanded_m_s2=thrust, budget_m_s2=budget)
         command = self._vertical(state.share, thrust)
@@ -410,7 +413,9 @@ class HeightAxis:
             beyond = confine(moves[1], least, most) - moves[1]
             best = best - products.ratio_product(self._ratio, beyond)
         move = confine(best, least, most)
-        self.deciding = np.stack([move == best, (move == best) & (beyond != 0)], axis=1)
+        decided, whole = move == best, np.all(np.stack(state) != 0, axis=0)
+        used = np.stack([decided, decided & (beyond != 0)], axis=1)
+        self.deciding = np.concatenate([used, used & whole[:, None]], axis=1)
         return products.move_acceleration(move)
 
     def stored(self, state: HeightState) -> list[NDArray[Any]]:

@@ -61,6 +61,10 @@ class KalmanObserver:
         drag = self._products.drag_product(self._drag, estimate.velocity_m_step)
         return np.asarray(estimate.disturbance_m_step2 - drag)
 
+    def is_free(self, estimate: Estimate) -> Rows:
+        """Return whether a disturbance along x or y is within its limit (n,)."""
+        return np.any(np.abs(estimate.disturbance_m_step2) < self._disturbance_limit, axis=1)
+
     def correct(self, estimate: Estimate, state: Real, tilt_m_step2: Real, is_coarse: Rows) -> Estimate:
         """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y.
 

@@ -31,8 +31,9 @@ class QuadraticOptimizer:
             ]
         )
         self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
-        self.deciding: Rows = np.zeros((0, 4), np.bool_)
-        """Of the last moves (n, 4): whether no limit decided each, and whether the second row did."""
+        self.deciding: Rows = np.zeros((0, 8), np.bool_)
+        """Of the last moves (n, 8): whether no limit decided each, whether the second row did; the same where
+        no state was 0."""
 
     def minimize(self, state: Real, limit: Real | None = None) -> Real:
         """Return the first free move (n, 2), right and forward, from states (n, 2, k) of `STATES`.
@@ -48,7 +49,9 @@ class QuadraticOptimizer:
             best = first - self._products.ratio_product(self._ratios, limited - moves[1])
             best = np.where(limited == moves[1], first, best)
         move = clamp(best, limit)
-        self.deciding = np.concatenate([move == best, (move == best) & (limited != moves[-1])], axis=1)
+        decided, whole = move == best, np.all(state != 0, axis=2)
+        used = np.concatenate([decided, decided & (limited != moves[-1])], axis=1)
+        self.deciding = np.concatenate([used, used & np.tile(whole, 2)], axis=1)
         return move
 
     def _row_product(self, rows: Real, state: Real) -> Real:
