@@ -17,6 +17,21 @@ CRAZYFLIE: Final[Values] = TWO_MOVES | {
 }
 """The Crazyflie's thrust."""
 
+EVERY_FUNCTION: Final = settings_of(
+    CRAZYFLIE
+    | {
+        "target.acceleration": "tracked",
+        "observer.age_s": 0.01,
+        "model.drag_1_s": 0.2,
+        "model.roll_gain": 0.9,
+        "limits.speed_m_s": 5.0,
+        "guard.tilt_rad_s": 5.0,
+        "guard.position_noise": 0.03,
+        "guard.target_noise_m_s2": 0.3,
+    }
+)
+"""Settings of every function of nmpc.h; roll and pitch differ."""
+
 HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     CRAZYFLIE | {"target.acceleration": "given", "observer.age_s": 0.01, "observer.outage_s": 0.05},
     CRAZYFLIE

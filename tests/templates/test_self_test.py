@@ -2,22 +2,25 @@
 
 import re
 import subprocess
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from mambo_codegen.bundle.episodes import null_calls
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
+from mambo_codegen.methods import method_of
+from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from tests.mutation.mutants import Mutant, mutants
-from tests.mutation.schemata import can_share, refused_numbers, with_mutants
+from tests.mutation.schemata import can_share
+from tests.mutation.self_test_bench import Noticed, SelfTestBench
 from tests.support.bundles import place
-from tests.support.height import CRAZYFLIE as HEIGHT
+from tests.support.height import EVERY_FUNCTION
 from tests.support.one_norm import ONE_NORM
-from tests.support.quadratic import EVERYTHING, settings_of
+from tests.support.quadratic import EVERYTHING
 from tests.support.tools import require
 
 SELF_TEST = "nmpc_self_test.c"
@@ -28,25 +31,22 @@ RENAMED = ("-Dnmpc_step=wrong_step", "-Dnmpc_last_cost=wrong_last_cost")
 OUTPUTS = 6
 """Status, two commands, cost, two gradients: the outputs that wrong_outputs.c makes wrong, one at a time."""
 LIMIT_S = 20
-_NUMBER = re.compile(r"\d+\.\d+(?:e-?\d+)?f")
-_TABLE = re.compile(r"^static const nmpc_real_t (\w+)(?:\[\w+\])+ = \{(.*?)\};$", re.MULTILINE | re.DOTALL)
-TABLES = {
-    *("tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios", "thrust_row"),
-    *("thrust_lagged_row", "height_rows"),
+_NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+(?:e-?\d+)?f)?(?!\w)")
+_TABLE = re.compile(r"^ *static const nmpc_real_t (\w+)(?:\[\w*\])+ = \{(.*?)\};$", re.MULTILINE | re.DOTALL)
+_ANGLES = {"sine_terms", "cosine_terms"}
+_PLANE = {*_ANGLES, "tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios"}
+_HEIGHT = {*_PLANE, "thrust_row", "thrust_lagged_row", "height_rows", "observer_gains"}
+_CRAZYFLIE, _MAMBO = presets.load("crazyflie"), presets.load("mambo")
+TABLED = {
+    "every function": (EVERY_FUNCTION, _HEIGHT),
+    "crazyflie": (_CRAZYFLIE, {*_PLANE, "observer_gains"}),
+    "mambo": (_MAMBO, _PLANE),
+    "table1": (presets.load("table1"), {*_ANGLES, "response_sum"}),
+    "mambo-1norm": (presets.load("mambo-1norm"), {*_ANGLES, "response_sum"}),
+    "crazyflie, fixed": (with_option(_CRAZYFLIE, "code.scalar", "fixed"), {*_PLANE, "observer_gains"}),
+    "mambo, fixed": (with_option(_MAMBO, "code.scalar", "fixed"), _PLANE),
 }
-CRAZYFLIE = settings_of(
-    HEIGHT
-    | {
-        "target.acceleration": "tracked",
-        "observer.age_s": 0.01,
-        "model.drag_1_s": 0.2,
-        "limits.speed_m_s": 5.0,
-        "guard.tilt_rad_s": 5.0,
-        "guard.position_noise": 0.03,
-        "guard.target_noise_m_s2": 0.3,
-    }
-)
-"""Settings of every function of nmpc.h."""
+"""Settings, and the tables that their C has."""
 BREAKS = {
     "a limit above its range": ("between(limits->speed_m_s, NMPC", "between(limits->tilt_rad, NMPC"),
     "walls change places": ("(limits->fence_min_m[axis] < limits->fence_max_m[axis])", "(limits->fence_min_m[axis] > limits->fence_max_m[axis])"),
@@ -145,42 +145,6 @@ def test_every_fault_of_the_comparisons_is_noticed(scalar: str, tmp_path: Path) 
     assert [mutant.wrong_line for mutant in found if bench.passes(mutant)] == []
 
 
-class Broken:
-    """A bundle with many broken lines of nmpc.c in one program."""
-
-    def __init__(self, settings: Settings, folder: Path) -> None:
-        files = render(settings)
-        self.text = files[CONTROLLER]
-        self._folder = place(files, folder / "broken")
-        self._gcc = require("gcc", "gcc")
-
-    def unnoticed(self, lines: Sequence[Mutant], *, at_start_up: bool = False) -> list[str]:
-        """Return which broken lines the self-test lets pass, or the one at start-up."""
-        numbered = dict(enumerate(lines, 1))
-        (self._folder / CONTROLLER).write_text(with_mutants(self.text, numbered), "utf-8")
-        program = Path(__file__).with_name("broken_lines.c")
-        flags = ["-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L", "-w", "-O1", "-I."]
-        line = [
-            self._gcc,
-            *flags,
-            "-Dalways_inline=unused",
-            CONTROLLER,
-            SELF_TEST,
-            str(program),
-            "-o",
-            "broken",
-        ]
-        done = subprocess.run(line, cwd=self._folder, check=False, capture_output=True, text=True)
-        assert done.returncode == 0, [lines[number - 1].wrong_line for number in refused_numbers(done.stderr)]
-        run = subprocess.run(
-            ["./broken", *map(str, numbered)], cwd=self._folder, check=True, capture_output=True, text=True
-        )
-        results = [tuple(map(int, one.split())) for one in run.stdout.splitlines()]
-        assert [number for number, _ in results] == list(numbered)
-        passes = {0, 2} if at_start_up else {0}
-        return [numbered[number].wrong_line for number, result in results if result in passes]
-
-
 def change(text: str, start: int, right: str, wrong: str, name: str) -> Mutant:
     """Return the fault that makes `right` at `start` read `wrong`."""
     assert text.startswith(right, start)
@@ -189,42 +153,60 @@ def change(text: str, start: int, right: str, wrong: str, name: str) -> Mutant:
 
 def test_the_self_test_notices_a_broken_line_of_every_function(tmp_path: Path) -> None:
     """What sets limits, shifts the frame, takes over, turns a heading or ends an outage."""
-    broken = Broken(CRAZYFLIE, tmp_path)
-    assert {name: broken.text.count(right) for name, (right, _) in BREAKS.items()} == dict.fromkeys(BREAKS, 1)
-    lines = [
-        change(broken.text, broken.text.index(right), right, wrong, name)
-        for name, (right, wrong) in BREAKS.items()
-    ]
-    assert broken.unnoticed(lines) == []
+    bench = SelfTestBench(EVERY_FUNCTION, tmp_path)
+    text = bench.files[CONTROLLER]
+    assert {name: text.count(right) for name, (right, _) in BREAKS.items()} == dict.fromkeys(BREAKS, 1)
+    lines = [change(text, text.index(right), right, wrong, name) for name, (right, wrong) in BREAKS.items()]
+    noticed = bench.noticed(lines)
+    assert len(noticed) == len(lines)
+    assert [one.wrong_line for one, by in noticed.items() if by is Noticed.NEVER] == []
 
 
-def test_the_self_test_at_start_up_uses_every_number_of_every_table(tmp_path: Path) -> None:
-    """Each number of the rows and ratios, of attitude, thrust and solution, 3 % larger."""
-    broken = Broken(CRAZYFLIE, tmp_path)
-    tables = [table for table in _TABLE.finditer(broken.text) if table[1] in TABLES]
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("name", TABLED)
+def test_the_self_test_at_start_up_uses_every_number_of_every_table(name: str, tmp_path: Path) -> None:
+    """Each number of the tables of trigonometry, attitude, observer, thrust and solution, 3 % larger."""
+    settings, tables = TABLED[name]
+    bench = SelfTestBench(settings, tmp_path)
+    text = bench.files[CONTROLLER]
+    found = [table for table in _TABLE.finditer(text) if table[1] != "signs"]
+    assert {table[1] for table in found} == tables
     lines = [
-        change(broken.text, number.start(), number[0], f"({number[0]} * 1.03f)", f"{table[1]}: {number[0]}")
-        for table in tables
-        for number in _NUMBER.finditer(broken.text, *table.span(2))
-        if float(number[0][:-1]) != 0
+        change(text, number.start(), number[0], _larger(number[0]), f"{table[1]}: {number[0]}")
+        for table in found
+        for number in _NUMBER.finditer(text, *table.span(2))
+        if float(number[0].rstrip("f")) != 0
     ]
-    assert {table[1] for table in tables} == TABLES
-    assert len(lines) == (2 * ((2 * 8) + 1 + 4 + 4 + 2)) + 3 + 2 + (2 * 7)
-    assert broken.unnoticed(lines, at_start_up=True) == []
+    noticed = bench.noticed(lines)
+    assert len(noticed) == len(lines)
+    assert [one.wrong_line for one, by in noticed.items() if by is not Noticed.AT_START_UP] == []
+
+
+def _larger(number: str) -> str:
+    """Return C for a number 3 % larger."""
+    return f"({number} * 1.03f)" if "." in number else f"({number} + ({number} / 32) + 1)"
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("settings", [CRAZYFLIE, EVERYTHING], ids=["height", "plane"])
+@pytest.mark.parametrize("settings", [EVERY_FUNCTION, EVERYTHING], ids=["height", "plane"])
 def test_the_self_test_notices_a_wrong_sign_anywhere(settings: Settings, tmp_path: Path) -> None:
     """Each plus made a minus and the other way round, from the attitude model to the interface."""
-    broken = Broken(settings, tmp_path)
-    start = broken.text.index("/* ---- Attitude")
+    bench = SelfTestBench(settings, tmp_path)
+    text = bench.files[CONTROLLER]
+    start = text.index("/* ---- Attitude")
     lines = [
         mutant
-        for mutant in mutants(CONTROLLER, broken.text)
-        if {broken.text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} == {"+", "-"}
+        for mutant in mutants(CONTROLLER, text)
+        if {text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} == {"+", "-"}
         and mutant.start > start
-        and can_share(broken.text, mutant)
+        and can_share(text, mutant)
     ]
     assert len(lines) > 60
-    assert broken.unnoticed(lines) == []
+    assert [one.wrong_line for one, by in bench.noticed(lines).items() if by is Noticed.NEVER] == []
+
+
+def test_the_reference_knows_how_many_calls_have_null_pointers() -> None:
+    """The sum of their statuses is a word of the digest."""
+    for settings in (EVERY_FUNCTION, EVERYTHING, ONE_NORM):
+        text = render(settings, with_digest=False)[SELF_TEST]
+        assert text.count("    refused += (unsigned long)nmpc_") == null_calls(method_of(settings))

@@ -20,13 +20,11 @@ _UNIT: Final = 1 << _UNIT_BITS
 """Random numbers are integers in -_UNIT.._UNIT - 1, which every scalar type represents exactly."""
 _MULTIPLIER: Final = 2654435761
 """The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
-_EXACT: Final = (0, -1, -_UNIT)
-"""Integers that are drawn more often."""
-_OTHER_SIGN: Final = 32
-"""The first of the cases that change a sign."""
 _LARGE: Final = 1e9
 """Out of every range, as NaN is."""
 _LARGEST_TURN_RAD: Final = 4.0
+_LARGEST_TILT_RAD: Final = 0.8
+"""Beyond what any small angle stands for, and the steepest that counts for a thrust."""
 _MOST_SPEED_M_S: Final = 2.0
 """Of the limits that are drawn: a drone that is slow can be far enough from a near wall."""
 
@@ -91,7 +89,7 @@ def input_scales(method: Method) -> InputScales:
         error_velocity_m_s=tuple(
             error / unit for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
         ),
-        attitude_rad=0.5 / unit,
+        attitude_rad=_LARGEST_TILT_RAD / unit,
         yaw_rad=100.0 / unit,
         heading_rad=YAW_LIMIT_RAD / unit,
         turn_rad=_LARGEST_TURN_RAD / unit,
@@ -184,12 +182,10 @@ class EpisodeDraws:
         return self._scaled(np.abs(self._integers()), scale)
 
     def spoil(self, numbers: Real) -> Real:
-        """Return numbers (n, k), each of the k out of range in one of 64 cases, of the other sign in another."""
+        """Return numbers (n, k), each out of range in one of 64 cases, of the other sign in another."""
         choice = self.next()
-        which, column = (choice & 63)[:, None], np.arange(numbers.shape[1])
-        is_turned = (which == _OTHER_SIGN + column) & (which >= len(column))
-        turned = np.where(is_turned, -numbers, numbers)
-        spoilt: Real = np.where(which == column, self.beyond(choice >> 6)[:, None], turned)
+        wrong = np.where((choice & 32 == 0)[:, None], self.beyond(choice >> 6)[:, None], -numbers)
+        spoilt: Real = np.where((choice & 31)[:, None] == np.arange(numbers.shape[1]), wrong, numbers)
         return spoilt
 
     def beyond(self, choice: NDArray[Any]) -> Any:
@@ -201,13 +197,12 @@ class EpisodeDraws:
         return np.where(choice & 1 == 0, scalar(np.nan), (sign * _LARGE).astype(scalar))
 
     def _integers(self) -> NDArray[np.int32]:
-        """Return the upper 24 of the next 32 bits with a sign; 0, -1 or the least in three of 128 cases."""
+        """Return the upper 24 of the next 32 bits with a sign; 0, -1 or +/- _UNIT in three of 128 cases."""
         word = self.next()
-        which = word & 127
         drawn = (word >> 8).astype(np.int32) - _UNIT
-        integers: NDArray[np.int32] = np.select(
-            [which == k for k in range(len(_EXACT))], np.array(_EXACT, np.int32), drawn
-        )
+        exact = [np.full_like(drawn, one) for one in (0, -1)]
+        exact.append(np.where(word & 128 == 0, -_UNIT, _UNIT).astype(np.int32))
+        integers: NDArray[np.int32] = np.select([word & 127 == k for k in range(3)], exact, drawn)
         return integers
 
     def _scaled(self, whole: NDArray[np.int32], scale: Real) -> Real:

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.bundle.draws import EpisodeDraws, InputScales, Words, input_scales
 from mambo_codegen.methods import Method
@@ -136,7 +137,7 @@ class Episodes:
         tilts_rad = np.where(is_there, np.zeros_like(attitude_rad), attitude_rad)
         state += [self._draws.draw(tilts_rad) for _ in range(2)]
         state += [self._draw(scales.yaw_rad, "yaw")]
-        thrust = self._next_thrust(state[0])
+        thrust = self._next_thrust(state[0], (choice >> 6) & 15)
         change = [np.zeros_like(thrust)] * len(method.target)
         motion = [self._motion(scales.target_motion, rests) for _ in range(2)] if self._has_motion else []
         if self._is_given:
@@ -182,14 +183,15 @@ class Episodes:
         errors = [np.array([self._numbers.constant(one, what) for one in sizes]) for sizes, what in kinds]
         return [place + self._draws.draw(error[size]) for place, error in zip(target, errors, strict=True)]
 
-    def _next_thrust(self, like: Real) -> Real:
-        """Draw thrusts within their range; a controller of the height gets none."""
+    def _next_thrust(self, like: Real, case: NDArray[Any]) -> Real:
+        """Draw thrusts within their range, at its ends in cases 0 and 1; none for one of the height."""
         limits, scales = self._method.limits, self._scales
         if self._method.has_height:
             return np.full_like(like, limits.thrust_least)
         thrust = self._numbers.constant(scales.hover_m_s2, "thrust") + self._draw(
             scales.thrust_m_s2, "thrust"
         )
+        thrust = np.where(case == 0, limits.thrust_least, np.where(case == 1, limits.thrust_most, thrust))
         drawn: Real = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
         return drawn
 

@@ -232,7 +232,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "self_test_digest": kept_digest(method) if with_digest else None,
             "spread": (scales := input_scales(method)),
             "first_lost": FIRST_LOST,
-            "lost": lost_inputs(method),
+            "found_again": [FIRST_LOST + lost for lost in lost_inputs(method)],
             "estimate_numbers": method.reference_controller().last_estimate.shape[1],
             "scale_constants": scale_constants(method, scales),
             "boards": [

@@ -68,7 +68,7 @@ class ReferenceController(Protocol):
 
     @property
     def deciding(self) -> NDArray[np.bool_]:
-        """Which rows of its tables decided the last moves (n, k), or the last gradients where moves are searched."""
+        """Which rows of its tables decided the last moves (n, k), or the last gradients of a search."""
 
     @property
     def has_estimate(self) -> NDArray[np.bool_]:

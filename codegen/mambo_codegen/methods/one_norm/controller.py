@@ -10,7 +10,7 @@ from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
-from mambo_codegen.methods.one_norm.predictor import Predictor
+from mambo_codegen.methods.one_norm.predictor import Prediction, Predictor
 from mambo_codegen.methods.shared.inputs import Inputs, Status, choose
 from mambo_codegen.methods.shared.limits import LimitsMemory, forgotten_target, limits_law
 from mambo_codegen.methods.shared.math import Real, clamp

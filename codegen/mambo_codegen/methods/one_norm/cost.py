@@ -68,7 +68,8 @@ def rows_used(errors_m: Real) -> NDArray[np.bool_]:
     negative = _is_negative(errors_m)
     last = np.ones_like(negative[:1])
     used = np.concatenate([negative[1:] != negative[:-1], last]) & np.any(errors_m != 0, axis=0)
-    return np.any(used, axis=2).T
+    rows: NDArray[np.bool_] = np.any(used, axis=2).T
+    return rows
 
 
 def _is_negative(errors_m: Real) -> NDArray[np.bool_]:

@@ -107,7 +107,7 @@ class HeightAxis:
         ]
         self._ratio = constant(found.ratio, "ratio")
         self.deciding: Rows = np.zeros((0, 4), np.bool_)
-        """Of the last thrusts (n, 4): whether no limit, floor or guard decided, and whether the second row did;
+        """Of the last thrusts (n, 4): whether no limit, floor or guard decided, whether the second row did;
         the same where no state was 0."""
         self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
         self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)

@@ -63,7 +63,8 @@ class KalmanObserver:
 
     def is_free(self, estimate: Estimate) -> Rows:
         """Return whether a disturbance along x or y is within its limit (n,)."""
-        return np.any(np.abs(estimate.disturbance_m_step2) < self._disturbance_limit, axis=1)
+        free: Rows = np.any(np.abs(estimate.disturbance_m_step2) < self._disturbance_limit, axis=1)
+        return free
 
     def correct(self, estimate: Estimate, state: Real, tilt_m_step2: Real, is_coarse: Rows) -> Estimate:
         """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y.
