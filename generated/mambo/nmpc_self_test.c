@@ -244,7 +244,7 @@ static void next_input(nmpc_self_test_run_t *run, int index)
     const unsigned long choice = next_number(stream);
     const int is_early = (index < run->found_again);
     unsigned long size = (((choice >> 2) & 15UL) == 0UL) ? 4UL : (choice & 3UL);
-    nmpc_real_t attitude_rad = (size == 4UL) ? (nmpc_real_t)0 : NMPC_SELF_TEST_ATTITUDE_RAD;
+    const nmpc_real_t attitude_rad = (size == 4UL) ? (nmpc_real_t)0 : NMPC_SELF_TEST_ATTITUDE_RAD;
     nmpc_real_t target_m = NMPC_SELF_TEST_TARGET_M;
     nmpc_real_t target_m_s = NMPC_SELF_TEST_TARGET_M_S;
     nmpc_real_t change_m_s = NMPC_SELF_TEST_CHANGE_M_S;

@@ -24,7 +24,7 @@ WITH_NULLS: Final = 6
 FIRST_LOST: Final = 1
 _MOST_LOST: Final = 22
 """With TICKS_PER_INPUT so many steps that the usual outage ends, and the drone comes to rest."""
-_FEWEST_LOST: Final = 1
+_FEW_LOST: Final = (1, 2)
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,11 @@ class _Input:
 
 
 def lost_inputs(method: Method) -> tuple[int, int]:
-    """Return how many inputs in a row have no good state in an outage: many, few; one if commands hold."""
+    """Return how many inputs in a row have no good state in an outage of each kind; few if commands hold."""
     steps = method.outage_steps
     if not steps:
-        return _FEWEST_LOST, _FEWEST_LOST
-    return _MOST_LOST, min(_MOST_LOST, 1 + math.ceil(steps / TICKS_PER_INPUT))
+        return _FEW_LOST
+    return _MOST_LOST, min(_MOST_LOST - 1, 1 + math.ceil(steps / TICKS_PER_INPUT))
 
 
 def null_calls(method: Method) -> int:
@@ -93,7 +93,7 @@ class Episodes:
         self._draws = EpisodeDraws(episodes, method.numbers)
         self._lost = lost_inputs(method)
         self._is_lost = episodes % 8 == 7
-        self._is_brief = self._is_lost & (episodes & 8 != 0) & (self._lost[0] != self._lost[1])
+        self._is_brief = self._is_lost & (episodes & 8 != 0)
         self._aim: Real = np.zeros(0)
         """Place and velocity of the targets along each axis when their input began (k, n)."""
 
