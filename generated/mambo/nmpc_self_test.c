@@ -155,7 +155,10 @@ static void start(nmpc_self_test_run_t *run, int episode)
     run->stream = fold(0UL, (unsigned long)episode + 1UL);
     run->found_again = 0;
     if (((unsigned int)episode & 7U) == 7U) {
-        run->found_again = (((unsigned int)episode & 8U) == 0U) ? NMPC_SELF_TEST_UNTIL_REST : NMPC_SELF_TEST_UNTIL_BRAKING;
+        run->found_again = NMPC_SELF_TEST_UNTIL_REST;
+    }
+    if (((unsigned int)episode & 15U) == 15U) {
+        run->found_again = NMPC_SELF_TEST_UNTIL_BRAKING;
     }
 }
 
@@ -242,14 +245,17 @@ static void next_input(nmpc_self_test_run_t *run, int index)
     nmpc_state_t *const state = &run->state;
     nmpc_target_t *const target = &run->target;
     const unsigned long choice = next_number(stream);
-    const int is_early = (index < run->found_again);
     unsigned long size = (((choice >> 2) & 15UL) == 0UL) ? 4UL : (choice & 3UL);
     const nmpc_real_t attitude_rad = (size == 4UL) ? (nmpc_real_t)0 : NMPC_SELF_TEST_ATTITUDE_RAD;
     nmpc_real_t target_m = NMPC_SELF_TEST_TARGET_M;
     nmpc_real_t target_m_s = NMPC_SELF_TEST_TARGET_M_S;
     nmpc_real_t change_m_s = NMPC_SELF_TEST_CHANGE_M_S;
+    int is_early = 0;
     int axis;
 
+    if (index < run->found_again) {
+        is_early = 1;
+    }
     if ((is_early != 0) && (run->found_again == NMPC_SELF_TEST_UNTIL_REST)) {
         size = 3UL;
         target_m = (nmpc_real_t)0;

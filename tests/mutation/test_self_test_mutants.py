@@ -35,7 +35,10 @@ METHODS: Final = {
 }
 KINDS: Final[dict[str, Settings]] = {
     f"{name}-{scalar}": with_option(METHODS[name], "code.scalar", scalar, "test")
-    for name, scalar in [*((name, "float32") for name in METHODS), ("one-norm", "fixed")]
+    for name, scalar in [
+        *((name, "float32") for name in METHODS),
+        *((name, "fixed") for name in ("one-norm", "tracked")),
+    ]
 }
 STRIDE: Final = 40
 """The test tries one fault in so many, others when the C changes; all of them take half an hour."""
