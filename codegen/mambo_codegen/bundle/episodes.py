@@ -103,8 +103,9 @@ class Episodes:
         for index in range(ticks // TICKS_PER_INPUT):
             given = self._next_input(index)
             headings, call = self._next_headings(), self._next_call(index)
+            first_bad = TICKS_PER_INPUT - 1 - (2 * (index % 2))
             for tick in range(TICKS_PER_INPUT):
-                if (tick + (2 * index)) % TICKS_PER_INPUT == TICKS_PER_INPUT - 1:
+                if tick == first_bad:
                     given = self._spoilt(given)
                 yield EpisodeStep(
                     self._numbers.to_si(given.state, *method.state),
@@ -115,7 +116,7 @@ class Episodes:
                     ~self._is_lost,
                     call if tick == 0 else None,
                 )
-                if self._has_motion and not self._is_given:  # -0 + 0 is 0, so that nothing is added else
+                if self._moves and tick < first_bad:
                     given = replace(given, target=given.target + given.change)
 
     def _next_input(self, index: int) -> _Input:
@@ -162,6 +163,11 @@ class Episodes:
     def _is_given(self) -> bool:
         """Whether targets have accelerations."""
         return self._method.settings.target.gives_acceleration
+
+    @property
+    def _moves(self) -> bool:
+        """Whether targets change their velocity from step to step; a change of 0 would make a -0 a 0."""
+        return self._has_motion and not self._is_given
 
     @property
     def _has_motion(self) -> bool:
