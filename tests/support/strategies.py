@@ -13,7 +13,7 @@ from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.controller_toml import with_value
 from mambo_codegen.settings.key import Key, spell
 from mambo_codegen.settings.model import Settings
-from mambo_codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
+from mambo_codegen.settings.reserved import KEYWORDS, OWN_NAMES, STANDARD_NAMES
 from tests.support.cases import SCALARS
 
 Values = dict[str, Any]
@@ -23,7 +23,7 @@ LAGS: Values = {"model.roll_lag_s": 0.3, "model.pitch_lag_s": 0.3}
 QUADRATIC: Values = LAGS | {"cost.norm": "quadratic"}
 """The fewest values that make a controller with a quadratic cost."""
 
-RESERVED = KEYWORDS | STANDARD_NAMES
+RESERVED = KEYWORDS | STANDARD_NAMES | OWN_NAMES
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
 

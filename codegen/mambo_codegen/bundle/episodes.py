@@ -197,8 +197,9 @@ class Episodes:
         thrust = self._numbers.constant(scales.hover_m_s2, "thrust") + self._draw(
             scales.thrust_m_s2, "thrust"
         )
-        thrust = np.where(case == 0, limits.thrust_least, np.where(case == 1, limits.thrust_most, thrust))
-        drawn: Real = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+        is_least = (case == 0) | (thrust < limits.thrust_least)
+        is_most = (case == 1) | (thrust > limits.thrust_most)
+        drawn: Real = np.where(is_least, limits.thrust_least, np.where(is_most, limits.thrust_most, thrust))
         return drawn
 
     def _motion(self, scale: float, rests: Rows) -> Real:

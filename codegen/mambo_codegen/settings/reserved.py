@@ -1,4 +1,4 @@
-"""Names of C, C++, their libraries and POSIX, which `code.prefix` must not be."""
+"""Names of C, C++, their libraries, POSIX and the controller itself, which `code.prefix` must not be."""
 
 _KEYWORDS = """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
@@ -57,3 +57,11 @@ STANDARD_NAMES = frozenset(
     ]
 )
 """Prefixes that would hide a C library header (stdio.h) or redefine one of its or POSIX's types (pid_t)."""
+
+_OWN = """
+    attitude call change_m climb_m displacement_m fold height innovation_m limits mean_m measured_m n_m
+    observer predictor run tiny tracker velocity_m
+"""
+OWN_NAMES = frozenset(_OWN.split())
+"""With one of these the name of a public function is that of another function or a variable of the C, as
+`observer_shift` is."""

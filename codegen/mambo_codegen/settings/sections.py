@@ -383,6 +383,10 @@ class Code(SettingsSection):
                 "keyword",
                 f"must not be a header or a name of the C library or POSIX; write for example {prefix}_nmpc",
             )
+        if prefix in reserved.OWN_NAMES:
+            raise PydanticCustomError(
+                "keyword", f"must not begin names of the controller's own C; write for example {prefix}_nmpc"
+            )
         return prefix
 
 

@@ -123,29 +123,29 @@ def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
 
 
 def test_self_test_steps_end_in_every_way() -> None:
-    """About one step in twenty is refused, for each reason; some converge, some reach the tilt limit."""
+    """About one step in ten is refused, for each reason; some converge, some reach the tilt limit."""
     episode = np.arange(50, dtype=np.uint32)
     reference = OneNormController(OneNorm(MAMBO), len(episode))
     steps = [reference.step(*inputs) for inputs in episode_inputs(OneNorm(MAMBO), episode)]
     assert len(steps) == TICKS
     status = np.array([step.status for step in steps])
     assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
-    assert 0.03 < np.mean(status != Status.OK) < 0.07
+    assert 0.07 < np.mean(status != Status.OK) < 0.14
     assert 0.005 < np.mean([step.converged for step in steps]) < 0.5
     assert {int(count) for step in steps for count in step.iterations} == {1, 2, 3, 4, 5}
     limit = np.float32(MAMBO.limits.tilt_rad)
     assert 0.05 < np.mean([np.abs(step.command_rad) == limit for step in steps]) < 0.5
 
 
-def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
-    """Inputs are uniformly distributed and uncorrelated, and differ between episodes."""
+def test_self_test_inputs_are_uniform_and_seldom_repeat() -> None:
+    """Inputs are uniform and uncorrelated; but for zeros and ends they differ between episodes."""
     inputs = list(episode_inputs(OneNorm(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
     yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
     yaw = yaw[np.abs(yaw) <= 100]
     shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
     assert np.all(np.abs(shares - 0.1) < 0.015)
     rolls = np.concatenate([state[:, 4] for state, _, _ in inputs])
-    assert len(np.unique(rolls)) > 0.99 * len(rolls)
+    assert len(np.unique(rolls)) > 0.9 * len(rolls)
     assert np.all(np.abs(np.corrcoef(inputs[0][1], rowvar=False) - np.eye(4))[:3, :3] < 0.2)
 
 
