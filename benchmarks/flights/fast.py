@@ -70,7 +70,9 @@ def settings() -> dict[str, Settings]:
     given = derived("given")
     return {
         "tracked: small angles": derived("tracked"),
-        "tracked: thrust vector": controller_toml.with_option(given, "target.acceleration", "tracked"),
+        "tracked: thrust vector": controller_toml.with_option(
+            controller_toml.with_option(given, "target.acceleration", "tracked"), "target.tracker_gain", 0.3
+        ),
         "given": given,
     }
 
