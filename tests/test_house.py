@@ -115,6 +115,6 @@ def test_modules_are_short_and_named_by_their_subject() -> None:
 
 def test_templates_are_short() -> None:
     """A template of more than 400 lines has more than one subject."""
-    templates = [*(ROOT / "templates").rglob("*.j2")]
+    templates = [*(ROOT / "templates").rglob("*.j2"), *(ROOT / "templates").rglob("kernel/**/*.c")]
     longest = max(templates, key=lambda path: len(path.read_text("utf-8").splitlines()))
     assert len(longest.read_text("utf-8").splitlines()) <= LONGEST_TEMPLATE, longest

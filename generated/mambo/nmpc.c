@@ -10,7 +10,11 @@
  *   tracker       acceleration of the target
  *   optimizer     the minimum of the cost
  *   limits        speed, braking and place
- *   step          a control step
+ *   step          what the functions of a control step hand on
+ *   observe       where the drone is
+ *   aim           what the next command flies to
+ *   command       the command of the least cost
+ *   advance       a control step
  *   interface     the functions of nmpc.h
  *
  * MISRA C:2012: departs from rules 2.3, 8.9, 10.3, 15.5 and 19.2, for the reasons in deviations.txt.
@@ -274,7 +278,7 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
  *     roll                                              0.2300     0.0450      1.0000
  *     pitch                                             0.1540     0.0600      0.7700
  *
- * The lag of roll is the setting, 0.28 s, less what rate feedback takes off it, 0.05 s (see the chapter step).
+ * The lag of roll is the setting, 0.28 s, less what rate feedback takes off it, 0.05 s (see the chapter observe).
  * The leak of i, with 1000 s, is slower than anything in flight: it only gives i a bound.
  *
  * u is held over a control step; the rows below are the exact solution. a, i and u are limited, so that what is stored
@@ -461,6 +465,7 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
 #define NMPC_VELOCITY_BY_VELOCITY 0.05931779f /* L22 */
 #define NMPC_DISTURBANCE_BY_POSITION 1.1298302e-05f /* L31 */
 #define NMPC_DISTURBANCE_BY_VELOCITY 0.0005300324f /* L32 */
+#define NMPC_REST_M_STEP 0.0002f /* up to this |v| along each axis the drone is at rest */
 #define NMPC_VELOCITY_LIMIT_M_STEP 1.0f /* of v */
 #define NMPC_DISTURBANCE_LIMIT_M_STEP2 0.0003f /* of d */
 #define NMPC_HALF 0.5f
@@ -485,10 +490,12 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
 }
 
 /* Correct the estimates by a measured state. */
-NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state)
+NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state,
+                                  const nmpc_real_t tilt_m_step2[2])
 {
     int axis;
 
+    (void)tilt_m_step2;
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t position_m = observer->position_m[axis];
@@ -1069,30 +1076,197 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
 
 /* ---- Step -----------------------------------------------------------------------------------------------------------
  *
- * A control step: the attitude model answers the last command; the heading turns it; the measured state corrects the
- * estimates; along right and forward the minimum of the cost is the next command; the estimates are predicted.
- *
- *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
- *
- * with R the rotation from x and y to right and forward. The observer is driven by the measured tilt, and by that of
- * the model, a, while there is no good state; the optimizer starts from that of the model.
- *
- * Rate feedback adds to a command the change of the measured angle since the last step, times a constant. Its sign is
- * positive: it takes damping off an attitude loop that has more than it needs, and so shortens its lag. It is added
- * behind the minimum, and a command that is held has none.
+ * What the functions of a control step know and hand on. A step begins, observes, aims, commands and predicts, in the
+ * chapters that follow.
  */
 
-/* `missed` while the model brakes after an outage; and before the first good state, and when the model is at rest. */
+/* `missed` after an outage; without limits also before the first good state. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
+
+/* `missed` before the first good state, and when the model has come to rest after an outage. */
 #define NMPC_AT_REST (NMPC_OUTAGE_STEPS + 2U)
 
-/* The model is at rest up to this speed along each axis. */
-#define NMPC_REST_M_STEP 0.0002f
+/* What the functions of a control step hand on to each other. */
+typedef struct {
+    const nmpc_state_t *state;    /* null if it is not good */
+    const nmpc_target_t *target;  /* null if the inputs allow no new command */
+    const nmpc_target_t *aim;     /* what the next command flies to; null if the last one holds */
+    nmpc_observer_t observer;     /* a copy, which the compiler can keep in registers */
+    unsigned int missed;          /* control steps since the last good state */
+    nmpc_real_t tilt_m_step2[2];  /* acceleration of the tilt, right and forward */
+    nmpc_real_t world_m_step2[2]; /* the same along x and y */
+    nmpc_real_t command_rad[2];   /* the angles that stand for the model's command */
+    /* The target within the limits. */
+    nmpc_target_t *limited;
+    /* What rate feedback adds to the commands. */
+    nmpc_real_t feedback_rad[2];
+} nmpc_step_t;
 
 NMPC_INLINE int has_estimate(const nmpc_t *self)
 {
     return self->missed < NMPC_NO_ESTIMATE;
 }
+
+/* ---- Observe --------------------------------------------------------------------------------------------------------
+ *
+ * Where the drone is: the attitude model answers the last command; the heading turns it; the measured state corrects
+ * the estimates. The observer is driven by the measured tilt, and by that of the model, a, while there is no good
+ * state.
+ */
+
+/* Turn the model to the measured heading. */
+NMPC_INLINE void measure_heading(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->state != NULL) {
+        nmpc_real_t sine;
+        nmpc_real_t cosine;
+
+        sine_cosine(step->state->yaw_rad, &sine, &cosine);
+        if (has_estimate(self) == 0) {
+            self->attitude.sine = sine;
+            self->attitude.cosine = cosine;
+        } else {
+            attitude_turn(&self->attitude, sine, cosine, step->target != NULL);
+        }
+    }
+}
+
+/* Set the acceleration of the tilt: the measured one, or that of the model. */
+NMPC_INLINE void measure_tilt(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->state != NULL) {
+        attitude_measure(step->state, step->tilt_m_step2);
+    } else {
+        step->tilt_m_step2[NMPC_RIGHT] = self->attitude.tilt_m_step2[NMPC_RIGHT];
+        step->tilt_m_step2[NMPC_FORWARD] = self->attitude.tilt_m_step2[NMPC_FORWARD];
+    }
+}
+
+/* Set the acceleration of the tilt along x and y. */
+NMPC_INLINE void turn_to_world(nmpc_t *self, nmpc_step_t *step)
+{
+    const nmpc_attitude_t *const attitude = &self->attitude;
+
+    step->world_m_step2[0] = (step->tilt_m_step2[NMPC_FORWARD] * attitude->cosine)
+                             - (step->tilt_m_step2[NMPC_RIGHT] * attitude->sine);
+    step->world_m_step2[1] = (step->tilt_m_step2[NMPC_RIGHT] * attitude->cosine)
+                             + (step->tilt_m_step2[NMPC_FORWARD] * attitude->sine);
+}
+
+/* Correct position, velocity and disturbance by the measured state. */
+NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->state != NULL) {
+        if (has_estimate(self) == 0) {
+            observer_start(&step->observer, step->state);
+        } else {
+            observer_correct(&step->observer, step->state, step->world_m_step2);
+        }
+    }
+}
+
+/* Set what rate feedback adds to the commands: the change of the measured angle since the last step, times a constant.
+ * Its sign is positive: it takes damping off an attitude loop that has more than it needs, and so shortens its lag. It
+ * is added behind the minimum, and a command that is held has none. */
+NMPC_INLINE void measure_rates(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->state != NULL) {
+        if (self->missed == 0U) {
+            step->feedback_rad[0] =
+                NMPC_ROLL_FEEDBACK_STEPS * (step->state->roll_rad - self->tilt_rad[0]);
+        }
+        self->tilt_rad[0] = step->state->roll_rad;
+        self->tilt_rad[1] = step->state->pitch_rad;
+    }
+}
+
+/* Count the control steps since the last good state. */
+NMPC_INLINE void count_missed(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->state != NULL) {
+        step->missed = 0U;
+    } else if (self->missed < NMPC_NO_ESTIMATE) {
+        step->missed = (unsigned int)self->missed + 1U;
+    } else {
+        step->missed = self->missed;
+    }
+}
+
+/* Estimate where the drone is. */
+NMPC_INLINE void step_observe(nmpc_t *self, nmpc_step_t *step)
+{
+    attitude_advance(&self->attitude);
+    measure_heading(self, step);
+    measure_tilt(self, step);
+    turn_to_world(self, step);
+    correct_estimates(self, step);
+    measure_rates(self, step);
+    count_missed(self, step);
+}
+
+/* ---- Aim ------------------------------------------------------------------------------------------------------------
+ *
+ * What the next command flies to: the target, within the limits, or rest after an outage. Without either the last
+ * command holds.
+ */
+
+/* Aim at the target within the limits. */
+NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
+{
+    const nmpc_real_t position_m[2] = { step->observer.position_m[0], step->observer.position_m[1] };
+
+    if (limits_apply(self, position_m, step->aim, step->limited) != 0U) {
+        step->aim = step->limited;
+    }
+}
+
+/* Estimate how the target moves. */
+NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
+{
+    tracker_update(self, step->aim->velocity_m_s);
+}
+
+/* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. */
+NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
+{
+    tracker_clear(self);
+    if ((within(step->observer.velocity_m_step[0], NMPC_REST_M_STEP) != 0)
+        && (within(step->observer.velocity_m_step[1], NMPC_REST_M_STEP) != 0)) {
+        self->command_rad[0] = (nmpc_real_t)0;
+        self->command_rad[1] = (nmpc_real_t)0;
+        attitude_set_command(&self->attitude, (nmpc_real_t)0, (nmpc_real_t)0);
+        self->limited = 0U;
+        step->missed = NMPC_AT_REST;
+    } else {
+        step->limited->position_m[0] = step->observer.position_m[0];
+        step->limited->position_m[1] = step->observer.position_m[1];
+        self->limited = (unsigned char)NMPC_LIMIT_BRAKING;
+        step->aim = step->limited;
+    }
+}
+
+/* Choose what the next command flies to. */
+NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
+{
+    step->aim = (step->missed < NMPC_NO_ESTIMATE) ? step->target : NULL;
+    if (step->missed == NMPC_NO_ESTIMATE) {
+        end_outage(self, step);
+    } else if (step->aim != NULL) {
+        limit_target(self, step);
+        track_target(self, step);
+    } else {
+        /* The last command holds. */
+    }
+}
+
+/* ---- Command --------------------------------------------------------------------------------------------------------
+ *
+ * Along right and forward the minimum of the cost is the next command, from the errors
+ *
+ *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
+ *
+ * with R the rotation from x and y to right and forward; without drag or without a tracker their terms are 0.
+ */
 
 /* Set `right` and `forward` to the components of a vector along x and y. */
 NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x, nmpc_real_t y, nmpc_real_t *right,
@@ -1102,155 +1276,143 @@ NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x,
     *forward = (x * attitude->cosine) + (y * attitude->sine);
 }
 
-/* Set the next command of the model to the minimum of the cost along both axes; `tilt_m_step2` is the acceleration of
- * the tilt, right and forward. */
-NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *observer,
-                          const nmpc_tracker_t *tracker, const nmpc_bounds_t *bounds, const nmpc_target_t *target,
-                          const nmpc_real_t tilt_m_step2[2])
+/* The largest move along an axis. */
+NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step, int axis)
 {
+    nmpc_real_t most_m_step2 = self->bounds.command_m_step2[axis];
+
+    (void)step;
+    return most_m_step2;
+}
+
+/* Set the next command of the model to the minimum of the cost along both axes. */
+NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
+{
+    nmpc_attitude_t *const attitude = &self->attitude;
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
-    nmpc_real_t right_m_step2;
-    nmpc_real_t forward_m_step2;
     int axis;
 
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        error[0][axis] = observer->position_m[axis] - target->position_m[axis];
-        error[1][axis] = observer->velocity_m_step[axis]
-                         - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
-        error[2][axis] = observer_disturbance(observer, axis) - tracker->acceleration_m_step2[axis];
-        state[axis][4] = tilt_m_step2[axis];
+        error[0][axis] = step->observer.position_m[axis] - step->aim->position_m[axis];
+        error[1][axis] =
+            step->observer.velocity_m_step[axis] - (NMPC_UPDATE_STEP_S * step->aim->velocity_m_s[axis]);
+        error[2][axis] = observer_disturbance(&step->observer, axis);
+        error[2][axis] = error[2][axis] - self->tracker.acceleration_m_step2[axis];
+        state[axis][4] = attitude->tilt_m_step2[axis];
         state[axis][5] = attitude->integral_m_step2[axis];
         state[axis][6] = attitude->lagged_m_step2[axis];
         state[axis][7] = attitude->command_m_step2[axis];
     }
     NMPC_UNROLL
     for (axis = 0; axis < 3; axis++) {
-        turn_to_heading(attitude, error[axis][0], error[axis][1], &state[NMPC_RIGHT][axis],
-                        &state[NMPC_FORWARD][axis]);
+        turn_to_heading(attitude, error[axis][0], error[axis][1], &state[NMPC_RIGHT][axis], &state[NMPC_FORWARD][axis]);
     }
-    turn_to_heading(attitude, tracker->jerk_m_step2_update[0], tracker->jerk_m_step2_update[1],
+    turn_to_heading(attitude, self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1],
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
-    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], bounds->command_m_step2[NMPC_RIGHT]);
-    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], bounds->command_m_step2[NMPC_FORWARD]);
-    attitude->command_m_step2[NMPC_RIGHT] = right_m_step2;
-    attitude->command_m_step2[NMPC_FORWARD] = forward_m_step2;
+    NMPC_UNROLL
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t most_m_step2 = largest_move(self, step, axis);
+        const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
+
+        attitude->command_m_step2[axis] = move_m_step2;
+    }
 }
 
-/* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. Returns what
- * stands for the target, or null; sets `missed`. */
-NMPC_INLINE const nmpc_target_t *end_outage(nmpc_t *self, nmpc_attitude_t *attitude, const nmpc_observer_t *observer,
-                                            unsigned int *missed, nmpc_target_t *rest)
+/* Set the angles that stand for the model's command. */
+NMPC_INLINE void find_angles(const nmpc_t *self, nmpc_step_t *step)
 {
-    const nmpc_target_t *aim = NULL;
+    const nmpc_real_t right_m_step2 = self->attitude.command_m_step2[NMPC_RIGHT];
+    const nmpc_real_t forward_m_step2 = self->attitude.command_m_step2[NMPC_FORWARD];
 
-    tracker_clear(self);
-    if ((within(observer->velocity_m_step[0], NMPC_REST_M_STEP) != 0)
-        && (within(observer->velocity_m_step[1], NMPC_REST_M_STEP) != 0)) {
-        self->command_rad[0] = (nmpc_real_t)0;
-        self->command_rad[1] = (nmpc_real_t)0;
-        attitude_set_command(attitude, (nmpc_real_t)0, (nmpc_real_t)0);
-        self->limited = 0U;
-        *missed = NMPC_AT_REST;
+    step->command_rad[0] = attitude_roll(right_m_step2);
+    step->command_rad[1] = attitude_pitch(forward_m_step2);
+}
+
+/* Clamp an angle at the tilt limit. */
+NMPC_INLINE nmpc_real_t limited_angle(const nmpc_t *self, nmpc_real_t angle_rad)
+{
+    const nmpc_real_t limit_rad = self->bounds.tilt_rad;
+
+    return clamp(angle_rad, limit_rad);
+}
+
+/* Add rate feedback to the angles, and clamp them at the tilt limit. */
+NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
+{
+    step->command_rad[0] = step->command_rad[0] + step->feedback_rad[0];
+    step->command_rad[0] = limited_angle(self, step->command_rad[0]);
+    step->command_rad[1] = limited_angle(self, step->command_rad[1]);
+}
+
+/* Hold the last command, less its rate feedback: that is for the rate of one control step only. The level command after
+ * an outage has none. */
+NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
+{
+    const int is_fed = (step->missed < NMPC_NO_ESTIMATE) && (self->missed == 0U);
+
+    if (is_fed != 0) {
+        find_angles(self, step);
+        self->command_rad[0] = limited_angle(self, step->command_rad[0]);
+    }
+}
+
+/* Command what flies to the aim; without one the last command holds. */
+NMPC_INLINE void step_command(nmpc_t *self, nmpc_step_t *step)
+{
+    if (step->aim != NULL) {
+        minimize(self, step);
+        find_angles(self, step);
+        limit_angles(self, step);
+        self->command_rad[0] = step->command_rad[0];
+        self->command_rad[1] = step->command_rad[1];
     } else {
-        rest->position_m[0] = observer->position_m[0];
-        rest->position_m[1] = observer->position_m[1];
-        self->limited = (unsigned char)NMPC_LIMIT_BRAKING;
-        aim = rest;
+        hold_command(self, step);
     }
-    return aim;
 }
 
-/* Hold the last command, less its rate feedback: that is for the rate of one control step only. */
-NMPC_INLINE void hold(nmpc_t *self, const nmpc_attitude_t *attitude)
+/* ---- Advance --------------------------------------------------------------------------------------------------------
+ *
+ * A control step, from what is known from the last one to what the next one will know.
+ */
+
+/* Begin with what is known from the last step. */
+NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
 {
-    if (self->missed == 0U) {
-        self->command_rad[0] = clamp(attitude_roll(attitude->command_m_step2[NMPC_RIGHT]), self->bounds.tilt_rad);
-    }
+    step->observer = self->observer;
+    step->feedback_rad[0] = (nmpc_real_t)0;
+    step->feedback_rad[1] = (nmpc_real_t)0;
+    /* One by one: for an initialiser some compilers call memset. */
+    step->limited->position_m[0] = (nmpc_real_t)0;
+    step->limited->position_m[1] = (nmpc_real_t)0;
+    step->limited->velocity_m_s[0] = (nmpc_real_t)0;
+    step->limited->velocity_m_s[1] = (nmpc_real_t)0;
+}
+
+/* Predict the estimates at the next control step. */
+NMPC_INLINE void step_predict(nmpc_t *self, nmpc_step_t *step)
+{
+    observer_predict(&step->observer, step->world_m_step2);
+    self->observer = step->observer;
+    self->missed = (unsigned char)step->missed;
 }
 
 /* Take a control step. A null `state` stands for one that is not good, a null `target` for inputs that allow no new
- * command. The model and the estimates are copied, so that the compiler can keep them in registers. */
+ * command. */
 NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
 {
-    nmpc_attitude_t own_attitude;
-    nmpc_observer_t own_observer;
-    nmpc_attitude_t *const attitude = &own_attitude;
-    nmpc_observer_t *const observer = &own_observer;
-    nmpc_real_t tilt_m_step2[2];
-    nmpc_real_t world_m_step2[2];
-    nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 };
-    unsigned int missed = self->missed;
+    nmpc_step_t step;
     nmpc_target_t limited;
-    const nmpc_target_t *aim = NULL;
 
-    own_attitude = self->attitude;
-    own_observer = self->observer;
-    /* One by one: for an initialiser some compilers call memset. */
-    limited.position_m[0] = (nmpc_real_t)0;
-    limited.position_m[1] = (nmpc_real_t)0;
-    limited.velocity_m_s[0] = (nmpc_real_t)0;
-    limited.velocity_m_s[1] = (nmpc_real_t)0;
-    attitude_advance(attitude);
-    if (state != NULL) {
-        nmpc_real_t sine;
-        nmpc_real_t cosine;
-
-        sine_cosine(state->yaw_rad, &sine, &cosine);
-        if (missed >= NMPC_NO_ESTIMATE) {
-            attitude->sine = sine;
-            attitude->cosine = cosine;
-        } else {
-            attitude_turn(attitude, sine, cosine, target != NULL);
-        }
-        attitude_measure(state, tilt_m_step2);
-    } else {
-        tilt_m_step2[NMPC_RIGHT] = attitude->tilt_m_step2[NMPC_RIGHT];
-        tilt_m_step2[NMPC_FORWARD] = attitude->tilt_m_step2[NMPC_FORWARD];
-    }
-    world_m_step2[0] = (tilt_m_step2[NMPC_FORWARD] * attitude->cosine)
-                       - (tilt_m_step2[NMPC_RIGHT] * attitude->sine);
-    world_m_step2[1] = (tilt_m_step2[NMPC_RIGHT] * attitude->cosine)
-                       + (tilt_m_step2[NMPC_FORWARD] * attitude->sine);
-    if (state == NULL) {
-        if (missed < NMPC_NO_ESTIMATE) {
-            missed = missed + 1U;
-        }
-    } else {
-        if (missed >= NMPC_NO_ESTIMATE) {
-            observer_start(observer, state);
-        } else {
-            observer_correct(observer, state);
-        }
-        if (missed == 0U) {
-            feedback_rad[0] = NMPC_ROLL_FEEDBACK_STEPS * (state->roll_rad - self->tilt_rad[0]);
-        }
-        self->tilt_rad[0] = state->roll_rad;
-        self->tilt_rad[1] = state->pitch_rad;
-        missed = 0U;
-    }
-    if (missed == NMPC_NO_ESTIMATE) {
-        aim = end_outage(self, attitude, observer, &missed, &limited);
-    } else if ((target != NULL) && (missed < NMPC_NO_ESTIMATE)) {
-        const nmpc_real_t position_m[2] = { observer->position_m[0], observer->position_m[1] };
-
-        aim = (limits_apply(self, position_m, target, &limited) != 0U) ? &limited : target;
-        tracker_update(self, aim->velocity_m_s);
-    } else {
-        hold(self, attitude);
-    }
-    if (aim != NULL) {
-        minimize(attitude, observer, &self->tracker, &self->bounds, aim, attitude->tilt_m_step2);
-        self->command_rad[0] =
-            clamp(attitude_roll(attitude->command_m_step2[NMPC_RIGHT]) + feedback_rad[0], self->bounds.tilt_rad);
-        self->command_rad[1] =
-            clamp(attitude_pitch(attitude->command_m_step2[NMPC_FORWARD]), self->bounds.tilt_rad);
-    }
-    observer_predict(observer, world_m_step2);
-    self->attitude = own_attitude;
-    self->observer = own_observer;
-    self->missed = (unsigned char)missed;
+    step.limited = &limited;
+    step.state = state;
+    step.target = target;
+    step_begin(self, &step);
+    step_observe(self, &step);
+    step_aim(self, &step);
+    step_command(self, &step);
+    step_predict(self, &step);
 }
 
 /* ---- Interface ------------------------------------------------------------------------------------------------------

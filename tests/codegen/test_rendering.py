@@ -5,7 +5,7 @@ from pathlib import Path
 import jinja2
 import pytest
 
-from mambo_codegen.bundle.products import products, term
+from mambo_codegen.bundle.products import infix, products, term
 from mambo_codegen.bundle.template_cache import TemplateCache
 
 FLOAT, FIXED = products(fixed=False), products(fixed=True)
@@ -34,20 +34,51 @@ def test_an_operand_has_brackets_only_if_it_is_infix(product: str, operand: str)
     assert term(product) == operand
 
 
-def test_an_acceleration_is_weighed_only_if_something_weighs_it() -> None:
-    """With a height it is times a weight, or over it, which is times the inverse; else it stays alone."""
-    assert products(fixed=False, weighs=True)["weighed"]("limit") == "limit * weight"
-    assert products(fixed=True, weighs=True)["over_weight"]("move") == "factor_product(move, inverse)"
-    assert FLOAT["weighed"]("limit") == FIXED["over_weight"]("limit") == "limit"
+@pytest.mark.parametrize(
+    ("kernel", "expected"),
+    [
+        ("a = gain_product(b, c);", "a = b * c;"),
+        ("return sine_product(y, c) - sine_product(x, s);", "return (y * c) - (x * s);"),
+        ("a = tilt_product(GAIN, roll - TRIM);", "a = GAIN * (roll - TRIM);"),
+        ("f(factor_product(a, share(&b, axis)), -halved(c));", "f(a * share(&b, axis), -(NMPC_HALF * c));"),
+        ("a = sine_product(x, sine_product(y, z));", "a = x * (y * z);"),
+        ("if (squared(a) <= squared(b)) {", "if ((a * a) <= (b * b)) {"),
+        ("a = (b < c) ? gain_product(b, d) : c;", "a = (b < c) ? (b * d) : c;"),
+        ("a[k] = to_move(spare(b, c)) + row_sum(d);", "a[k] = spare(b, c) + d;"),
+        ("a = sine_sum(\n    a, b,\n    c, d);", "a = (a * b) + (c * d);"),
+        ("{ gain_product(a, b), gain_product(c, d) }", "{ a * b, c * d }"),
+    ],
+)
+def test_calls_of_products_are_written_with_operators(kernel: str, expected: str) -> None:
+    """With brackets round operands alone, whether what calls it has one or several lines."""
+    assert infix(f"{kernel}\n") == f"{expected}\n"
 
 
-def test_an_acceleration_has_a_learnt_gain_only_if_one_is_learnt() -> None:
-    """Then it is times the share of the gain of its axis, as an operand if it is weighed too."""
-    write = products(fixed=False, weighs=True, learns=True)
-    gained = write["gained"]("limit", "RIGHT")
-    assert gained == "limit * (tilt_gain_share(learnt, RIGHT))"
-    assert write["weighed"](gained) == "(limit * (tilt_gain_share(learnt, RIGHT))) * weight"
-    assert FLOAT["gained"]("limit", "RIGHT") == FIXED["gained"]("limit", "RIGHT") == "limit"
+def test_what_is_no_product_stays() -> None:
+    """Names that only contain one, declarations, comments, and lines that are long for other reasons."""
+    text = f"my_gain_product(a, b); /* gain_product */\n/* {'x' * 150} */\n"
+    assert infix(text) == text
+
+
+def test_a_call_that_does_not_end_is_an_error() -> None:
+    """The message has what stands there."""
+    with pytest.raises(ValueError, match=r"a call that does not end: a, b;"):
+        infix("gain_product(a, b;\n")
+
+
+def test_a_line_that_is_too_long_with_operators_is_wrapped() -> None:
+    """Before the operator outside of most brackets, or behind a comma, below what it goes on with."""
+    name = "position_of_a_very_long_name_m"
+    assert infix(
+        f"    error[axis] = squared({name}_a) + squared({name}_b) - gain_product({name}, {name});\n"
+    ) == (
+        f"    error[axis] = ({name}_a * {name}_a)\n"
+        f"                  + ({name}_b * {name}_b)\n"
+        f"                  - ({name} * {name});\n"
+    )
+    assert infix(f"    call_it({name}, squared({name}), squared({name}));\n") == (
+        f"    call_it({name}, {name} * {name},\n            {name} * {name});\n"
+    )
 
 
 def rendered(text: str) -> str:

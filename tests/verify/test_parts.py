@@ -84,14 +84,12 @@ FAULTS = {
             "nmpc.c", r"angle_rad = NMPC_QUARTER_TURN - angle_rad;", "angle_rad = angle_rad + angle_rad;"
         ),
         "the share has another least": Harm("nmpc.c", r"(#define NMPC_LEAST_SHARE) [^ ]*", r"\1 0.9f"),
-        "the thrust leaves all": Harm(
-            "nmpc.c", r"return \(left_m_step2 < limit_m_step2\) \?", "return (0) ?"
-        ),
-        "no word of the thrust": Harm("nmpc.c", r"by_thrust = NMPC_LIMIT_THRUST;", ""),
+        "the thrust leaves all": Harm("nmpc.c", r"= \(step->left_m_step2 < most_m_step2\) \?", "= (0) ?"),
+        "no word of the thrust": Harm("nmpc.c", r"step->by_thrust = NMPC_LIMIT_THRUST;", ""),
         "a bounded command is told as it was": Harm(
             "nmpc.c",
-            r"attitude_change_command\(attitude, asked_rad",
-            "attitude_change_command(attitude, self->command_rad",
+            r"attitude_change_command\(&self->attitude, asked_rad",
+            "attitude_change_command(&self->attitude, self->command_rad",
         ),
     },
     "learnt gain": {
@@ -117,17 +115,15 @@ FAULTS = {
             r"learnt->slow_m_step2\[angle\] = attitude->tilt_m_step2\[angle\];",
             "learnt->slow_m_step2[angle] = (nmpc_real_t)0;",
         ),
-        "the floor is learnt from": Harm(
-            "nmpc.c",
-            r" \|\| \(state->grounded != 0\)\) \{\n            tilt_gain",
-            ") {\n            tilt_gain",
-        ),
+        "the floor is learnt from": Harm("nmpc.c", r"        restarts = \(restarts != 0\)[^;]*;\n", ""),
         "a reset keeps the gain": Harm("nmpc.c", r"    tilt_gain_clear\(&self->tilt_gain\);\n", ""),
         "a bounded command is the model's": Harm(
-            "nmpc.c", r"tilt_gain_meant\(&self->tilt_gain, 0, change_rad\[0\]\)", "change_rad[0]"
+            "nmpc.c", r"tilt_gain_meant\(&self->tilt_gain, 0, roll_change_rad\)", "roll_change_rad"
         ),
         "the largest move is that of the settings": Harm(
-            "nmpc.c", r"tilt_gain_share\(learnt, NMPC_RIGHT\)", "NMPC_TILT_GAIN_ONE"
+            "nmpc.c",
+            r"tilt_gain_share\(&self->tilt_gain, axis\)",
+            "((axis == NMPC_RIGHT) ? NMPC_TILT_GAIN_ONE : tilt_gain_share(&self->tilt_gain, axis))",
         ),
     },
 }

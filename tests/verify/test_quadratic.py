@@ -59,7 +59,7 @@ UNPROVEN = {
     ),
     "the command leaves the tilt limit": Fault(
         "take_numbers",
-        Harm(CONTROLLER, r"clamp\((attitude_roll\([^;]*feedback_rad\[0\]), self->bounds\.tilt_rad\)", r"\1"),
+        Harm(CONTROLLER, r"    step->command_rad\[0\] = limited_angle\([^;]*;\n", ""),
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
     ),
     "a clamp that does not limit": Fault(

@@ -2,11 +2,12 @@
 
 In floating point that is `gain * tilt`, and as an operand, by the filter `term`, `(gain * tilt)`. In fixed
 point it is `gain_product(gain, tilt)`: each product is a function, since it rounds and shifts to the
-format of its result (`products_fixed.c.j2`).
+format of its result (`products_fixed.c.j2`). Chapters of the kernel call these functions; for floating
+point the filter `infix` writes them with operators.
 """
 
-from collections.abc import Callable
-from functools import partial
+import re
+from collections.abc import Callable, Sequence
 from typing import Final
 
 _NAMES: Final = (
@@ -46,18 +47,28 @@ _OTHER_FORMS: Final = {
 """The same of those that are something else."""
 
 
+COLUMNS: Final = 120
+"""Of a line of C."""
+
+CALL: Final = re.compile(rf"\b({'|'.join(_NAMES)})\(")
+"""A call of a product, up to its first argument."""
+
+_OPERATOR: Final = re.compile(r" (?:[-+*/]|&&|\|\||[<>=!]=|[<>]) ")
+_OPENINGS: Final = ("(", ",", "[", "{", "=", "return")
+_COMPARISONS: Final = ("==", "<=", ">=", "!=")
+_MARK: Final = "\0"
+"""Of what has become a product with operators."""
+_BLANKS: Final = f" \n{_MARK}"
+
+
 class Infix(str):
     """A product written with operators."""
 
     __slots__ = ()
 
 
-def products(*, fixed: bool, weighs: bool = False, learns: bool = False) -> dict[str, Callable[..., str]]:
-    """Return the functions of the templates that write products, by name.
-
-    weighed, over_weight: an acceleration of a tilt times its weight, and over it; as it is without `weighs`.
-    gained: such an acceleration times the share of the learnt gain of its axis; as it is without `learns`.
-    """
+def products(*, fixed: bool) -> dict[str, Callable[..., str]]:
+    """Return the functions of the templates that write products, by name."""
 
     def call(name: str) -> Callable[..., str]:
         return lambda *arguments: f"{name}({', '.join(arguments)})"
@@ -69,20 +80,7 @@ def products(*, fixed: bool, weighs: bool = False, learns: bool = False) -> dict
 
         return write
 
-    found = {name: call(name) if fixed else infix(name) for name in _NAMES}
-    factors = {"weighed": "weight", "over_weight": "inverse"}
-
-    def gained(acceleration: str, axis: str) -> str:
-        share = f"tilt_gain_share(learnt, {axis})"
-        return found["factor_product"](acceleration, share) if learns else acceleration
-
-    return found | {
-        "gained": gained,
-        **{
-            name: partial(_times, found["factor_product"], factor) if weighs else str
-            for name, factor in factors.items()
-        },
-    }
+    return {name: call(name) if fixed else infix(name) for name in _NAMES}
 
 
 def term(product: str) -> str:
@@ -90,9 +88,73 @@ def term(product: str) -> str:
     return f"({product})" if isinstance(product, Infix) and " " in product else product
 
 
-def _times(product: Callable[..., str], factor: str, acceleration: str) -> str:
-    return product(acceleration, factor)
-
-
 def _factor(argument: str) -> str:
     return f"({argument})" if " " in argument else argument
+
+
+def infix(text: str) -> str:
+    """Return C whose calls of products are written with operators, in brackets where they are operands.
+
+    Lines that come out longer than `COLUMNS` are wrapped.
+    """
+    while found := CALL.search(text):
+        end, arguments = arguments_of(text, found.end())
+        product = form(found[1], arguments)
+        before, after = text[: found.start()].rstrip(_BLANKS), text[end:].lstrip(_BLANKS)
+        is_whole = before.endswith(_OPENINGS) and not before.endswith(_COMPARISONS) and after[0] in ",;)]}"
+        text = f"{text[: found.start()]}{_MARK}{product if is_whole else _bracketed(product)}{text[end:]}"
+    lines = text.split("\n")
+    return "\n".join(wrap(line.replace(_MARK, "")) if _MARK in line else line for line in lines)
+
+
+def form(name: str, arguments: Sequence[str]) -> str:
+    """Return a product with operators."""
+    written = _OTHER_FORMS.get(name) or _FORMS[len(arguments)]
+    return written.format(*(map(_bracketed, arguments) if "*" in written else arguments))
+
+
+def arguments_of(text: str, start: int) -> tuple[int, list[str]]:
+    """Return where the call whose arguments begin at `start` ends, and the arguments."""
+    depth, begin, arguments = 1, start, []
+    for place in range(start, len(text)):
+        depth += (text[place] in "([{") - (text[place] in ")]}")
+        if depth == 0 or (depth == 1 and text[place] == ","):
+            arguments.append(" ".join(text[begin:place].split()))
+            begin = place + 1
+        if depth == 0:
+            return place + 1, arguments
+    raise ValueError(f"a call that does not end: {text[start : start + 40]}")
+
+
+def _bracketed(operand: str) -> str:
+    """Return an operand, in brackets if it has an operator of its own."""
+    depth = 0
+    for place, letter in enumerate(operand):
+        depth += (letter in "([{") - (letter in ")]}")
+        if depth == 0 and letter == " " and operand[place - 1] != ",":
+            return f"({operand})"
+    return operand
+
+
+def wrap(line: str, column: int | None = None) -> str:
+    """Break a line of C that is too long: behind a comma or before an operator, outside of brackets.
+
+    `column`: where what goes on from the line before begins; None for the first line of a statement.
+    """
+    if len(line) <= COLUMNS:
+        return line
+    indent = len(line) - len(line.lstrip()) + 4
+    opened, breaks = [indent if column is None else column], []
+    for place, letter in enumerate(line[: COLUMNS + 1]):
+        if letter in "([{":
+            opened.append(place + 1)
+        elif letter in ")]}" and len(opened) > 1:
+            opened.pop()
+        elif letter == " " and (line[place - 1] == "," or _OPERATOR.match(line, place)):
+            breaks.append((len(opened), -place, opened[-1]))
+        if column is None and len(opened) == 1 and line.startswith((" = ", "return "), place):
+            opened[0] = line.index(" ", place + 1) + 1
+    if not breaks:
+        return line
+    _, place, begin = min(breaks)
+    return line[:-place].rstrip() + "\n" + wrap(" " * begin + line[-place:].lstrip(), begin)

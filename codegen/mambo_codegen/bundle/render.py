@@ -21,8 +21,9 @@ from mambo_codegen.bundle.flags import (
     WARNING_FLAGS,
 )
 from mambo_codegen.bundle.fmu import fmu_variables
+from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
-from mambo_codegen.bundle.products import products, term
+from mambo_codegen.bundle.products import infix, products, term
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -141,7 +142,7 @@ def with_prefix(text: str, prefix: str) -> str:
 def _environment() -> jinja2.Environment:
     """Return the Jinja environment; its number filters use the `Spelling` under "spelling" in the context."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("mambo_templates", ""),
+        loader=KernelLoader("mambo_templates", ""),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -151,6 +152,7 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
     environment.filters["term"] = term
+    environment.filters["infix"] = jinja2.pass_context(_infix)
     return environment
 
 
@@ -165,17 +167,18 @@ def _number_filter(name: str) -> Callable[..., str]:
     return spell
 
 
+def _infix(context: jinja2.runtime.Context, text: str) -> str:
+    """Write the products of a chapter with operators, in floating point."""
+    return text if context["fixed"] else infix(text)
+
+
 def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     """Return all values that the templates insert; `with_digest` as in `render`."""
     method = method_of(settings)
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        products(
-            fixed=numbers.formats is not None,
-            weighs=method.has_height,
-            learns=method.learns_tilt_gain,
-        )
+        products(fixed=numbers.formats is not None)
         | {"height": None, "guard": None, "doubts": False, "vector": None, "tilt_gain": None}
         | method.context
         | {

@@ -18,7 +18,6 @@ from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.law import STATES
 from mambo_codegen.methods.quadratic.optimizer import ROW_QUANTITIES
 from mambo_codegen.methods.quadratic.step import REST_M_S
-from mambo_codegen.methods.quadratic.step_choices import step_choices
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
@@ -49,7 +48,11 @@ class Quadratic(QuadraticConstants, Method):
         "guard": "how much the commands may vary",
         "height": "the third axis, whose command is the thrust",
         "limits": "speed, braking and place",
-        "step": "a control step",
+        "step": "what the functions of a control step hand on",
+        "observe": "where the drone is",
+        "aim": "what the next command flies to",
+        "command": "the command of the least cost",
+        "advance": "a control step",
         "interface": "the functions of nmpc.h",
         "float": "the same functions with floats",
     }
@@ -170,13 +173,39 @@ class Quadratic(QuadraticConstants, Method):
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
-            "step": step_choices(self),
+            **_parts(self),
+            "per_step2": _per_step2(self),
             "rest_m_step": REST_M_S * period_s,
             "trims": [
                 f" {'-' if trim_rad > 0 else '+'} NMPC_{name}_TRIM_COMMAND_RAD" if trim_rad else ""
                 for name, trim_rad in zip(("ROLL", "PITCH"), self.attitude.trim_rad.tolist(), strict=True)
             ],
         }
+
+
+def _parts(constants: QuadraticConstants) -> dict[str, bool]:
+    """Return which parts the chapters of the kernel have, by the names of their conditions."""
+    settings, feedback = constants.settings, constants.feedback_steps or (0.0, 0.0)
+    return {
+        "WITH_FEEDBACK": constants.feedback_steps is not None,
+        "WITH_FIXED": constants.numbers.formats is not None,
+        "WITH_GIVEN": settings.target.gives_acceleration,
+        "WITH_GUARD": constants.guard is not None,
+        "WITH_HEIGHT": constants.has_height,
+        "WITH_LIMITS": constants.has_limits,
+        "WITH_PITCH_FEEDBACK": feedback[1] != 0,
+        "WITH_PREDICTED": settings.model.attitude == "predicted",
+        "WITH_ROLL_FEEDBACK": feedback[0] != 0,
+        "WITH_TILT_GAIN": constants.learns_tilt_gain,
+        "WITH_TRACKER": constants.tracker is not None,
+        "WITH_VECTOR": constants.has_thrust_vector,
+    }
+
+
+def _per_step2(constants: QuadraticConstants) -> str:
+    """Return the constant that makes a command of a thrust over mass per squared step."""
+    of_its_own = constants.height is not None and constants.height.thrust_gain != 1.0
+    return "NMPC_THRUST_PER_STEP2_S2" if of_its_own else "NMPC_STEPS2_PER_S2"
 
 
 def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: float) -> NDArray[np.float64]:

@@ -64,11 +64,32 @@ class CheckedInputs:
 
 
 @dataclass(frozen=True)
+class _Observed:
+    """What n controllers know of their drones in a step.
+
+    lift:   the height, and what it makes of a tilt.
+    tilt:   (n, 2) acceleration of the tilt, right and forward; world: the same along x and y.
+    feedback_rad: (n, 2) what rate feedback adds to the commands.
+    missed: (n,) as in the memory.
+    """
+
+    attitude: AttitudeState
+    lift: Lift
+    tilt: Real
+    tilt_gain: TiltGainState
+    world: Real
+    estimate: Estimate
+    feedback_rad: Real
+    missed: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class _Aim:
     """What n controllers aim at in a step.
 
     target: (n, 4 or more) less the height's columns, and within the limits.
     weight: (n,) by how much more tilts count with the next thrust than in hover; None if no more.
+    limit_active: (n,) whether a limit of the height acts.
     missed: (n,) as in the memory.
     has_command: (n,) whether there is a new command.
     rests:  (n,) whether the model has come to rest after an outage.
@@ -79,9 +100,20 @@ class _Aim:
     limits: LimitsMemory
     height: HeightState
     weight: Real | None
+    limit_active: Rows
     missed: NDArray[np.int64]
     has_command: Rows
     rests: Rows
+
+
+@dataclass(frozen=True)
+class _Commanded:
+    """What n controllers command in a step; command_rad and budget_rad are (n, 2)."""
+
+    attitude: AttitudeState
+    command_rad: Real
+    budget_rad: Real
+    limits: LimitsMemory
 
 
 class ControlStep:
@@ -116,38 +148,12 @@ class ControlStep:
         self._rest_m_step = constant(REST_M_S * constants.settings.horizon.update_period_s, "speed")
 
     def advance(self, memory: QuadraticMemory, inputs: CheckedInputs) -> QuadraticMemory:
-        """Return the memory after a control step."""
-        none_yet, has_state = memory.missed >= self._no_estimate, inputs.has_state
-        attitude = self._turn(memory.attitude, inputs, none_yet)
-        angles, seen = inputs.state[:, 4:6], has_state[:, None]
-        share, slope = self._direction(memory, inputs)
-        lift = self.height.observe(memory.height, inputs.state[:, 7:10], share, has_state, none_yet)
-        measured = (
-            self.model.measure(angles, lift.weight)
-            if slope is None
-            else self.model.accelerations(slope, lift.weight)
-        )
-        tilt = np.where(seen, measured, attitude.tilt)
-        memory = replace(memory, tilt_gain=self._learn(memory, inputs, none_yet, attitude.tilt, measured))
-        world = self._to_world(attitude, tilt)
-        estimate = self._observe(memory, inputs, none_yet, world)
-        aim = self._aim(memory, inputs, lift, estimate)
-        moves, by_thrust = self._minimize(memory, attitude, estimate, aim, tilt)
-        attitude, command, budget = self._command(memory, inputs, attitude, moves, aim)
-        return QuadraticMemory(
-            estimate=self.observer.predict(estimate, world),
-            attitude=attitude,
-            target=aim.motion,
-            limits=self._with_thrust(memory.limits, aim, by_thrust),
-            tilt_rad=np.where(seen, angles, memory.tilt_rad),
-            command_rad=command,
-            missed=aim.missed,
-            height=self.height.predict(aim.height, lift.on_ground),
-            height_bounds=memory.height_bounds,
-            budget_rad=budget,
-            is_coarse=memory.is_coarse,
-            tilt_gain=memory.tilt_gain,
-        )
+        """Return the memory after a control step, which observes, aims, commands and predicts."""
+        seen = self._observe(memory, inputs)
+        memory = replace(memory, tilt_gain=seen.tilt_gain)
+        aim = self._aim(memory, inputs, seen)
+        commanded = self._command(memory, seen, aim)
+        return self._predict(memory, inputs, seen, aim, commanded)
 
     def has_estimate(self, memory: QuadraticMemory) -> NDArray[np.bool_]:
         """Return whether there is an estimate (n,): not before the first good state and after an outage."""
@@ -177,7 +183,23 @@ class ControlStep:
         vector = self.model.vector
         return self.height.share(command_rad) if vector is None else vector.of_command(command_rad)[0]
 
-    def _direction(self, memory: QuadraticMemory, inputs: CheckedInputs) -> tuple[Real, Real | None]:
+    def _observe(self, memory: QuadraticMemory, inputs: CheckedInputs) -> _Observed:
+        """Return where the drones are."""
+        none_yet = memory.missed >= self._no_estimate
+        attitude = self.model.advance(memory.attitude)
+        share, slope = self._measure_direction(memory, inputs)
+        attitude = self._measure_heading(attitude, inputs, none_yet)
+        lift = self.height.observe(memory.height, inputs.state[:, 7:10], share, inputs.has_state, none_yet)
+        measured = self._measure_tilt(inputs, slope, lift)
+        tilt = np.where(inputs.has_state[:, None], measured, attitude.tilt)
+        tilt_gain = self._learn_tilt_gain(memory, inputs, none_yet, attitude.tilt, measured)
+        world = self._turn_to_world(attitude, tilt)
+        estimate = self._correct_estimates(memory, inputs, none_yet, world)
+        feedback_rad = self._measure_rates(memory, inputs)
+        missed = self._count_missed(memory.missed, inputs.has_state)
+        return _Observed(attitude, lift, tilt, tilt_gain, world, estimate, feedback_rad, missed)
+
+    def _measure_direction(self, memory: QuadraticMemory, inputs: CheckedInputs) -> tuple[Real, Real | None]:
         """Return the vertical share (n,) of the thrust, and its slopes (n, 2), None with small angles."""
         angles, vector = inputs.state[:, 4:6], self.model.vector
         if vector is None:
@@ -186,7 +208,25 @@ class ControlStep:
         share, slope = vector.of_measured(angles)
         return np.where(inputs.has_state, share, self.commanded_share(memory.command_rad)), slope
 
-    def _learn(
+    def _measure_heading(
+        self, attitude: AttitudeState, inputs: CheckedInputs, none_yet: Rows
+    ) -> AttitudeState:
+        """Return the models at the measured heading."""
+        sine, cosine = self.products.sine_cosine(inputs.state[:, 6])
+        measured = choose(
+            none_yet,
+            replace(attitude, sine=sine, cosine=cosine),
+            self.model.turn(attitude, sine, cosine, inputs.allows_command),
+        )
+        return choose(inputs.has_state, measured, attitude)
+
+    def _measure_tilt(self, inputs: CheckedInputs, slope: Real | None, lift: Lift) -> Real:
+        """Return the accelerations (n, 2) of the measured tilt."""
+        if slope is None:
+            return self.model.measure(inputs.state[:, 4:6], lift.weight)
+        return self.model.accelerations(slope, lift.weight)
+
+    def _learn_tilt_gain(
         self, memory: QuadraticMemory, inputs: CheckedInputs, none_yet: Rows, model: Real, measured: Real
     ) -> TiltGainState:
         """Return what the accelerations (n, 2) of the model's and of the measured tilt say of the gain."""
@@ -201,30 +241,7 @@ class ControlStep:
         kept = self.tilt_gain.restart(before, model, measured, restarts)
         return choose(inputs.has_state, choose(restarts, kept, learnt), before)
 
-    def _sent(self, memory: QuadraticMemory, command_rad: Real) -> Real:
-        """Return what is sent for commands (n, 2) of the model."""
-        return self.tilt_gain.sent(memory.tilt_gain, command_rad) if self.tilt_gain else command_rad
-
-    def _with_thrust(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
-        """Return the memory of the limits, with whether the thrust limited the last command (n,)."""
-        if not self.limits.brake:
-            return aim.limits
-        kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
-        thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
-        return replace(aim.limits, active=(aim.limits.active & ~ActiveLimit.THRUST) + thrust)
-
-    def _turn(self, attitude: AttitudeState, inputs: CheckedInputs, none_yet: Rows) -> AttitudeState:
-        """Return the models after they have answered the last command, at the measured heading."""
-        attitude = self.model.advance(attitude)
-        sine, cosine = self.products.sine_cosine(inputs.state[:, 6])
-        measured = choose(
-            none_yet,
-            replace(attitude, sine=sine, cosine=cosine),
-            self.model.turn(attitude, sine, cosine, inputs.allows_command),
-        )
-        return choose(inputs.has_state, measured, attitude)
-
-    def _observe(
+    def _correct_estimates(
         self, memory: QuadraticMemory, inputs: CheckedInputs, none_yet: Rows, world: Real
     ) -> Estimate:
         """Return the estimates after the measurement; world (n, 2) is the acceleration of the tilt."""
@@ -236,41 +253,49 @@ class ControlStep:
         )
         return choose(inputs.has_state, corrected, estimate)
 
-    def _count(self, missed: NDArray[np.int64], has_state: Rows) -> NDArray[np.int64]:
+    def _measure_rates(self, memory: QuadraticMemory, inputs: CheckedInputs) -> Real:
+        """Return what the change of the measured angles since the last step adds to commands (n, 2)."""
+        if self._feedback is None:
+            return np.zeros_like(memory.tilt_rad)
+        change = self.products.feedback_product(self._feedback, inputs.state[:, 4:6] - memory.tilt_rad)
+        known = inputs.has_state & (memory.missed == 0)
+        return np.where(known[:, None], change, np.zeros_like(change))
+
+    def _count_missed(self, missed: NDArray[np.int64], has_state: Rows) -> NDArray[np.int64]:
         """Return the control steps (n,) since the last good state."""
         waited = np.minimum(missed + 1, np.maximum(missed, self._no_estimate))
         return np.where(has_state, 0, waited)
 
-    def _aim(self, memory: QuadraticMemory, inputs: CheckedInputs, lift: Lift, estimate: Estimate) -> _Aim:
-        """Return what the controllers aim at; the height has its next thrust."""
-        missed = self._count(memory.missed, inputs.has_state)
-        columns, follows = self._level_columns, inputs.allows_command & (missed < self._no_estimate)
-        level, upward = inputs.target[:, :columns], inputs.target[:, columns:]
+    def _aim(self, memory: QuadraticMemory, inputs: CheckedInputs, seen: _Observed) -> _Aim:
+        """Return what the next commands fly to; the height has its next thrust."""
+        follows = inputs.allows_command & (seen.missed < self._no_estimate)
+        level, upward = np.split(inputs.target, [self._level_columns], axis=1)
         height, limit_active = self.height.aim(
-            lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
+            seen.lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
-        limits, motion, target = self.limits.aim(
-            memory.limits, memory.target, estimate.position_m, level, follows
-        )
-        if self.tracker is not None:
-            motion = choose(follows, self.tracker.update(motion, target[:, self.tracker.columns]), motion)
         weight = self.height.command_weight(height)
-        aim = _Aim(target, motion, limits, height, weight, missed, has_command=follows, rests=follows & False)
-        if not self.limits.brake:
-            return aim
-        return self._end_outage(aim, estimate, limit_active)
+        limits, motion, target = self.limits.aim(
+            memory.limits, memory.target, seen.estimate.position_m, level, follows
+        )
+        motion = self._track_target(motion, target, follows)
+        aim = _Aim(
+            target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
+        )
+        return self._end_outage(aim, seen.estimate) if self.limits.brake else aim
 
-    def _end_outage(self, aim: _Aim, estimate: Estimate, limit_active: Rows) -> _Aim:
-        """Brake by the model's velocity where an outage lasts too long, until the model is at rest.
+    def _track_target(self, motion: TargetMotion, target: Real, follows: Rows) -> TargetMotion:
+        """Return how the targets (n, 4 or more) move that are followed (n,)."""
+        if self.tracker is None:
+            return motion
+        return choose(follows, self.tracker.update(motion, target[:, self.tracker.columns]), motion)
 
-        limit_active (n,): whether a limit of the height acts.
-        """
+    def _end_outage(self, aim: _Aim, estimate: Estimate) -> _Aim:
+        """Brake by the model's velocity where an outage lasts too long, until the model is at rest."""
         overdue = aim.missed == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = overdue & ~slow, overdue & slow
         stopped = np.concatenate([estimate.position_m, np.zeros_like(aim.target[:, 2:])], axis=1)
         active = np.where(brakes, ActiveLimit.BRAKING, np.where(rests, 0, aim.limits.active))
-        active = (active & ~ActiveLimit.HEIGHT) + np.where(limit_active, ActiveLimit.HEIGHT, 0)
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),
@@ -282,86 +307,132 @@ class ControlStep:
             rests=rests,
         )
 
-    def _command(
-        self,
-        memory: QuadraticMemory,
-        inputs: CheckedInputs,
-        attitude: AttitudeState,
-        moves: Real,
-        aim: _Aim,
-    ) -> tuple[AttitudeState, Real, Real]:
-        """Return the models with the next commands, roll and pitch (n, 2) that are sent, and the budgets."""
-        moved = replace(attitude, command=self.products.move_acceleration(moves))
-        command = self._sent(memory, self._angles(moved.command, aim.weight))
-        held, tilt_limit = memory.command_rad, memory.limits.bounds.tilt_rad[:, None]
-        if self._feedback is not None:  # the C adds none where its factor is 0: a sum with 0 has no sign -0
-            fed = self._feedback != 0
-            command = np.where(fed, command + self._rate_feedback(memory, inputs), command)
-            without = self._sent(memory, self._angles(attitude.command, aim.weight))
-            without = clamp(without, tilt_limit)
-            held = np.where(fed & (memory.missed == 0)[:, None], without, held)
-        command, budget = clamp(command, tilt_limit), memory.budget_rad
-        if self.tilt_budget is not None:
-            wanted = command
-            command, left = self.tilt_budget.spend(budget, memory.command_rad, wanted)
-            command, budget = clamp(command, tilt_limit), np.where(aim.has_command[:, None], left, budget)
-            gain = memory.tilt_gain.gain if self.tilt_gain else None
-            told = self.model.change_command(moved, wanted, command, aim.weight, gain)
-            moved = choose((command != wanted).any(axis=1), told, moved)
+    def _command(self, memory: QuadraticMemory, seen: _Observed, aim: _Aim) -> _Commanded:
+        """Return what flies to the aim; without one the last commands hold, and at rest they are level."""
+        moves, by_thrust = self._minimize(memory, seen, aim)
+        moved = replace(seen.attitude, command=self.products.move_acceleration(moves))
+        angles_rad = self._find_angles(memory, moved, aim)
+        angles_rad = self._limit_angles(memory, angles_rad, seen)
+        moved, command, budget = self._guard_commands(memory, moved, angles_rad, aim)
+        held = self._hold_command(memory, seen, aim)
         command = np.where(aim.has_command[:, None], command, held)
-        attitude, level = choose(aim.has_command, moved, attitude), np.zeros_like(command)
+        attitude, level = choose(aim.has_command, moved, seen.attitude), np.zeros_like(command)
         attitude = choose(aim.rests, self.model.set_command(attitude, level, aim.weight), attitude)
-        return attitude, np.where(aim.rests[:, None], level, command), budget
+        command = np.where(aim.rests[:, None], level, command)
+        return _Commanded(attitude, command, budget, self._report_limits(memory.limits, aim, by_thrust))
 
-    def _rate_feedback(self, memory: QuadraticMemory, inputs: CheckedInputs) -> Real:
-        """Return what the change of the measured angles since the last step adds to commands (n, 2)."""
-        change = self.products.feedback_product(self._feedback, inputs.state[:, 4:6] - memory.tilt_rad)
-        known = inputs.has_state & (memory.missed == 0)
-        return np.where(known[:, None], change, np.zeros_like(change))
-
-    def _angles(self, command: Real, weight: Real | None) -> Real:
-        """Return roll and pitch (n, 2) of commands (n, 2) while tilts count `weight` (n,) times."""
-        return self.model.command_rad(self.height.over_weight(command, weight))
-
-    def _minimize(
-        self, memory: QuadraticMemory, attitude: AttitudeState, estimate: Estimate, aim: _Aim, tilt: Real
-    ) -> tuple[Real, Rows]:
-        """Return the first free moves (n, 2), right and forward, with the acceleration `tilt` (n, 2).
+    def _minimize(self, memory: QuadraticMemory, seen: _Observed, aim: _Aim) -> tuple[Real, Rows]:
+        """Return the first free moves (n, 2), right and forward, by the minimum of the cost along both axes.
 
         And whether what the thrust leaves limits one of them (n,).
         """
-        disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(tilt)
+        attitude, estimate = seen.attitude, seen.estimate
+        disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(seen.tilt)
         if self.tracker is not None:
             disturbance = disturbance - aim.motion.acceleration_m_step2
-            jerk = self._to_heading(attitude, aim.motion.jerk_m_step2_update)
+            jerk = self._turn_to_heading(attitude, aim.motion.jerk_m_step2_update)
         errors = (
             estimate.position_m - aim.target[:, 0:2],
             estimate.velocity_m_step - self.products.speed_product(aim.target[:, 2:4]),
             disturbance,
         )
         state = [
-            *(self._to_heading(attitude, error) for error in errors),
+            *(self._turn_to_heading(attitude, error) for error in errors),
             jerk,
-            attitude.tilt if self._is_predicted else tilt,
+            attitude.tilt if self._is_predicted else seen.tilt,
             attitude.integral,
             attitude.lagged,
             attitude.command,
         ]
+        limit, left = self._largest_move(memory, aim)
+        moves = self.optimizer.minimize(np.stack(state, axis=2), limit)
+        if left is None:
+            return moves, np.zeros(len(moves), np.bool_)
+        return moves, np.any((limit == left) & (np.abs(moves) >= limit), axis=1)
+
+    def _largest_move(self, memory: QuadraticMemory, aim: _Aim) -> tuple[Real, Real | None]:
+        """Return the largest moves (n, 2), and what the thrust leaves to each, None if it does not count."""
         limit, spare = aim.limits.command_limit, self.height.spare(aim.height)
         if self.tilt_gain is not None:
             limit = self.products.factor_product(limit, self.tilt_gain.share(memory.tilt_gain))
         limit = self.model.weighed(limit, aim.weight)
         if spare is None:
-            return self.optimizer.minimize(np.stack(state, axis=2), limit), np.zeros(len(tilt), np.bool_)
+            return limit, None
         left = self.products.to_move(spare)[:, None]
-        limit = np.where(left < limit, left, limit)
-        moves = self.optimizer.minimize(np.stack(state, axis=2), limit)
-        return moves, np.any((limit == left) & (np.abs(moves) >= limit), axis=1)
+        return np.where(left < limit, left, limit), left
 
-    def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
+    def _find_angles(self, memory: QuadraticMemory, attitude: AttitudeState, aim: _Aim) -> Real:
+        """Return roll and pitch (n, 2) that stand for the commands of models."""
+        angles_rad = self.model.command_rad(self.height.over_weight(attitude.command, aim.weight))
+        return self.tilt_gain.sent(memory.tilt_gain, angles_rad) if self.tilt_gain else angles_rad
+
+    def _limit_angles(self, memory: QuadraticMemory, angles_rad: Real, seen: _Observed) -> Real:
+        """Return angles (n, 2) with rate feedback, within the tilt limit."""
+        if self._feedback is not None:  # the C adds none where its factor is 0: a sum with 0 has no sign -0
+            angles_rad = np.where(self._feedback != 0, angles_rad + seen.feedback_rad, angles_rad)
+        return clamp(angles_rad, memory.limits.bounds.tilt_rad[:, None])
+
+    def _guard_commands(
+        self, memory: QuadraticMemory, moved: AttitudeState, asked_rad: Real, aim: _Aim
+    ) -> tuple[AttitudeState, Real, Real]:
+        """Return the models that know what is commanded, the commands (n, 2), and the budgets."""
+        budget = memory.budget_rad
+        if self.tilt_budget is None:
+            return moved, asked_rad, budget
+        allowed, left = self.tilt_budget.spend(budget, memory.command_rad, asked_rad)
+        command = clamp(allowed, memory.limits.bounds.tilt_rad[:, None])
+        gain = memory.tilt_gain.gain if self.tilt_gain else None
+        told = self.model.change_command(moved, asked_rad, command, aim.weight, gain)
+        moved = choose((command != asked_rad).any(axis=1), told, moved)
+        return moved, command, np.where(aim.has_command[:, None], left, budget)
+
+    def _hold_command(self, memory: QuadraticMemory, seen: _Observed, aim: _Aim) -> Real:
+        """Return the last commands (n, 2), less rate feedback."""
+        if self._feedback is None:
+            return memory.command_rad
+        without = self._find_angles(memory, seen.attitude, aim)
+        without = clamp(without, memory.limits.bounds.tilt_rad[:, None])
+        is_fed = (self._feedback != 0) & (memory.missed == 0)[:, None]
+        return np.where(is_fed, without, memory.command_rad)
+
+    def _report_limits(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
+        """Return the limits with those of the thrust, which limits the last moves or not (n,)."""
+        if not self.limits.brake:
+            return aim.limits
+        kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
+        thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
+        others = aim.limits.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)
+        height = np.where(aim.limit_active, ActiveLimit.HEIGHT, 0)
+        return replace(aim.limits, active=others + height + thrust)
+
+    def _predict(
+        self,
+        memory: QuadraticMemory,
+        inputs: CheckedInputs,
+        seen: _Observed,
+        aim: _Aim,
+        commanded: _Commanded,
+    ) -> QuadraticMemory:
+        """Return the memory with the estimates at the next control step."""
+        return QuadraticMemory(
+            estimate=self.observer.predict(seen.estimate, seen.world),
+            attitude=commanded.attitude,
+            target=aim.motion,
+            limits=commanded.limits,
+            tilt_rad=np.where(inputs.has_state[:, None], inputs.state[:, 4:6], memory.tilt_rad),
+            command_rad=commanded.command_rad,
+            missed=aim.missed,
+            height=self.height.predict(aim.height, seen.lift.on_ground),
+            height_bounds=memory.height_bounds,
+            budget_rad=commanded.budget_rad,
+            is_coarse=memory.is_coarse,
+            tilt_gain=memory.tilt_gain,
+        )
+
+    def _turn_to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         """Return vectors (n, 2) along x and y from those along right and forward."""
         return self.products.turn(heading[:, ::-1], attitude.sine, attitude.cosine)
 
-    def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
+    def _turn_to_heading(self, attitude: AttitudeState, world: Real) -> Real:
         """Return vectors (n, 2) along right and forward from those along x and y."""
         return self.products.turn(world[:, ::-1], attitude.sine, attitude.cosine)

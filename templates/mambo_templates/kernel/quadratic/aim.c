@@ -1,0 +1,103 @@
+/* ---- Aim ------------------------------------------------------------------------------------------------------------
+ *
+ * What the next command flies to: the target, within the limits, or rest after an outage. Without either the last
+ * command holds.
+ */
+
+#if WITH_HEIGHT
+/* Set the next thrust, and what it makes of a tilt. */
+NMPC_INLINE void command_thrust(nmpc_t *self, nmpc_step_t *step)
+{
+#if WITH_LIMITS
+    step->limit_active = height_aim(self, step->state, step->aim);
+#else
+    (void)height_aim(self, step->state, step->aim);
+#endif
+    step->weight = height_weight(height_lift(&self->height, self->height.command_m_step2));
+    step->inverse = weight_inverse(step->weight);
+}
+
+#endif
+#if WITH_LIMITS
+/* Aim at the target within the limits. */
+NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
+{
+    const nmpc_real_t position_m[2] = { step->observer.position_m[0], step->observer.position_m[1] };
+
+    if (limits_apply(self, position_m, step->aim, step->limited) != 0U) {
+        step->aim = step->limited;
+    }
+}
+
+#endif
+#if WITH_TRACKER
+/* Estimate how the target moves. */
+NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
+{
+#if WITH_GIVEN
+    tracker_update(self, step->aim->acceleration_m_s2);
+#else
+    tracker_update(self, step->aim->velocity_m_s);
+#endif
+}
+
+#endif
+#if WITH_LIMITS
+/* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. */
+NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
+{
+#if WITH_TRACKER
+    tracker_clear(self);
+#endif
+#if WITH_TRACKER and WITH_HEIGHT
+    height_clear_target(&self->height);
+#endif
+#if WITH_VECTOR
+    step->by_thrust = 0U;
+#endif
+    if ((within(step->observer.velocity_m_step[0], NMPC_REST_M_STEP) != 0)
+        && (within(step->observer.velocity_m_step[1], NMPC_REST_M_STEP) != 0)) {
+        self->command_rad[0] = (nmpc_real_t)0;
+        self->command_rad[1] = (nmpc_real_t)0;
+#if WITH_HEIGHT
+        attitude_set_command(&self->attitude, (nmpc_real_t)0, (nmpc_real_t)0, step->weight);
+#else
+        attitude_set_command(&self->attitude, (nmpc_real_t)0, (nmpc_real_t)0);
+#endif
+        self->limited = 0U;
+        step->missed = NMPC_AT_REST;
+    } else {
+        step->limited->position_m[0] = step->observer.position_m[0];
+        step->limited->position_m[1] = step->observer.position_m[1];
+        self->limited = (unsigned char)NMPC_LIMIT_BRAKING;
+        step->aim = step->limited;
+    }
+}
+
+#endif
+/* Choose what the next command flies to. */
+NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
+{
+    step->aim = (step->missed < NMPC_NO_ESTIMATE) ? step->target : NULL;
+#if WITH_HEIGHT
+    command_thrust(self, step);
+#endif
+#if WITH_LIMITS
+    if (step->missed == NMPC_NO_ESTIMATE) {
+        end_outage(self, step);
+    } else if (step->aim != NULL) {
+        limit_target(self, step);
+#if WITH_TRACKER
+        track_target(self, step);
+#endif
+    } else {
+        /* The last command holds. */
+    }
+#elif WITH_TRACKER
+    if (step->aim != NULL) {
+        track_target(self, step);
+    }
+#elif not WITH_HEIGHT
+    (void)self;
+#endif
+}

@@ -1,0 +1,57 @@
+/* ---- Step -----------------------------------------------------------------------------------------------------------
+ *
+ * What the functions of a control step know and hand on. A step begins, observes, aims, commands and predicts, in the
+ * chapters that follow.
+ */
+
+/* `missed` after an outage; without limits also before the first good state. */
+#define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
+#if WITH_LIMITS
+
+/* `missed` before the first good state, and when the model has come to rest after an outage. */
+#define NMPC_AT_REST (NMPC_OUTAGE_STEPS + 2U)
+#endif
+
+/* What the functions of a control step hand on to each other. */
+typedef struct {
+    const nmpc_state_t *state;    /* null if it is not good */
+    const nmpc_target_t *target;  /* null if the inputs allow no new command */
+    const nmpc_target_t *aim;     /* what the next command flies to; null if the last one holds */
+    nmpc_observer_t observer;     /* a copy, which the compiler can keep in registers */
+    unsigned int missed;          /* control steps since the last good state */
+    nmpc_real_t tilt_m_step2[2];  /* acceleration of the tilt, right and forward */
+    nmpc_real_t world_m_step2[2]; /* the same along x and y */
+    nmpc_real_t command_rad[2];   /* the angles that stand for the model's command */
+#if WITH_LIMITS
+    /* The target within the limits. */
+    nmpc_target_t *limited;
+#endif
+#if WITH_FEEDBACK
+    /* What rate feedback adds to the commands. */
+    nmpc_real_t feedback_rad[2];
+#endif
+#if WITH_HEIGHT
+    /* By how much a tilt counts for more than in hover, with the next thrust; 1 over it; 1 on the floor, else 0. */
+    nmpc_real_t weight;
+    nmpc_real_t inverse;
+    int on_ground;
+#endif
+#if WITH_HEIGHT and WITH_LIMITS
+    /* 1 if a limit of the height acts, else 0. */
+    int limit_active;
+#endif
+#if WITH_VECTOR
+    /* The slopes of the thrust, right and forward; the largest move that it leaves. */
+    nmpc_real_t slope[2];
+    nmpc_real_t left_m_step2;
+#endif
+#if WITH_VECTOR and WITH_LIMITS
+    /* NMPC_LIMIT_THRUST if that limits a move, else 0. */
+    unsigned int by_thrust;
+#endif
+} nmpc_step_t;
+
+NMPC_INLINE int has_estimate(const nmpc_t *self)
+{
+    return self->missed < NMPC_NO_ESTIMATE;
+}
