@@ -318,7 +318,7 @@ static int is_good_command(const nmpc_command_t *command)
            && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
 }
 
-/* ---- Sine and cosine ------------------------------------------------------------------------------------------------
+/* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
  * The angle less whole quarter turns, r, and for |r| <= pi/4 apart from rounding polynomials
  *
@@ -392,7 +392,7 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
     vector[1] = sine_product(second, cosine) + sine_product(first, sine);
 }
 
-/* ---- Attitude model -------------------------------------------------------------------------------------------------
+/* ---- Attitude -------------------------------------------------------------------------------------------------------
  *
  * How the drone accelerates in answer to the commands (not in the paper). Axes are those of the heading: 0 is right,
  * which roll tilts to, and 1 is forward, which minus pitch tilts to. Along each let u be the commanded acceleration, c
@@ -709,7 +709,7 @@ static void observer_clear(nmpc_observer_t *observer)
     }
 }
 
-/* ---- Target tracker -------------------------------------------------------------------------------------------------
+/* ---- Tracker --------------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
  * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target,
@@ -1896,7 +1896,7 @@ const char *nmpc_version(void)
     return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
 }
 
-/* ---- Interface in floats --------------------------------------------------------------------------------------------
+/* ---- Float ----------------------------------------------------------------------------------------------------------
  *
  * Conversion between float and the fixed point numbers of the controller. The linker leaves out what nobody calls.
  */

@@ -189,7 +189,7 @@ static int is_good_command(const nmpc_command_t *command)
            && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
 }
 
-/* ---- Sine and cosine ------------------------------------------------------------------------------------------------
+/* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
  * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
  *
@@ -265,7 +265,7 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
     vector[1] = (second * cosine) + (first * sine);
 }
 
-/* ---- Attitude model -------------------------------------------------------------------------------------------------
+/* ---- Attitude -------------------------------------------------------------------------------------------------------
  *
  * How the drone accelerates in answer to the commands (not in the paper). Axes are those of the heading: 0 is right,
  * which roll tilts to, and 1 is forward, which minus pitch tilts to. Along each let u be the commanded acceleration, c
@@ -583,7 +583,7 @@ static void observer_clear(nmpc_observer_t *observer)
     }
 }
 
-/* ---- Target tracker -------------------------------------------------------------------------------------------------
+/* ---- Tracker --------------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
  * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target,

@@ -251,7 +251,7 @@ static int is_good_command(const nmpc_command_t *command)
            && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
 }
 
-/* ---- Sine and cosine ------------------------------------------------------------------------------------------------
+/* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
  * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
  *

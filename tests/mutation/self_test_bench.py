@@ -35,7 +35,7 @@ _MACRO: Final = re.compile(
     r"^([ \t]*#[ \t]*define[ \t]+\w+[ \t]+)([^\n]*?)([ \t]*(?:/\*[^\n]*)?)$", re.MULTILINE
 )
 _NUMBER: Final = re.compile(r"-?(?:\d+\.\d*(?:e[-+]?\d+)?f?|\d+e[-+]?\d+f?|\d{3,})")
-_FLOATS: Final = "/* ---- Interface in floats -"
+_FLOATS: Final = "/* ---- Float -"
 _NAMED: Final = re.compile(r"\bNMPC_\w+")
 
 

@@ -123,7 +123,7 @@ def build_extension(settings: Settings) -> ModuleType:
 def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     """Return the extension of a bundle with prefix nmpc; builds it with gcc unless it is cached."""
     library = files["nmpc.c"]
-    tracked = "Target tracker" in library
+    tracked = "/* ---- Tracker -" in library
     norm = "quadratic" if "nmpc_observer_t" in library else "1-norm"
     includes = '#include "nmpc.c"\n#include "nmpc_self_test.c"\n'
     declarations = _TYPES + {"1-norm": _ONE_NORM, "quadratic": _QUADRATIC}[norm] + _FUNCTIONS

@@ -138,3 +138,11 @@ def test_a_bundle_has_no_condition_and_no_line_of_the_kernel_is_too_long(setting
     chapter = text[text.index("/* ---- Step --") : text.index("/* ---- Interface ")]
     assert max(map(len, chapter.splitlines())) <= 120
     assert ("sine_product(" in chapter) == (method_of(settings).numbers.formats is not None)
+
+
+@pytest.mark.parametrize("settings", [*SHAPES.values(), presets.preset("table1")], ids=[*SHAPES, "table1"])
+def test_the_index_has_the_headings_of_the_chapters(settings: Settings) -> None:
+    """In their order."""
+    text = render(settings, with_digest=False)["nmpc.c"]
+    index = [line[5:19].strip() for line in text.partition("*/")[0].splitlines() if line.startswith(" *   ")]
+    assert index == [one.lower() for one in re.findall(r"^/\* ---- (.+?) -+$", text, re.MULTILINE)]
