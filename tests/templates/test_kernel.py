@@ -28,8 +28,9 @@ SHAPES: dict[str, Settings] = {
     "all options": with_option(height_case(6, "float32"), "observer.tilt_gain", "learnt"),
     "fixed": height_case(4, "fixed"),
     "without limits": settings_of(TWO_MOVES | {"observer.tilt_gain": "learnt", "code.scalar": "float64"}),
+    "least": settings_of(TWO_MOVES),
 }
-"""Four shapes, which every condition on parts divides."""
+"""Shapes that every condition on parts divides, and one with none of them."""
 MANY = [
     *(pytest.param("gcc", settings, id=f"gcc {name}") for name, settings in SHAPES.items()),
     *(
@@ -71,7 +72,7 @@ def test_a_compiler_reads_the_kernel_as_it_stands(compiler: str, settings: Setti
     assert done.stdout == "same bits"
 
 
-def test_the_four_shapes_divide_every_condition() -> None:
+def test_the_shapes_divide_every_condition() -> None:
     """Each part is there in one of them, and absent from another."""
     parts = [parts_of(settings) for settings in SHAPES.values()]
     assert {name for name in parts[0] if len({shape[name] for shape in parts}) == 1} == set()

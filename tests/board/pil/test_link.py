@@ -253,7 +253,10 @@ def test_a_board_that_does_not_answer_is_told(faults: Faults, message: str, elf:
     [
         (
             "nmpc.c",
-            ("self->tilt_rad[0] = state->roll_rad", "self->tilt_rad[0] = 1.0000001f * state->roll_rad"),
+            (
+                "self->tilt_rad[0] = step->state->roll_rad",
+                "self->tilt_rad[0] = 1.0000001f * step->state->roll_rad",
+            ),
             "STEP 2 OF THE SELF-TEST HAS OTHER BITS THAN THE REFERENCE",
         ),
         (

@@ -221,14 +221,12 @@ def test_a_drone_without_sensors_is_calm() -> None:
 
 
 def test_the_true_state_has_a_quick_observer() -> None:
-    """Without noise and age, whether the file says it or an option; the older name says the same."""
+    """Without noise and age, whether the file says it or an option."""
     true = settings_for(GENERIC.with_sensors("true")).observer
     assert (true.position_noise, true.velocity_noise, true.disturbance_noise) == (0.001, 0.02, 3.0)
     assert true.age_s == 0.0
-    for name in ("true", "none"):
-        said = VehicleFile.model_validate(GENERIC.model_dump() | {"sensors": {"kind": name}})
-        assert said.sensors.kind == "true"
-        assert settings_for(said).observer == true
+    said = VehicleFile.model_validate(GENERIC.model_dump() | {"sensors": {"kind": "true"}})
+    assert settings_for(said).observer == true
     assert GENERIC.with_sensors("mocap") == GENERIC
     with pytest.raises(
         InvalidSettingsError, match=r'^sensors = "mambo" needs its figures, \[sensors\], in the file'

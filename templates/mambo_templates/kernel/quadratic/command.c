@@ -127,6 +127,7 @@ NMPC_INLINE void find_angles(const nmpc_t *self, nmpc_step_t *step)
 #endif
 }
 
+#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK or WITH_GUARD
 /* Clamp an angle at the tilt limit. */
 NMPC_INLINE nmpc_real_t limited_angle(const nmpc_t *self, nmpc_real_t angle_rad)
 {
@@ -146,6 +147,8 @@ NMPC_INLINE nmpc_real_t limited_angle(const nmpc_t *self, nmpc_real_t angle_rad)
 #endif
 }
 
+#endif
+#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK
 /* Add rate feedback to the angles, and clamp them at the tilt limit. */
 NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
 {
@@ -166,6 +169,7 @@ NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
 #endif
 }
 
+#endif
 #if WITH_GUARD
 /* Command the angles, but bound their change from the last commands, and tell the model what is commanded. */
 NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
@@ -253,7 +257,9 @@ NMPC_INLINE void step_command(nmpc_t *self, nmpc_step_t *step)
     if (step->aim != NULL) {
         minimize(self, step);
         find_angles(self, step);
+#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK
         limit_angles(self, step);
+#endif
 #if WITH_GUARD
         guard_commands(self, step);
 #else
