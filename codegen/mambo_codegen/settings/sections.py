@@ -198,7 +198,8 @@ class Target(SettingsSection):
     def _is_known(cls, acceleration: Any) -> Any:
         if acceleration == "preview":
             raise PydanticCustomError(
-                "preview", 'must not be "preview", which went in version 0.4; write "given", which is closer'
+                "preview",
+                'must be "none", "given" or "tracked": version 0.4 has no preview, and "given" is closer',
             )
         return acceleration
 

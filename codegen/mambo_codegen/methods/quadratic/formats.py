@@ -147,11 +147,10 @@ def formats(settings: Sections) -> QuadraticFormats:
         "factor": FACTOR_BITS,
     }
     bits |= limits_bits(limits(settings), bits["velocity"], position)
-    names = STATES
-    inputs = [bits[_INPUTS.get(name, "acceleration")] for name in names]
+    inputs = [bits[_INPUTS.get(name, "acceleration")] for name in STATES]
     shifts = {
         "attitude": _attitude_shift(loops, bounds.states, bits),
-        "row": _shift(np.abs(laws), [bounds.states[name] for name in names], inputs, bits["move"]),
+        "row": _shift(np.abs(laws), [bounds.states[name] for name in STATES], inputs, bits["move"]),
     }
     bits["attitude"] = shifts["attitude"]
     if height is not None:
@@ -168,7 +167,7 @@ def formats(settings: Sections) -> QuadraticFormats:
         shifts[f"{name}_correction"] = shift
         for by, source in zip(("position", "velocity"), sources, strict=True):
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
-    for name, source in zip(names, inputs, strict=True):
+    for name, source in zip(STATES, inputs, strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
     shifts |= _product_shifts(bits, tracker.input_quantity if tracker else "")
     shifts |= vertical_shifts(bits) if height else {}
