@@ -90,9 +90,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update
     period, or wants a controller of another kind.
     """
-    target.refuse_level(
-        has_height=settings.height is not None, has_limits=method_of(settings).limiting is not None
-    )
+    target.refuse_level(has_height=settings.height is not None)
     ticks = target.ticks_per_update(settings.horizon.update_period_s)
     bundle = render(settings, with_digest=with_digest)
     library = {

@@ -24,7 +24,7 @@ class FirmwareTarget:
     opening: text before the text of nmpc.c.
     self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
-    flies_height: whether it wants roll, pitch and thrust from one controller, within limits.
+    flies_height: whether it wants roll, pitch and thrust from one controller.
     """
 
     name: str
@@ -35,12 +35,12 @@ class FirmwareTarget:
     tick_s: float | None = None
     flies_height: bool = False
 
-    def refuse_level(self, *, has_height: bool, has_limits: bool) -> None:
-        """Raise InvalidSettingsError for settings without a section that the target needs."""
-        if self.flies_height and not (has_height and has_limits):
+    def refuse_level(self, *, has_height: bool) -> None:
+        """Raise InvalidSettingsError for settings without a height if the target needs one."""
+        if self.flies_height and not has_height:
             raise InvalidSettingsError(
                 (
-                    f"--for {self.name} wants settings with [height] and [limits], since its controller "
+                    f"--for {self.name} wants settings with [height], since its controller "
                     "commands the thrust too: derive them from a drone with [thrust] or [rotors] "
                     "(mambo-nmpc design)",
                 )

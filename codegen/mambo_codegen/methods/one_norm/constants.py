@@ -1,19 +1,15 @@
 """The constants of a controller with the 1-norm."""
 
 import math
-from dataclasses import replace
 from functools import cached_property
 
 from mambo_codegen.methods.one_norm.formats import OneNormFormats, formats
 from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import (
-    ONE_NORM_APPROACH_1_S,
     ONE_NORM_OUTAGE_S,
-    ONE_NORM_TILT,
-    TURN_SHARE,
     LimitsConstants,
-    limits_constants,
+    one_norm_limits,
     stored_quantities,
 )
 from mambo_codegen.numbers.representation import WEIGHT_LIMIT
@@ -35,9 +31,7 @@ class OneNormConstants(Constants):
     @cached_property
     def limiting(self) -> LimitsConstants | None:
         """The constants of the limits of speed, braking and place, in float64; None without any."""
-        found = limits_constants(self.settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
-        turn = TURN_SHARE * ONE_NORM_TILT.slope_m_s2_rad * self.settings.horizon.update_period_s
-        return found and replace(found, turn_m_s_rad=turn)
+        return one_norm_limits(self.settings)
 
     @property
     def limits_stored(self) -> tuple[str, ...]:

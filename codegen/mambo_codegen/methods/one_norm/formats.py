@@ -22,10 +22,8 @@ import numpy as np
 
 from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
 from mambo_codegen.methods.shared.limits_constants import (
-    ONE_NORM_APPROACH_1_S,
-    ONE_NORM_TILT,
     limits_bits,
-    limits_constants,
+    one_norm_limits,
 )
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
@@ -163,7 +161,7 @@ def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
     error = min(
         fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
     )
-    limiting = limits_constants(settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
+    limiting = one_norm_limits(settings)
     position = min(fractional_bits((_PLACES if limiting else 2) * ranges.position_m), error)
     velocity = fractional_bits(2 * ranges.velocity_m_s)
     gradient_bound = 2 * gain * bounds.response

@@ -9,7 +9,7 @@ from mambo_codegen.methods.interface import Method, StepResult
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.formats import refusals
-from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, ONE_NORM_TILT
+from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, ONE_NORM_TILT, has_limits
 from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS
 from mambo_codegen.methods.shared.rate_feedback import lag_refusals
@@ -55,7 +55,9 @@ class OneNorm(OneNormConstants, Method):
     def refusals(self) -> list[Refusal]:
         """Return why a controller with the 1-norm cannot have the settings."""
         settings = self.settings
-        refused = lag_refusals(settings, needs_lag=False) or limits_refusals(settings, ONE_NORM_TILT)
+        refused = lag_refusals(settings, needs_lag=False) or limits_refusals(
+            settings, ONE_NORM_TILT, is_limited=has_limits(settings)
+        )
         return refused or (refusals(settings) if settings.code.scalar == "fixed" else [])
 
     def reference_controller(self, n: int = 1) -> OneNormController:

@@ -67,8 +67,8 @@ class QuadraticConstants(Constants):
         return self.height.tracker if self.height else None
 
     @cached_property
-    def limiting(self) -> LimitsConstants | None:
-        """The constants of the limits of speed, braking and place, in float64; None without any."""
+    def limiting(self) -> LimitsConstants:
+        """The constants of the limits of speed, braking and place, in float64."""
         return limits(self.settings)
 
     def choose_formats(self) -> QuadraticFormats:
@@ -82,11 +82,11 @@ class QuadraticConstants(Constants):
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
         attitude += [*["acceleration"] * 8, *["factor"] * 2] if self.tilt_gain else []
         tracker = [quantity for quantity in self._stored_tracker for _ in "xy"]
-        limiting = stored_quantities("move", "move") if self.limiting else ()
-        if self.limiting and self.settings.target.gives_acceleration:
+        limiting = stored_quantities("move", "move")
+        if self.settings.target.gives_acceleration:
             limiting += ("velocity", "velocity")
         height = self._stored_height
-        if self.limiting and self.height:
+        if self.height:
             limiting += ("position",) * 4
         tilt = ["angle"] * 2 if self.feedback_steps else []
         guard = ["angle"] * 2 if self.guard else []

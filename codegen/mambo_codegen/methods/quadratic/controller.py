@@ -32,7 +32,7 @@ class QuadraticStep:
     missed:      (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
     stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
-    active:      (n,) the limits that act, as `ActiveLimit`, but TILT; None without limits.
+    active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
     thrust_m_s2: (n,) commanded thrust over mass; None without a height.
     """
 
@@ -127,7 +127,7 @@ class QuadraticController:
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; k is 7, or 11 with a height.
 
-        Returns a status (n,); bad limits change nothing. Raises ValueError without limits in the settings.
+        Returns a status (n,); bad limits change nothing.
         """
         given, good = self._limits.read(limits)
         vertical = given[:, len(LIMITS) :]
@@ -161,7 +161,7 @@ class QuadraticController:
             missed=memory.missed,
             saturated=self.saturated,
             stored=self._numbers.to_si(self.stored, *self._constants.stored),
-            active=memory.limits.active if self._constants.has_limits else None,
+            active=memory.limits.active,
             thrust_m_s2=thrust if self._constants.has_height else None,
         )
 
@@ -178,9 +178,7 @@ class QuadraticController:
         angles = clamp(given[:, 0:2], self.memory.limits.bounds.tilt_rad[:, None])
         return np.column_stack([angles, self._height.limited(given[:, 2:])]), good
 
-    def _restarted(
-        self, command: Real, limits: LimitsMemory, height_bounds: HeightBounds | None
-    ) -> QuadraticMemory:
+    def _restarted(self, command: Real, limits: LimitsMemory, height_bounds: HeightBounds) -> QuadraticMemory:
         """Return the memory of controllers that hold commands (n, 2), with a height (n, 3)."""
         command_rad = command[:, 0:2]
         n, zeros = len(command_rad), np.zeros_like(command_rad)
@@ -225,7 +223,7 @@ class QuadraticController:
             "command_rad": memory.command_rad,
             **({"thrust_m_s2": memory.height.thrust_m_s2} if self._constants.has_height else {}),
             "stored": self.stored,
-            **({"active": memory.limits.active} if self._constants.has_limits else {}),
+            "active": memory.limits.active,
         }
 
     @property
@@ -260,11 +258,11 @@ class QuadraticController:
 
     @property
     def stored_limits(self) -> Real:
-        """All numbers of nmpc_bounds_t (n, k), in their order; k is 0 without limits."""
+        """All numbers of nmpc_bounds_t (n, k), in their order."""
         columns = [np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)]
         columns += self._limits.stored(self.memory.limits, has_command=True)
-        bounds = self.memory.height_bounds
-        if bounds is not None:
+        if self._constants.has_height:
+            bounds = self.memory.height_bounds
             columns.append(np.column_stack([bounds.floor_m, bounds.ceiling_m, bounds.up_m, bounds.down_m]))
         return np.concatenate(columns, axis=1)
 

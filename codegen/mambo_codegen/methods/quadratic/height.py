@@ -129,7 +129,6 @@ class HeightAxis:
         self._age = constant(age_steps, "age") if age_steps else None
         self._height_limit = constant(settings.ranges.position_m, "position")
         self._velocity_limit = constant(constants.observer.velocity_limit_m_step, "speed")
-        self._up, self._down = constant(found.up_m, "position"), constant(found.down_m, "position")
         self._step2 = constant(found.step2_s2, "step2")
         self._steps2 = constant(found.steps2_per_s2, "thrust_per_step2")
         self._lines = {
@@ -149,10 +148,8 @@ class HeightAxis:
         level = np.zeros((n, 2), self._products.numbers.computed)
         return np.column_stack([level, np.full(n, self._hover_m_s2)])
 
-    def bounds(self, limits: Real) -> HeightBounds | None:
-        """Derive what the steps need from good limits (n, 4), of HEIGHT_LIMITS; None without limits."""
-        if not limits.shape[1]:
-            return None
+    def bounds(self, limits: Real) -> HeightBounds:
+        """Derive what the steps need from good limits (n, 4), of HEIGHT_LIMITS."""
         products = self._products
         distance = products.reach_product(self._reach, products.speed_product(limits[:, 2:4]))
         return HeightBounds(limits[:, 0], limits[:, 1], distance[:, 0], distance[:, 1])
@@ -236,7 +233,7 @@ class HeightAxis:
         return replace(choose(first, steady, corrected), share=share), on_ground
 
     def aim(
-        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
+        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds
     ) -> tuple[HeightState, Rows]:
         """Set the next thrust for targets (n, 2 or more), or for rest at the own height.
 
@@ -255,10 +252,8 @@ class HeightAxis:
             jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
         error = state.height_m - goal
         lead = products.reach_product(self._reach, climb)
-        up, down = self._up, self._down
-        if bounds is not None:
-            up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
-            down = confine(state.height_m - bounds.floor_m, -bounds.up_m, bounds.down_m)
+        up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
+        down = confine(state.height_m - bounds.floor_m, -bounds.up_m, bounds.down_m)
         limited = confine(error, lead - up, lead + down)
         share = state.share
         if self._found.learns_gain:

@@ -27,7 +27,6 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import refusals as 
 from mambo_codegen.methods.shared.limits_constants import (
     LimitsConstants,
     TiltAcceleration,
-    has_limits,
     limits_constants,
 )
 from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
@@ -131,10 +130,8 @@ def axis_law(
     return LawSolution(**keep("law", inputs, solve))
 
 
-def limits(settings: Sections) -> LimitsConstants | None:
-    """Derive the constants of the limits of speed, braking and place; None if `settings` have none."""
-    if not has_limits(settings):
-        return None
+def limits(settings: Sections) -> LimitsConstants:
+    """Derive the constants of the limits of speed, braking and place."""
     rows = law_constants(settings).rows[:, 0]
     rates_1_s = rows[:, 0] / rows[:, 1] / settings.horizon.update_period_s
     return limits_constants(settings, float(np.min(rates_1_s)), _tilted(settings))
@@ -163,7 +160,11 @@ def refusals(settings: Sections) -> list[Refusal]:
         refused.append(Refusal("observer", "outage_s", rule))
     if horizon.ramp_s and horizon.ramp_s < 2 * horizon.update_period_s:
         refused.append(Refusal("horizon", "ramp_s", "must be 0 or at least 2 update periods"))
-    refused = refused or thrust_vector_refusals(settings) or limits_refusals(settings, _tilted(settings))
+    refused = (
+        refused
+        or thrust_vector_refusals(settings)
+        or limits_refusals(settings, _tilted(settings), is_limited=True)
+    )
     if refused:
         return refused
     try:

@@ -95,7 +95,7 @@ class Quadratic(QuadraticConstants, Method):
             StepResult("missed"),
             StepResult("saturated", count_type=np.bool_),
             StepResult("stored", self.stored, (len(self.stored),)),
-            *((StepResult("active"),) if self.limiting else ()),
+            StepResult("active"),
             *((StepResult("thrust_m_s2", THRUST),) if self.has_height else ()),
         )
 
@@ -113,7 +113,7 @@ class Quadratic(QuadraticConstants, Method):
     def instance_bytes(self) -> int:
         """The size of nmpc_t: its numbers and single bytes, with padding."""
         number_bytes, _ = self.numbers.bytes
-        flags = 1 + sum(part is not None for part in (self.tracker, self.limiting, self.guard))
+        flags = 2 + sum(part is not None for part in (self.tracker, self.guard))
         return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
 
     @property
@@ -192,7 +192,6 @@ def _parts(constants: QuadraticConstants) -> dict[str, bool]:
         "WITH_GIVEN": settings.target.gives_acceleration,
         "WITH_GUARD": constants.guard is not None,
         "WITH_HEIGHT": constants.has_height,
-        "WITH_LIMITS": constants.has_limits,
         "WITH_PITCH_FEEDBACK": feedback[1] != 0,
         "WITH_PREDICTED": settings.model.attitude == "predicted",
         "WITH_ROLL_FEEDBACK": feedback[0] != 0,

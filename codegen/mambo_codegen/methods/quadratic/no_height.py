@@ -19,8 +19,10 @@ class NoHeight:
         """Return level commands (n, 2)."""
         return np.zeros((n, 2), self._computed)
 
-    def bounds(self, limits: Real) -> None:
-        """Return no limits of the height."""
+    def bounds(self, limits: Real) -> HeightBounds:
+        """Return zeros (n,)."""
+        zeros = np.zeros(len(limits), limits.dtype)
+        return HeightBounds(zeros, zeros, zeros, zeros)
 
     def check_limits(self, limits: Real) -> Rows:
         """Return that limits may be set (n,)."""
@@ -60,7 +62,7 @@ class NoHeight:
         """Return that no thrust limits the tilt."""
 
     def aim(
-        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
+        self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds
     ) -> tuple[HeightState, Rows]:
         """Return zeros, and that no limit acts (n,)."""
         del target, measured, bounds

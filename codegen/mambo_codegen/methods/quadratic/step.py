@@ -16,7 +16,7 @@ from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
-from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory, limits_law
+from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
 
@@ -32,7 +32,7 @@ class QuadraticMemory:
     """State of n controllers between two steps.
 
     tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state.
-    height_bounds is None unless there are limits and a height. budget_rad (n, 2) is how much the commands may
+    height_bounds are zeros without a height. budget_rad (n, 2) is how much the commands may
     vary, is_coarse (n,) whether no position is measured; zeros without a guard.
     """
 
@@ -44,7 +44,7 @@ class QuadraticMemory:
     command_rad: Real
     missed: NDArray[np.int64]
     height: HeightState
-    height_bounds: HeightBounds | None
+    height_bounds: HeightBounds
     budget_rad: Real
     is_coarse: Rows
     tilt_gain: TiltGainState
@@ -126,7 +126,7 @@ class ControlStep:
         self.model = AttitudeModel(constants, products)
         self.optimizer = QuadraticOptimizer(constants, products, self.model.command_limit)
         self.tracker = Tracker(constants.tracker, products) if constants.tracker else None
-        self.limits = limits_law(constants)
+        self.limits = LimitsLaw(constants, constants.limiting)
         self.height: HeightAxis | NoHeight = NoHeight(constants)
         if constants.height:
             self.height = HeightAxis(constants, constants.height, products)
@@ -142,8 +142,8 @@ class ControlStep:
         self._level_columns = len(constants.level_target)
         self._is_predicted = constants.settings.model.attitude == "predicted"
         self._no_estimate = constants.observer.outage_steps + 1
-        """`missed` while the model brakes after an outage, and without limits from then on."""
-        self.at_rest = self._no_estimate + self.limits.brake
+        """`missed` while the model brakes after an outage."""
+        self.at_rest = self._no_estimate + 1
         """`missed` before the first good state and when the model has come to rest."""
         self._rest_m_step = constant(REST_M_S * constants.settings.horizon.update_period_s, "speed")
 
@@ -281,7 +281,7 @@ class ControlStep:
         aim = _Aim(
             target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
         )
-        return self._end_outage(aim, seen.estimate) if self.limits.brake else aim
+        return self._end_outage(aim, seen.estimate)
 
     def _track_target(self, motion: TargetMotion, target: Real, follows: Rows) -> TargetMotion:
         """Return how the targets (n, 4 or more) move that are followed (n,)."""
@@ -397,8 +397,6 @@ class ControlStep:
 
     def _report_limits(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
         """Return the limits with those of the thrust, which limits the last moves or not (n,)."""
-        if not self.limits.brake:
-            return aim.limits
         kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
         thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
         others = aim.limits.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)

@@ -6,7 +6,6 @@ for the target's, and the limited desired velocity for the target's velocity. `l
 
 from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,8 +98,6 @@ def _memory(bounds: Bounds) -> LimitsMemory:
 class NoLimits:
     """No limits of speed, braking and place: every target stays as it is."""
 
-    brake: Final = False
-
     def __init__(self, constants: Constants) -> None:
         self._tilt, self.defaults = constants.limits.tilt, np.zeros((1, 0), constants.numbers.computed)
 
@@ -134,12 +131,7 @@ class NoLimits:
 
 
 class LimitsLaw:
-    """The constants of the limits, in the scalar type of the controller.
-
-    brake: whether a controller brakes and comes to rest after an outage.
-    """
-
-    brake: Final = True
+    """The constants of the limits, in the scalar type of the controller."""
 
     def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
         self._products = LimitsArithmetic(constants, limits)

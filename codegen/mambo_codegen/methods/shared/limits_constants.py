@@ -5,7 +5,7 @@ k = K_e / K_v. All limits are limits of that velocity: `limits.c.j2` derives the
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -120,12 +120,8 @@ def has_limits(settings: Sections) -> bool:
     return bool(limits.speed_m_s or limits.braking_m_s2) or limits.fence != DEFAULTS.limits.fence
 
 
-def limits_constants(
-    settings: Sections, approach_1_s: float, tilted: TiltAcceleration
-) -> LimitsConstants | None:
-    """Derive the constants of the limits; None if `settings` have none."""
-    if not has_limits(settings):
-        return None
+def limits_constants(settings: Sections, approach_1_s: float, tilted: TiltAcceleration) -> LimitsConstants:
+    """Derive the constants of the limits."""
     limits, ranges = settings.limits, settings.ranges
     low, high = zip(*(_walls(settings, axis) for axis in "xy"), strict=True)
     braking_m_s2 = limits.braking_m_s2 or BRAKING_SHARE * tilted.at(settings.limits.tilt_rad)
@@ -143,8 +139,16 @@ def limits_constants(
     )
 
 
-def refusals(settings: Sections, tilted: TiltAcceleration) -> list[Refusal]:
-    """Return why a controller cannot have the limits of `settings`."""
+def one_norm_limits(settings: Sections) -> LimitsConstants | None:
+    """Derive the constants of the limits with the 1-norm; None if `settings` have none."""
+    if not has_limits(settings):
+        return None
+    turn = TURN_SHARE * ONE_NORM_TILT.slope_m_s2_rad * settings.horizon.update_period_s
+    return replace(limits_constants(settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT), turn_m_s_rad=turn)
+
+
+def refusals(settings: Sections, tilted: TiltAcceleration, *, is_limited: bool) -> list[Refusal]:
+    """Return why a controller cannot have the limits of `settings`; `is_limited`: whether it has any."""
     limits, ranges = settings.limits, settings.ranges
     refused = []
     if limits.speed_m_s > ranges.velocity_m_s:
@@ -159,7 +163,7 @@ def refusals(settings: Sections, tilted: TiltAcceleration) -> list[Refusal]:
         )
         refused.append(Refusal("limits", "braking_m_s2", rule))
     least_m_s2 = SMALLEST_LIMIT / BRAKING_SHARE
-    if has_limits(settings) and not limits.braking_m_s2 and most_m_s2 < least_m_s2:
+    if is_limited and not limits.braking_m_s2 and most_m_s2 < least_m_s2:
         rule = (
             f"must give a deceleration of {least_m_s2:g} m/s^2 to limit speed, braking or place, and gives "
             f"{most_m_s2:.3g}"

@@ -14,17 +14,15 @@ NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
 #if WITH_HEIGHT
     step->on_ground = 0;
 #endif
-#if WITH_VECTOR and WITH_LIMITS
+#if WITH_VECTOR
     step->by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST;
 #endif
-#if WITH_LIMITS
     /* One by one: for an initialiser some compilers call memset. */
     step->limited->position_m[0] = (nmpc_real_t)0;
     step->limited->position_m[1] = (nmpc_real_t)0;
     step->limited->velocity_m_s[0] = (nmpc_real_t)0;
     step->limited->velocity_m_s[1] = (nmpc_real_t)0;
-#endif
-#if WITH_LIMITS and WITH_GIVEN
+#if WITH_GIVEN
     step->limited->acceleration_m_s2[0] = (nmpc_real_t)0;
     step->limited->acceleration_m_s2[1] = (nmpc_real_t)0;
 #endif
@@ -50,13 +48,9 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
 #endif
 {
     nmpc_step_t step;
-#if WITH_LIMITS
     nmpc_target_t limited;
-#endif
 
-#if WITH_LIMITS
     step.limited = &limited;
-#endif
     step.state = state;
     step.target = target;
     step_begin(self, &step);

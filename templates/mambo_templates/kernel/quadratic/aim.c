@@ -8,17 +8,12 @@
 /* Set the next thrust, and what it makes of a tilt. */
 NMPC_INLINE void command_thrust(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_LIMITS
     step->limit_active = height_aim(self, step->state, step->aim);
-#else
-    (void)height_aim(self, step->state, step->aim);
-#endif
     step->weight = height_weight(height_lift(&self->height, self->height.command_m_step2));
     step->inverse = weight_inverse(step->weight);
 }
 
 #endif
-#if WITH_LIMITS
 /* Aim at the target within the limits. */
 NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
 {
@@ -29,7 +24,6 @@ NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
     }
 }
 
-#endif
 #if WITH_TRACKER
 /* Estimate how the target moves. */
 NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
@@ -42,7 +36,6 @@ NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
 }
 
 #endif
-#if WITH_LIMITS
 /* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. */
 NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 {
@@ -74,7 +67,6 @@ NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
     }
 }
 
-#endif
 /* Choose what the next command flies to. */
 NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
 {
@@ -82,7 +74,6 @@ NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
 #if WITH_HEIGHT
     command_thrust(self, step);
 #endif
-#if WITH_LIMITS
     if (step->missed == NMPC_NO_ESTIMATE) {
         end_outage(self, step);
     } else if (step->aim != NULL) {
@@ -93,11 +84,4 @@ NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
     } else {
         /* The last command holds. */
     }
-#elif WITH_TRACKER
-    if (step->aim != NULL) {
-        track_target(self, step);
-    }
-#elif not WITH_HEIGHT
-    (void)self;
-#endif
 }

@@ -18,15 +18,8 @@ NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x,
 /* The largest move along an axis. */
 NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step, int axis)
 {
-#if WITH_LIMITS
     nmpc_real_t most_m_step2 = self->bounds.command_m_step2[axis];
-#else
-    nmpc_real_t most_m_step2 = (axis == NMPC_RIGHT) ? NMPC_RIGHT_LIMIT_M_STEP2 : NMPC_FORWARD_LIMIT_M_STEP2;
-#endif
 
-#if not WITH_LIMITS and not WITH_TILT_GAIN
-    (void)self;
-#endif
 #if not WITH_HEIGHT
     (void)step;
 #endif
@@ -53,7 +46,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
 #if WITH_VECTOR
     step->left_m_step2 = to_move(height_spare(&self->height));
 #endif
-#if WITH_VECTOR and WITH_LIMITS
+#if WITH_VECTOR
     step->by_thrust = 0U;
 #endif
     NMPC_UNROLL
@@ -90,7 +83,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
         const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
 
         attitude->command_m_step2[axis] = move_acceleration(move_m_step2);
-#if WITH_VECTOR and WITH_LIMITS
+#if WITH_VECTOR
         if ((most_m_step2 >= step->left_m_step2)
             && ((move_m_step2 >= step->left_m_step2) || (move_m_step2 <= -step->left_m_step2))) {
             step->by_thrust = NMPC_LIMIT_THRUST;
@@ -127,19 +120,11 @@ NMPC_INLINE void find_angles(const nmpc_t *self, nmpc_step_t *step)
 #endif
 }
 
-#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK or WITH_GUARD
 /* Clamp an angle at the tilt limit. */
 NMPC_INLINE nmpc_real_t limited_angle(const nmpc_t *self, nmpc_real_t angle_rad)
 {
-#if WITH_LIMITS
     const nmpc_real_t limit_rad = self->bounds.tilt_rad;
-#else
-    const nmpc_real_t limit_rad = NMPC_TILT_LIMIT_RAD;
-#endif
 
-#if not WITH_LIMITS
-    (void)self;
-#endif
 #if WITH_HEIGHT
     return shared_clamp(angle_rad, limit_rad);
 #else
@@ -147,8 +132,6 @@ NMPC_INLINE nmpc_real_t limited_angle(const nmpc_t *self, nmpc_real_t angle_rad)
 #endif
 }
 
-#endif
-#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK
 /* Add rate feedback to the angles, and clamp them at the tilt limit. */
 NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
 {
@@ -158,18 +141,10 @@ NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
 #if WITH_PITCH_FEEDBACK
     step->command_rad[1] = step->command_rad[1] + step->feedback_rad[1];
 #endif
-#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_ROLL_FEEDBACK
     step->command_rad[0] = limited_angle(self, step->command_rad[0]);
-#endif
-#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_PITCH_FEEDBACK
     step->command_rad[1] = limited_angle(self, step->command_rad[1]);
-#endif
-#if not WITH_LIMITS
-    (void)self;
-#endif
 }
 
-#endif
 #if WITH_GUARD
 /* Command the angles, but bound their change from the last commands, and tell the model what is commanded. */
 NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
@@ -219,11 +194,7 @@ NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
  * an outage has none. */
 NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_LIMITS
     const int is_fed = (step->missed < NMPC_NO_ESTIMATE) && (self->missed == 0U);
-#else
-    const int is_fed = (self->missed == 0U);
-#endif
 
     if (is_fed != 0) {
         find_angles(self, step);
@@ -237,7 +208,7 @@ NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
 }
 
 #endif
-#if WITH_HEIGHT and WITH_LIMITS
+#if WITH_HEIGHT
 /* Say which limits of the thrust act, beside those of the target. */
 NMPC_INLINE void report_limits(nmpc_t *self, nmpc_step_t *step)
 {
@@ -257,9 +228,7 @@ NMPC_INLINE void step_command(nmpc_t *self, nmpc_step_t *step)
     if (step->aim != NULL) {
         minimize(self, step);
         find_angles(self, step);
-#if WITH_LIMITS or WITH_HEIGHT or WITH_TILT_GAIN or WITH_FEEDBACK
         limit_angles(self, step);
-#endif
 #if WITH_GUARD
         guard_commands(self, step);
 #else
@@ -271,7 +240,7 @@ NMPC_INLINE void step_command(nmpc_t *self, nmpc_step_t *step)
         hold_command(self, step);
 #endif
     }
-#if WITH_HEIGHT and WITH_LIMITS
+#if WITH_HEIGHT
     report_limits(self, step);
 #endif
 }

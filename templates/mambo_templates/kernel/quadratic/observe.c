@@ -89,11 +89,7 @@ NMPC_INLINE void learn_tilt_gain(nmpc_t *self, nmpc_step_t *step)
         if (restarts != 0) {
             tilt_gain_restart(&self->tilt_gain, &self->attitude, tilt_m_step2);
         } else {
-#if WITH_LIMITS
             tilt_gain_learn(&self->tilt_gain, &self->attitude, tilt_m_step2, self->command_rad, self->bounds.tilt_rad);
-#else
-            tilt_gain_learn(&self->tilt_gain, &self->attitude, tilt_m_step2, self->command_rad, NMPC_TILT_LIMIT_RAD);
-#endif
         }
     }
 }

@@ -6,11 +6,9 @@
 
 /* `missed` after an outage; without limits also before the first good state. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
-#if WITH_LIMITS
 
 /* `missed` before the first good state, and when the model has come to rest after an outage. */
 #define NMPC_AT_REST (NMPC_OUTAGE_STEPS + 2U)
-#endif
 
 /* What the functions of a control step hand on to each other. */
 typedef struct {
@@ -22,10 +20,8 @@ typedef struct {
     nmpc_real_t tilt_m_step2[2];  /* acceleration of the tilt, right and forward */
     nmpc_real_t world_m_step2[2]; /* the same along x and y */
     nmpc_real_t command_rad[2];   /* the angles that stand for the model's command */
-#if WITH_LIMITS
     /* The target within the limits. */
     nmpc_target_t *limited;
-#endif
 #if WITH_FEEDBACK
     /* What rate feedback adds to the commands. */
     nmpc_real_t feedback_rad[2];
@@ -36,7 +32,7 @@ typedef struct {
     nmpc_real_t inverse;
     int on_ground;
 #endif
-#if WITH_HEIGHT and WITH_LIMITS
+#if WITH_HEIGHT
     /* 1 if a limit of the height acts, else 0. */
     int limit_active;
 #endif
@@ -45,7 +41,7 @@ typedef struct {
     nmpc_real_t slope[2];
     nmpc_real_t left_m_step2;
 #endif
-#if WITH_VECTOR and WITH_LIMITS
+#if WITH_VECTOR
     /* NMPC_LIMIT_THRUST if that limits a move, else 0. */
     unsigned int by_thrust;
 #endif
