@@ -117,12 +117,6 @@ def shown(value: float, digits: int = 2) -> str:
     return f"{value:.{digits}g}"
 
 
-def without_limits(figure: str) -> float:
-    """Return a worst figure of preset `mambo` after a step of 30 m, of eight headings, without limits."""
-    one = next(one for one in figures("limits")["rows"] if one["case"] == "state known, no limits")
-    return float(one[figure].partition(", ")[2])
-
-
 def in_simulator(drone: str, controller: str, item: str = "simulators") -> str:
     """Return the median RMS distance on the eight in a simulator of others, in mm, by default with noise."""
     return shown(statistics.median(figures(item)[drone][controller]["eight"]))
@@ -246,10 +240,6 @@ FIGURES = [
     Figure("docs/index.md", r"the paper's PD (\d+) cm", lambda: shown(figures("space")["pd"])),
     Figure("docs/index.md", r"a tuned PID (\S+) cm", lambda: shown(figures("space")["pid"])),
     Figure("docs/index.md", r"this MPC (\S+) cm", lambda: shown(figures("space")["third-axis"])),
-    Figure("CHANGELOG.md", r"at up to (\d+) m/s and by", lambda: shown(without_limits("speed, m/s"))),
-    Figure(
-        "CHANGELOG.md", r"m/s and by up to (\d+) m", lambda: shown(without_limits("overshoot, cm") / 100, 1)
-    ),
     Figure(
         "docs/reference/c-api.md",
         r"quadratic, (\d+ to \d+) instructions",

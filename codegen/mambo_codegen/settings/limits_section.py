@@ -72,8 +72,8 @@ class Limits(SettingsSection):
     braking_m_s2: BrakingLimit = Field(
         0.0,
         description="Braking limit, in metres per second squared: the drone approaches a target or a wall at "
-        "a speed that this deceleration takes away in time. 0 for none, or, with a speed limit or a fence, "
-        "for what the tilt limit leaves.",
+        "a speed that this deceleration takes away in time. 0 for 0.8 of what the tilt limit gives; with the "
+        "1-norm, which has no limits unless one is set, also for none.",
     )
     fence: Fence = Field(
         Fence(),
