@@ -168,11 +168,11 @@ NMPC_INLINE int sign_of(nmpc_sum_t value)
 /* One bit per prediction step, the last step in bit 0. Steps count from 0 to NMPC_LAST_STEP, in the paper from 1 to
  * N_p: step i has bit NMPC_LAST_STEP - i. More than 32 steps take an unsigned long long. */
 typedef unsigned long nmpc_steps_t;
-#define NMPC_LAST_STEP 9U
+#define NMPC_LAST_STEP ((unsigned int)NMPC_HORIZON_PREDICTION - 1U)
 
 typedef char nmpc_assert_every_step_has_a_bit[((8U * sizeof(nmpc_steps_t)) > NMPC_LAST_STEP) ? 1 : -1];
 
-/* The sign bit: 1 for negative values and -0, else 0. */
+/* The sign bit: 1 for negative values, and with floats for -0; else 0. */
 NMPC_INLINE nmpc_steps_t is_negative(nmpc_real_t value)
 {
     const nmpc_bits_t sign = bits_of(value) >> 31U;
@@ -181,10 +181,13 @@ NMPC_INLINE nmpc_steps_t is_negative(nmpc_real_t value)
 }
 
 /* Index of the least significant set bit; `word` must not be 0. */
+#if defined(__GNUC__)
+#define NMPC_TRAILING_ZEROS(word) __builtin_ctzl(word)
+#endif
 NMPC_INLINE unsigned int lowest_set_bit(nmpc_steps_t word)
 {
-#if defined(__GNUC__)
-    return (unsigned int)__builtin_ctzl(word);
+#if defined(NMPC_TRAILING_ZEROS)
+    return (unsigned int)NMPC_TRAILING_ZEROS(word);
 #else
     unsigned int index;
 
@@ -326,19 +329,18 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
  * prints Tp_k; here the target is propagated by eq 11. Eqs 9 and 11, and the velocity for constant acceleration over
  * a step, which the paper does not print, are
  *
- *     r(i+1) = r(i) + tau v(i) + tau^2/2 a(i),   v(i+1) = v(i) + tau a(i),   Tp(i+1) = Tp(i) + tau Tv
+ *     r(i+1) = r(i) + tau v(i) + s tau^2 a(i),   v(i+1) = v(i) + tau a(i),   Tp(i+1) = Tp(i) + tau Tv
  *
- * (eq 9 prints tau/2). So the displacement d(i) = e(i+1) - e(i) is tau (v(i) - Tv) + s A(i), with A = tau^2 a
- * and s = 1/2, and
+ * with s = 1/2 if the position is exact, or s = 1/(2 tau) for tau/2, which eq 9 prints. So the displacement
+ * d(i) = e(i+1) - e(i) is tau (v(i) - Tv) + s A(i), with A = tau^2 a, and
  *
  *     e(i+1) = e(i) + d(i),   d(i+1) = d(i) + A(i) + s dA(i+1),   dA(i+1) = A(i+1) - A(i).
- *
- * A prediction step is two additions. A changes only where a move changes: only there products are needed.
  */
+
+/* A prediction step is two additions. A changes only where a move changes: only there products are needed. */
 
 #define NMPC_ROLL 0
 #define NMPC_PITCH 1
-
 #define NMPC_DISPLACEMENT_SHARE 0.5f /* s */
 
 /* The response R(i) of a move is the change of the error e(i+1) per unit of A of that move. S(i) = R(0) + ... + R(i).
@@ -367,16 +369,15 @@ NMPC_INLINE void predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_
     const nmpc_real_t pitch_m_step2 = gain_m_step2_rad[NMPC_PITCH] * pitch_change_rad;
     const nmpc_real_t change_m_step2 = roll_m_step2 + pitch_m_step2;
 
-    rollout->displacement_m_step = rollout->displacement_m_step
-                                   + (NMPC_DISPLACEMENT_SHARE * change_m_step2);
+    rollout->displacement_m_step =
+        rollout->displacement_m_step + (NMPC_DISPLACEMENT_SHARE * change_m_step2);
     rollout->acceleration_m_step2 = rollout->acceleration_m_step2 + change_m_step2;
 }
 
-/* Apply the moves of step `i` of the control horizon: their change from the moves before, or from the initial
- * tilt, which is 0: without a lag a command is the tilt. */
-NMPC_INLINE void predictor_apply_moves(const nmpc_prediction_t *prediction,
-                                       const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_rollout_t *x,
-                                       nmpc_rollout_t *y)
+/* Apply the moves of step `i` of the control horizon: their change from the moves before, or from the initial tilt,
+ * which without a lag is 0: a command is the tilt. */
+NMPC_INLINE void predictor_apply_moves(const nmpc_prediction_t *prediction, const nmpc_real_t moves_rad[NMPC_MOVES],
+                                       int i, nmpc_rollout_t *x, nmpc_rollout_t *y)
 {
     const nmpc_real_t *move_rad = &moves_rad[NMPC_ANGLES * i];
     const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_ANGLES * (i - 1)] : prediction->tilt_rad;
@@ -394,37 +395,45 @@ NMPC_INLINE void predictor_step(nmpc_rollout_t *rollout)
     rollout->displacement_m_step = rollout->displacement_m_step + rollout->acceleration_m_step2;
 }
 
-/* Start the roll-out along one axis without moves: the acceleration stays 0, as nmpc_init() set it. */
-static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t relative_velocity_m_s)
+/* Start the roll-out along one axis: with a lag at the measured tilt, which stays constant until the first moves;
+ * without one at the acceleration 0, which nmpc_init() set. */
+static void start_rollout(nmpc_rollout_t *rollout, const nmpc_real_t gain_m_step2_rad[NMPC_ANGLES],
+                          const nmpc_real_t tilt_rad[NMPC_ANGLES], nmpc_real_t error_m,
+                          nmpc_real_t relative_velocity_m_s)
 {
     rollout->error_m = error_m;
+    (void)gain_m_step2_rad;
+    (void)tilt_rad;
     rollout->displacement_m_step = NMPC_PREDICTION_STEP_S * relative_velocity_m_s;
 }
 
 /* Evaluate eq 8 at the present yaw and thrust, and start the roll-out along x and along y. */
-static void predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
-                              nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
+static void predictor_prepare(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
+                              nmpc_real_t thrust_acceleration_m_s2)
 {
+    nmpc_prediction_t *const prediction = &self->prediction;
     const nmpc_real_t thrust_m_step2 = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
     nmpc_real_t sine;
     nmpc_real_t cosine;
     nmpc_real_t sine_m_step2;
     nmpc_real_t cosine_m_step2;
 
-    /* tau^2 times the matrix of eq 8. Eq 8 prints both sin psi with the opposite sign of what eqs 3 and 6 give. */
+    /* tau^2 times the matrix of eq 8. */
     sine_cosine(state->yaw_rad, &sine, &cosine);
     sine_m_step2 = thrust_m_step2 * sine;
     cosine_m_step2 = thrust_m_step2 * cosine;
-    prediction->gain_x_m_step2_rad[NMPC_ROLL] = -sine_m_step2;
+    /* Eq 8 prints both sin psi with the opposite sign of what eqs 3 and 6 give. */
+    sine_m_step2 = -sine_m_step2;
+    prediction->gain_x_m_step2_rad[NMPC_ROLL] = sine_m_step2;
     prediction->gain_x_m_step2_rad[NMPC_PITCH] = -cosine_m_step2;
     prediction->gain_y_m_step2_rad[NMPC_ROLL] = cosine_m_step2;
-    prediction->gain_y_m_step2_rad[NMPC_PITCH] = -sine_m_step2;
+    prediction->gain_y_m_step2_rad[NMPC_PITCH] = sine_m_step2;
 
     /* r - Tp and v - Tv, of eqs 9 to 11, at the present control step. */
-    start_rollout(&prediction->x, state->position_m[0] - target->position_m[0],
-                  state->velocity_m_s[0] - target->velocity_m_s[0]);
-    start_rollout(&prediction->y, state->position_m[1] - target->position_m[1],
-                  state->velocity_m_s[1] - target->velocity_m_s[1]);
+    start_rollout(&prediction->x, prediction->gain_x_m_step2_rad, prediction->tilt_rad,
+                  state->position_m[0] - target->position_m[0], state->velocity_m_s[0] - target->velocity_m_s[0]);
+    start_rollout(&prediction->y, prediction->gain_y_m_step2_rad, prediction->tilt_rad,
+                  state->position_m[1] - target->position_m[1], state->velocity_m_s[1] - target->velocity_m_s[1]);
 }
 
 /* ---- Cost -----------------------------------------------------------------------------------------------------------
@@ -455,14 +464,13 @@ NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *erro
  * over the horizon of the response R to the move, each term with the sign of the error at that prediction step. With
  * S(i) = R(0) + ... + R(i), four errors with the signs + + - - give 2 S(1) - S(3); response_sum holds
  * 2 S(i), and S in its last row. The loop goes from the last change of sign to the first, as if the first error were
- * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any
- * value from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
+ * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any value
+ * from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
 NMPC_INLINE void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_real_t subgradient[NMPC_RESPONSES])
 {
     static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };
     nmpc_real_t sign = (nmpc_real_t)0;
-    nmpc_steps_t changes =
-        (errors->negative ^ (errors->negative >> 1)) & (((nmpc_steps_t)1 << NMPC_LAST_STEP) - 1U);
+    nmpc_steps_t changes = (errors->negative ^ (errors->negative >> 1)) & (((nmpc_steps_t)1 << NMPC_LAST_STEP) - 1U);
     int count;
     int k;
 
@@ -537,8 +545,8 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
             const int k = (NMPC_ANGLES * i) + angle;
             const int response = k / NMPC_ANGLES_PER_RESPONSE;
             const nmpc_real_t change_rad = moves_rad[k] - previous_rad;
-            const nmpc_real_t distance_gradient_m_rad =
-                (gain_x_m_step2_rad * subgradient_x[response]) + (gain_y_m_step2_rad * subgradient_y[response]);
+            const nmpc_real_t distance_gradient_m_rad = (gain_x_m_step2_rad * subgradient_x[response])
+                                                        + (gain_y_m_step2_rad * subgradient_y[response]);
             nmpc_sum_t effort_slope = (nmpc_sum_t)0;
 
             if (change_rad > (nmpc_real_t)0) {
@@ -563,24 +571,31 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
 
 /* ---- Optimizer ------------------------------------------------------------------------------------------------------
  *
- * RPROP with a fixed number of iterations, variant rprop+ (Riedmiller and Braun 1993; Igel and Huesken 2000). Each
- * move u has a step size Delta. From the signs of the gradient g = dJ/du in this iteration and the one before,
+ * RPROP with a fixed number of iterations (Riedmiller and Braun 1993; Igel and Huesken 2000). Each move u has a step
+ * size Delta. From the signs of the gradient g = dJ/du in this iteration and the one before,
  *
  *     equal:     Delta = min(eta+ Delta, Delta_max),   u -= sign(g) Delta
- *     opposite:  Delta = max(eta- Delta, Delta_min),   u back to what it was before its last update
+ *     opposite:  Delta = max(eta- Delta, Delta_min),   u before its last update (rprop+), or u (irprop-)
  *     else:                                            u -= sign(g) Delta.
  */
 
+/* The limit of each angle, either way. */
+NMPC_INLINE nmpc_real_t tilt_limit(const nmpc_t *self)
+{
+    (void)self;
+    return NMPC_TILT_LIMIT_RAD;
+}
+
 /* State of RPROP for one move. */
 typedef struct {
-    nmpc_real_t step_rad;     /* Delta: the step size */
+    nmpc_real_t step_rad; /* Delta: the step size */
     nmpc_real_t previous_rad; /* the move before its last update */
-    int previous_sign;        /* sign of dJ/du at the last update; 0 after a step back */
+    int previous_sign; /* sign of dJ/du at the last update; 0 after a change of sign */
 } nmpc_rprop_t;
 
 /* Return the updated move, within the tilt limit. RPROP uses the sign of the gradient dJ/du, not its size:
  * while the sign stays the same the step size is multiplied by eta+, where it changes by eta-. */
-static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign)
+static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign, nmpc_real_t limit_rad)
 {
     const int agreement = sign * rprop->previous_sign;
     nmpc_real_t next_rad = move_rad;
@@ -595,9 +610,9 @@ static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign)
             rprop->step_rad = smaller(rprop->step_rad * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
         }
         if (sign > 0) {
-            next_rad = larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD);
+            next_rad = larger(move_rad - rprop->step_rad, -limit_rad);
         } else if (sign < 0) {
-            next_rad = smaller(move_rad + rprop->step_rad, NMPC_TILT_LIMIT_RAD);
+            next_rad = smaller(move_rad + rprop->step_rad, limit_rad);
         } else {
             /* Zero gradient: the move stays. */
         }
@@ -639,7 +654,7 @@ static void optimizer_minimize(nmpc_t *self)
         for (k = 0; k < NMPC_MOVES; k++) {
             const int sign = (converged == 0) ? sign_of(self->gradient[k]) : 0;
 
-            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], sign);
+            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], sign, tilt_limit(self));
         }
     }
     self->iterations = (unsigned char)updates;
@@ -666,7 +681,9 @@ static void set_plan(nmpc_t *self)
 static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
                     nmpc_real_t thrust_acceleration_m_s2)
 {
-    predictor_prepare(state, target, thrust_acceleration_m_s2, &self->prediction);
+    const nmpc_target_t *aim = target;
+
+    predictor_prepare(self, state, aim, thrust_acceleration_m_s2);
     /* The initial guess Omega_k: every move equals the last command. */
     set_plan(self);
     optimizer_minimize(self);
@@ -723,8 +740,8 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
         return NMPC_BAD_COMMAND;
     }
 
-    self->command_rad[0] = clamp(command->roll_rad, NMPC_TILT_LIMIT_RAD);
-    self->command_rad[1] = clamp(command->pitch_rad, NMPC_TILT_LIMIT_RAD);
+    self->command_rad[0] = clamp(command->roll_rad, tilt_limit(self));
+    self->command_rad[1] = clamp(command->pitch_rad, tilt_limit(self));
     set_plan(self);
     return NMPC_OK;
 }
@@ -792,8 +809,8 @@ int nmpc_has_converged(const nmpc_t *self)
 
 int nmpc_is_saturated(const nmpc_t *self)
 {
-    return (reaches(self->command_rad[0], NMPC_TILT_LIMIT_RAD) != 0)
-           || (reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
+    return (reaches(self->command_rad[0], tilt_limit(self)) != 0)
+           || (reaches(self->command_rad[1], tilt_limit(self)) != 0);
 }
 
 nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m[2],

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_codegen.bundle.kernel import with_tags
+from mambo_codegen.bundle.kernel import with_head, with_tags
 from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.bundles import place
+from tests.support.cases import settings_case
 from tests.support.height import HEIGHT_CORNERS, height_case
 from tests.support.kernel import CHAPTERS, as_it_stands, defines, parts_of
 from tests.support.quadratic import CORNER_SETTINGS, TWO_MOVES, quadratic_case, settings_of
@@ -29,14 +30,22 @@ SHAPES: dict[str, Settings] = {
     "fixed": height_case(4, "fixed"),
     "without limits": settings_of(TWO_MOVES | {"observer.tilt_gain": "learnt", "code.scalar": "float64"}),
     "least": settings_of(TWO_MOVES),
+    "1-norm": presets.preset("mambo-1norm"),
+    "1-norm fixed": settings_case(0, "fixed"),
+    "1-norm long": settings_case(3, "float64"),
+    "1-norm hover": with_option(settings_case(6, "float32"), "model.thrust", "hover"),
 }
-"""Shapes that every condition on parts divides, and one with none of them."""
+"""Shapes of either method that every condition on its parts divides; one has none of the parts."""
 MANY = [
     *(pytest.param("gcc", settings, id=f"gcc {name}") for name, settings in SHAPES.items()),
     *(
         pytest.param(compiler, case(index, scalar), marks=[pytest.mark.long, pytest.mark.thorough])
         for compiler in ("gcc", "clang")
-        for case, count in ((quadratic_case, len(CORNER_SETTINGS)), (height_case, len(HEIGHT_CORNERS)))
+        for case, count in (
+            (quadratic_case, len(CORNER_SETTINGS)),
+            (height_case, len(HEIGHT_CORNERS)),
+            (settings_case, 20),
+        )
         for index in range(count)
         for scalar in ("float32", "float64", "fixed")
     ),
@@ -74,8 +83,11 @@ def test_a_compiler_reads_the_kernel_as_it_stands(compiler: str, settings: Setti
 
 def test_the_shapes_divide_every_condition() -> None:
     """Each part is there in one of them, and absent from another."""
-    parts = [parts_of(settings) for settings in SHAPES.values()]
-    assert {name for name in parts[0] if len({shape[name] for shape in parts}) == 1} == set()
+    found: dict[str, set[bool]] = {}
+    for settings in SHAPES.values():
+        for name, is_there in parts_of(settings).items():
+            found.setdefault(name, set()).add(is_there)
+    assert [name for name, values in found.items() if len(values) == 1] == []
 
 
 @pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda path: f"{path.parent.name} {path.stem}")
@@ -106,7 +118,7 @@ def kept(text: str, parts: Mapping[str, bool]) -> str:
 @pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda path: f"{path.parent.name} {path.stem}")
 def test_jinja_and_the_preprocessor_keep_the_same_lines(chapter: Path) -> None:
     """With any parts, together or not."""
-    text, rng = chapter.read_text("utf-8"), np.random.default_rng(0)
+    text, rng = re.sub(r'#include ".*\n', "", chapter.read_text("utf-8")), np.random.default_rng(0)
     names = sorted(set(re.findall(r"WITH_\w+", text)))
     template = jinja2.Environment(trim_blocks=True, undefined=jinja2.StrictUndefined).from_string(
         with_tags(text)
@@ -131,6 +143,12 @@ def test_only_conditions_on_parts_become_tags() -> None:
     assert with_tags(text) == expected
 
 
+def test_an_include_of_a_chapter_becomes_the_template_of_its_constants() -> None:
+    """That of the same folder; a header of C stays."""
+    text = '#include <stddef.h>\n#include "limits.h"\n'
+    assert with_head(text, "common") == '#include <stddef.h>\n{% include "common/limits.h.j2" %}\n'
+
+
 @pytest.mark.parametrize("settings", SHAPES.values(), ids=SHAPES)
 def test_a_bundle_has_no_condition_and_no_line_of_the_kernel_is_too_long(settings: Settings) -> None:
     """And in floating point no product is a call."""
@@ -138,7 +156,7 @@ def test_a_bundle_has_no_condition_and_no_line_of_the_kernel_is_too_long(setting
     assert "WITH_" not in text
     chapter = text[text.index("/* ---- Step --") : text.index("/* ---- Interface ")]
     assert max(map(len, chapter.splitlines())) <= 120
-    assert ("sine_product(" in chapter) == (method_of(settings).numbers.formats is not None)
+    assert ("_product(" in chapter) == (method_of(settings).numbers.formats is not None)
 
 
 @pytest.mark.parametrize("settings", [*SHAPES.values(), presets.preset("table1")], ids=[*SHAPES, "table1"])

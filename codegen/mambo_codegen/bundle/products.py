@@ -11,26 +11,18 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 _NAMES: Final = (
-    *("aged_position", "aged_velocity", "angle_square", "approach_product", "approach_ratio", "attitude_sum"),
-    *("braking_product", "command_product", "disturbance_correction", "drag_product", "effort_cost"),
-    *("effort_gradient", "error_change", "factor_product", "feedback_product", "gain_correction"),
-    *(
-        "gain_product",
-        "gravity_product",
-        "half_change",
-        "halved",
-        "initial_error",
-        "knee_product",
-        "learning_product",
-        "noise_product",
-    ),
-    *("move_acceleration", "per_step2_product", "per_step_product", "position_change"),
-    *("position_correction", "rate_product", "ratio_product", "reach_product", "row_sum", "scaled_velocity"),
-    *("share_product", "sine_difference", "sine_product", "sine_sum", "speed_product", "speed_ratio"),
-    *("squared", "step2_product", "step_product", "target_product", "thrust_product", "tilt_product"),
-    *("to_factor", "to_move", "tracker_product", "tracking_cost", "tracking_gradient", "velocity_change"),
-    *("velocity_correction", "velocity_product", "wide_product"),
-    *("angle_to_yaw", "factor_to_sine", "sine_to_angle", "slope_acceleration"),
+    *("aged_position", "aged_velocity", "angle_square", "angle_to_yaw", "approach_product"),
+    *("approach_ratio", "attitude_sum", "braking_product", "command_product", "distance_gradient"),
+    *("disturbance_correction", "drag_product", "effort_cost", "effort_gradient", "error_change"),
+    *("factor_product", "factor_to_sine", "feedback_product", "gain_correction", "gain_product"),
+    *("gravity_product", "half_change", "halved", "initial_error", "knee_product", "learning_product"),
+    *("move_acceleration", "noise_product", "per_step2_product", "per_step_product", "position_change"),
+    *("position_correction", "rate_product", "ratio_product", "reach_product", "row_sum"),
+    *("scaled_velocity", "share_product", "sine_difference", "sine_product", "sine_sum", "sine_to_angle"),
+    *("slope_acceleration", "speed_product", "speed_ratio", "squared", "step2_product", "step_product"),
+    *("target_product", "thrust_product", "tilt_product", "to_factor", "to_move", "tracker_product"),
+    *("tracking_cost", "tracking_gradient", "velocity_change", "velocity_correction", "velocity_product"),
+    "wide_product",
 )
 """The functions of fixed point."""
 

@@ -75,11 +75,11 @@ def render(settings: Settings, *, with_digest: bool = True) -> dict[str, str]:
     Without `with_digest` the self-test does not state its digest, which takes a second to compute; flights do
     not need it.
     """
-    context = _context(settings, with_digest=with_digest)
-    environment = _environment()
-    library = {name: environment.select_template(_places(name, context)).render(context) for name in LIBRARY}
+    context = template_context(settings, with_digest=with_digest)
+    templates = environment()
+    library = {name: templates.select_template(_places(name, context)).render(context) for name in LIBRARY}
     project = {
-        path: environment.get_template(f"project/{name}.j2").render(context) for name, path in PROJECT.items()
+        path: templates.get_template(f"project/{name}.j2").render(context) for name, path in PROJECT.items()
     }
     return _finish(library | project, settings)
 
@@ -99,8 +99,8 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
             with_prefix(name, settings.code.prefix) for name in LIBRARY[: 4 if target.self_test else 2]
         )
     }
-    environment = _environment()
-    context = _context(settings, with_digest=with_digest) | {
+    templates = environment()
+    context = template_context(settings, with_digest=with_digest) | {
         "ticks_per_update": ticks,
         "update_period_ns": round(1e9 * settings.horizon.update_period_s),
         "variables": fmu_variables(settings),
@@ -109,8 +109,8 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"
     files = {
-        path.removeprefix(own).removesuffix(".j2"): environment.get_template(path).render(context)
-        for path in environment.list_templates(extensions=["j2"])
+        path.removeprefix(own).removesuffix(".j2"): templates.get_template(path).render(context)
+        for path in templates.list_templates(extensions=["j2"])
         if path.startswith(own)
     }
     return library | _finish(files, settings)
@@ -137,9 +137,9 @@ def with_prefix(text: str, prefix: str) -> str:
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
     """Return the Jinja environment; its number filters use the `Spelling` under "spelling" in the context."""
-    environment = jinja2.Environment(
+    made = jinja2.Environment(
         loader=KernelLoader("mambo_templates", ""),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -148,10 +148,10 @@ def _environment() -> jinja2.Environment:
         autoescape=False,
         bytecode_cache=TemplateCache(),
     )
-    environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
-    environment.filters["term"] = term
-    environment.filters["infix"] = jinja2.pass_context(_infix)
-    return environment
+    made.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
+    made.filters["term"] = term
+    made.filters["infix"] = jinja2.pass_context(_infix)
+    return made
 
 
 def _number_filter(name: str) -> Callable[..., str]:
@@ -170,7 +170,7 @@ def _infix(context: jinja2.runtime.Context, text: str) -> str:
     return text if context["fixed"] else infix(text)
 
 
-def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
+def template_context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     """Return all values that the templates insert; `with_digest` as in `render`."""
     method = method_of(settings)
     numbers = method.numbers

@@ -21,6 +21,7 @@ from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
+from mambo_codegen.methods.shared.parts import common_parts
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.numbers.representation import THRUST
@@ -186,17 +187,12 @@ class Quadratic(QuadraticConstants, Method):
 def _parts(constants: QuadraticConstants) -> dict[str, bool]:
     """Return which parts the chapters of the kernel have, by the names of their conditions."""
     settings, feedback = constants.settings, constants.feedback_steps or (0.0, 0.0)
-    return {
-        "WITH_FEEDBACK": constants.feedback_steps is not None,
-        "WITH_FIXED": constants.numbers.formats is not None,
-        "WITH_GIVEN": settings.target.gives_acceleration,
+    return common_parts(constants) | {
         "WITH_GUARD": constants.guard is not None,
-        "WITH_HEIGHT": constants.has_height,
         "WITH_PITCH_FEEDBACK": feedback[1] != 0,
         "WITH_PREDICTED": settings.model.attitude == "predicted",
         "WITH_ROLL_FEEDBACK": feedback[0] != 0,
         "WITH_TILT_GAIN": constants.learns_tilt_gain,
-        "WITH_TRACKER": constants.tracker is not None,
         "WITH_VECTOR": constants.has_thrust_vector,
     }
 

@@ -26,24 +26,23 @@ NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *erro
  * over the horizon of the response R to the move, each term with the sign of the error at that prediction step. With
  * S(i) = R(0) + ... + R(i), four errors with the signs + + - - give 2 S(1) - S(3); response_sum holds
  * 2 S(i), and S in its last row. The loop goes from the last change of sign to the first, as if the first error were
- * positive; then the result is multiplied by the sign of the first error. An error of zero takes {% if fixed %}the sign +{% else %}its sign bit{% endif %}: any
- * value from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
+ * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any value
+ * from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
 NMPC_INLINE void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_real_t subgradient[NMPC_RESPONSES])
 {
     static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };
     nmpc_real_t sign = (nmpc_real_t)0;
-{% if settings.horizon.prediction > 1 %}
-    nmpc_steps_t changes =
-        (errors->negative ^ (errors->negative >> 1)) & (((nmpc_steps_t)1 << NMPC_LAST_STEP) - 1U);
+#if WITH_LATER_STEPS
+    nmpc_steps_t changes = (errors->negative ^ (errors->negative >> 1)) & (((nmpc_steps_t)1 << NMPC_LAST_STEP) - 1U);
     int count;
-{% endif %}
+#endif
     int k;
 
     NMPC_UNROLL
     for (k = 0; k < NMPC_RESPONSES; k++) {
         subgradient[k] = response_sum[NMPC_LAST_STEP][k];
     }
-{% if settings.horizon.prediction > 1 %}
+#if WITH_LATER_STEPS
     /* Prediction step i, counted from 0, is the last before a change of sign. The sign changes at most N_p - 1
      * times; the counter makes that bound explicit for static analysis. */
     for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {
@@ -55,7 +54,7 @@ NMPC_INLINE void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_rea
         }
         changes = changes & (changes - 1U);
     }
-{% endif %}
+#endif
     if (bits_of(errors->distance_m) != 0U) {
         sign = signs[errors->negative >> NMPC_LAST_STEP];
     }
@@ -112,33 +111,28 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
             const int k = (NMPC_ANGLES * i) + angle;
             const int response = k / NMPC_ANGLES_PER_RESPONSE;
             const nmpc_real_t change_rad = moves_rad[k] - previous_rad;
-            const nmpc_real_t distance_gradient_m_rad =
-{% if fixed %}
-                distance_gradient(gain_x_m_step2_rad, subgradient_x[response],
-                                  gain_y_m_step2_rad, subgradient_y[response]);
-{% else %}
-                (gain_x_m_step2_rad * subgradient_x[response]) + (gain_y_m_step2_rad * subgradient_y[response]);
-{% endif %}
+            const nmpc_real_t distance_gradient_m_rad = distance_gradient(gain_x_m_step2_rad, subgradient_x[response],
+                                                                          gain_y_m_step2_rad, subgradient_y[response]);
             nmpc_sum_t effort_slope = (nmpc_sum_t)0;
 
             if (change_rad > (nmpc_real_t)0) {
                 variation_rad = variation_rad + change_rad;
-                effort_slope = {{ effort_gradient("weight.effort") }};
+                effort_slope = effort_gradient(weight.effort);
             } else if (change_rad < (nmpc_real_t)0) {
                 variation_rad = variation_rad - change_rad;
-                effort_slope = -{{ effort_gradient("weight.effort") }};
+                effort_slope = -effort_gradient(weight.effort);
             } else {
                 /* No change: 0 is a subgradient. */
             }
-{% if settings.horizon.control > 1 %}
+#if WITH_LATER_MOVES
             if (i > 0) {
                 self->gradient[k - NMPC_ANGLES] = gradient - effort_slope;
             }
-{% endif %}
-            gradient = {{ tracking_gradient("weight.tracking", "distance_gradient_m_rad") | term }} + effort_slope;
+#endif
+            gradient = tracking_gradient(weight.tracking, distance_gradient_m_rad) + effort_slope;
             previous_rad = moves_rad[k];
         }
         self->gradient[(NMPC_MOVES - NMPC_ANGLES) + angle] = gradient;
     }
-    return {{ tracking_cost("weight.tracking", "distance_m") | term }} + {{ effort_cost("weight.effort", "variation_rad") | term }};
+    return tracking_cost(weight.tracking, distance_m) + effort_cost(weight.effort, variation_rad);
 }

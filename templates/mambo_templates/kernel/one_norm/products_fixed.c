@@ -26,26 +26,25 @@ NMPC_INLINE nmpc_real_t gain_product(nmpc_real_t gain_m_step2_rad, nmpc_real_t t
                          >> (NMPC_GAIN_BITS + NMPC_ANGLE_BITS - NMPC_ACCELERATION_BITS));
 }
 
-{% if not tables.halves %}
+#if not WITH_HALVES
 /* The acceleration has room to be shifted left first: then the result is the upper word of the product. */
 NMPC_INLINE nmpc_real_t share_product(nmpc_real_t share, nmpc_real_t acceleration_m_step2)
 {
     return (nmpc_real_t)(((nmpc_sum_t)share
                           * (nmpc_real_t)(acceleration_m_step2 * ((nmpc_real_t)1 << (32 - NMPC_SHARE_BITS))))
-                          >> 32);
+                         >> 32);
 }
-{% else %}
+#else
 NMPC_INLINE nmpc_real_t half(nmpc_real_t acceleration_m_step2)
 {
     return acceleration_m_step2 >> 1;
 }
-{% endif %}
+#endif
 
 /* Clamping an error whose sign no plan can change changes neither the gradient nor a difference of costs. */
 NMPC_INLINE nmpc_real_t initial_error(nmpc_real_t difference_m)
 {
-    return clamp(difference_m, NMPC_ERROR_LIMIT_M)
-           * ((nmpc_real_t)1 << (NMPC_ERROR_BITS - NMPC_POSITION_BITS));
+    return clamp(difference_m, NMPC_ERROR_LIMIT_M) * ((nmpc_real_t)1 << (NMPC_ERROR_BITS - NMPC_POSITION_BITS));
 }
 
 NMPC_INLINE nmpc_real_t error_change(nmpc_real_t displacement_m_step)
@@ -85,16 +84,20 @@ NMPC_INLINE nmpc_sum_t effort_gradient(nmpc_real_t weight)
 /* The step size is shifted left first too, and the product is rounded down. */
 NMPC_INLINE nmpc_real_t step_product(nmpc_real_t step_rad, nmpc_real_t factor)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)factor
-                          * (nmpc_real_t)(step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS))))
-                          >> 32);
+    return (nmpc_real_t)(((nmpc_sum_t)factor * (nmpc_real_t)(step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS))))
+                         >> 32);
 }
-{% if tracker %}
+#if WITH_TRACKER
 
 NMPC_INLINE nmpc_real_t target_product(nmpc_real_t factor, nmpc_real_t value)
 {
+#if WITH_GIVEN
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value,
-                                     NMPC_TRACKER_BITS + {{ "NMPC_THRUST_BITS" if given else "NMPC_VELOCITY_BITS" }} - NMPC_ACCELERATION_BITS);
+                                     NMPC_TRACKER_BITS + NMPC_THRUST_BITS - NMPC_ACCELERATION_BITS);
+#else
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value,
+                                     NMPC_TRACKER_BITS + NMPC_VELOCITY_BITS - NMPC_ACCELERATION_BITS);
+#endif
 }
 
 /* A gain of the tracker is at most 1 and has the format of a sine. */
@@ -102,11 +105,11 @@ NMPC_INLINE nmpc_real_t tracker_product(nmpc_real_t gain, nmpc_real_t accelerati
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)gain * acceleration_m_step2, NMPC_SINE_BITS);
 }
-{% endif %}
-{% if feedback %}
+#endif
+#if WITH_FEEDBACK
 
 NMPC_INLINE nmpc_real_t feedback_product(nmpc_real_t steps, nmpc_real_t change_rad)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)steps * change_rad, NMPC_FEEDBACK_BITS);
 }
-{% endif %}
+#endif
