@@ -2,21 +2,24 @@
  *
  * The controller of nmpc.h. Its chapters follow the control step; each opens with the equations that it computes:
  *
- *   numbers       comparisons, limits and products
- *   inputs        the checks of inputs
- *   trigonometry  sine and cosine of the heading
- *   attitude      how the drone answers the commands
- *   observer      position, velocity and disturbance
- *   tracker       acceleration of the target
- *   optimizer     the minimum of the cost
- *   limits        speed, braking and place
- *   step          what the functions of a control step hand on
- *   observe       where the drone is
- *   aim           what the next command flies to
- *   command       the command of the least cost
- *   advance       a control step
- *   interface     the functions of nmpc.h
- *   float         the same functions with floats
+ *   numbers           comparisons, limits and products
+ *   inputs            the checks of inputs
+ *   trigonometry      sine and cosine of the heading
+ *   attitude          how the drone answers the commands
+ *   observer          position, velocity and disturbance
+ *   tracker           acceleration of the target
+ *   optimizer         the minimum of the cost
+ *   limits arithmetic roots and products of the limits
+ *   limits            speed, braking and place
+ *   set limits        what the limits need, and their functions of nmpc.h
+ *   step              what the functions of a control step hand on
+ *   observe           where the drone is
+ *   aim               what the next command flies to
+ *   command           the command of the least cost
+ *   advance           a control step
+ *   interface         the functions of nmpc.h
+ *   heading           set-points of a yaw loop
+ *   float             the same functions with floats
  *
  * MISRA C:2012: departs from rules 2.3, 8.9, 10.1, 10.3 and 15.5, for the reasons in deviations.txt.
  *
@@ -49,8 +52,11 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_INLINE static
 #endif
 
-/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger and
- * no faster. */
+/* A comparison, about as small as its call. */
+#define NMPC_COMPARISON NMPC_INLINE
+
+/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger
+ * and no faster. */
 #if defined(__GNUC__)
 #define NMPC_SHARED static __attribute__((noinline))
 #else
@@ -66,7 +72,7 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 
 /* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
- * Comparisons, limits and products with the same bits on every board.
+ * Comparisons, limits and, in fixed point, products with the same bits on every board.
  */
 
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
@@ -92,7 +98,7 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 }
 
 /* Shift a sum right by `bits`, rounded to nearest, ties up. */
-#define NMPC_ROUNDED(sum, bits) (((sum) + ((nmpc_sum_t)1 << ((bits) - 1))) >> (bits))
+#define NMPC_ROUNDED(sum, bits) (((sum) + ((nmpc_sum_t)1 << ((bits)-1))) >> (bits))
 
 /* The upper word of a sum. AVR shifts bit by bit or byte by byte: there its bytes are taken as they lie in memory. */
 #if defined(__AVR__)
@@ -288,23 +294,24 @@ NMPC_INLINE nmpc_real_t to_move(nmpc_real_t acceleration_m_step2)
 
 NMPC_INLINE int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
 {
-    return within(position_m[0], NMPC_POSITION_RANGE_M)
-           && within(position_m[1], NMPC_POSITION_RANGE_M)
-           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S)
-           && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    return within(position_m[0], NMPC_POSITION_RANGE_M) && within(position_m[1], NMPC_POSITION_RANGE_M)
+           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S) && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
 }
 
 NMPC_INLINE int is_good_state(const nmpc_state_t *state)
 {
-    return is_good_point(state->position_m, state->velocity_m_s)
-           && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+    int is_good = is_good_point(state->position_m, state->velocity_m_s)
+                  && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
+                  && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD) && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_target(const nmpc_target_t *target)
 {
-    return is_good_point(target->position_m, target->velocity_m_s);
+    int is_good = is_good_point(target->position_m, target->velocity_m_s);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
@@ -314,29 +321,31 @@ NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
 
 static int is_good_command(const nmpc_command_t *command)
 {
-    return within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+    int is_good =
+        within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD) && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+
+    return is_good;
 }
 
 /* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns, r, and for |r| <= pi/4 apart from rounding polynomials
+ * The angle less whole quarter turns, r, which floats take off in two parts (Cody and Waite), and for |r| <= pi/4 apart
+ * from rounding the Taylor series in float64, and else the polynomials of the smallest largest error,
  *
- *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...).
  *
- * whose largest error is the smallest that so many terms allow.
- * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
- * absolute errors of at most 4e-09.
+ * The C libraries of different boards differ in the last bit; this function has the same bits on every board.
  */
 
 #define NMPC_SINE_TERMS 3
 #define NMPC_COSINE_TERMS 4
 
-/* 2/pi with 31 fractional bits, pi/2 with 40. */
+/* 2/pi with 31 fractional bits, pi/2 with NMPC_FINE_BITS. */
+#define NMPC_FINE_BITS 40
 #define NMPC_QUARTER_TURNS_PER_RAD 1367130551
 #define NMPC_QUARTER_TURN_RAD 1727108826179LL
 
-/* s0, s1, ... and c0, c1, ... */
+/* s0, s1, ... and c0, c1, ...: the absolute errors of sine and cosine are at most 4e-09. */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
     -178956798, 8946391, -209329
 };
@@ -349,9 +358,9 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
 {
     const nmpc_real_t count =
         (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)angle_rad * NMPC_QUARTER_TURNS_PER_RAD, 31 + NMPC_YAW_BITS);
-    const nmpc_sum_t fine_rad = (angle_rad * ((nmpc_sum_t)1 << (40 - NMPC_YAW_BITS)))
-                                - (count * NMPC_QUARTER_TURN_RAD);
-    const nmpc_real_t rest = (nmpc_real_t)NMPC_ROUNDED(fine_rad, 40 - NMPC_SINE_BITS);
+    const nmpc_sum_t fine_rad =
+        (angle_rad * ((nmpc_sum_t)1 << (NMPC_FINE_BITS - NMPC_YAW_BITS))) - (count * NMPC_QUARTER_TURN_RAD);
+    const nmpc_real_t rest = (nmpc_real_t)NMPC_ROUNDED(fine_rad, NMPC_FINE_BITS - NMPC_SINE_BITS);
     const unsigned int quadrant = (unsigned int)count & 3U;
     const nmpc_real_t one = (nmpc_real_t)1 << NMPC_SINE_BITS;
     const nmpc_real_t square = sine_product(rest, rest);
@@ -712,20 +721,24 @@ static void observer_clear(nmpc_observer_t *observer)
 /* ---- Tracker --------------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
- * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target,
- * A_T = T_s^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every
- * control step the measured acceleration M, the predicted one P and the new estimates are
+ * steps, which are T_s = NMPC_UPDATE_PERIOD_S apart; tau is a step of the prediction, which is T_s too with a quadratic
+ * cost. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its acceleration, and J_T the
+ * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
+ * predicted one P and the new estimates are
  *
- *     M = T_s (Tv_k - Tv_k-1)                P = A_T(k-1) + J_T(k-1)
+ *     M = (tau^2/T_s) (Tv_k - Tv_k-1), or tau^2 a_k where the acceleration a_k is given
+ *     P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
- * with alpha = 0.5 and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an optimal set of
- * radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an acceleration
- * that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays bounded.
- *
- * A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
- * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are 0.
+ * with alpha = NMPC_TRACKER_GAIN and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an
+ * optimal set of radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an
+ * acceleration that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays
+ * bounded.
  */
+
+/* A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
+ * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are
+ * 0. */
 
 #define NMPC_TARGET_CHANGE_LIMIT_M_S 432034 /* of Tv in T_s: 1.5 g times the tilt limit, or less */
 #define NMPC_STEP_SQUARED_PER_UPDATE_S 1374389535 /* T_s */
@@ -754,11 +767,10 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
     const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
     const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
 
-    tracker->acceleration_m_step2[axis] = tracker_product(NMPC_TRACKER_REST, predicted_m_step2)
-                                          + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
+    tracker->acceleration_m_step2[axis] =
+        tracker_product(NMPC_TRACKER_REST, predicted_m_step2) + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
     tracker->jerk_m_step2_update[axis] =
-        clamp(tracker->jerk_m_step2_update[axis]
-                  + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
+        clamp(tracker->jerk_m_step2_update[axis] + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
               NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
 }
 
@@ -797,8 +809,8 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
     }
 }
 
-/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one:
- * there the jerk begins at 0. */
+/* The frame has turned: so does the target's acceleration. Where it is estimated, the next velocity of the target is
+ * taken for its first one: there the jerk begins at 0. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
@@ -883,50 +895,39 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
     return clamp(move_m_step2, limit_m_step2);
 }
 
-/* ---- Limits ---------------------------------------------------------------------------------------------------------
+/* ---- Limits arithmetic ----------------------------------------------------------------------------------------------
  *
- * Limits of speed, braking and place (not in the paper).
- *
- * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
- * desired velocity
- *
- *     v_d = v_T + k (p_T - p),   k = K_e/K_v = 1.606 1/s (the smaller one of both axes).
- *
- * All limits are limits of v_d. With the position p, the fence, the speed limit V and the braking limit A, at most k V:
- *
- *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
- *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
- *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
- *      two are the same at the knee. A target that is slower than A/(2 k), and inside the fence, is approached with
- *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not
- *      jump, and the tracker forgets the deceleration.
- *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
- *      Outside, it leads back in by f.
- *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
- *
- * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T.
- *
- * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
+ * Roots and products of the limits. An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start
+ * that a shift of the bits gives.
  */
 
-#define NMPC_APPROACH_1_S 862233802 /* k */
+/* The start of 1/sqrt(m), a parabola that is 2.4 % off, (START - (SLOPE - CURVE m) m)/2^30 for m in 2^30..2^32, and
+ * Newton's iterations, after which the relative error is at most 1.2e-06. */
+#define NMPC_ROOT_START 2867787557UL
+#define NMPC_ROOT_SLOPE 3527627035UL
+#define NMPC_ROOT_CURVE 1759398805UL
+#define NMPC_ROOT_ITERATIONS 2
 #define NMPC_STEEPEST_1_S 1231762575 /* where braking ends: k/0.7 */
-#define NMPC_KNEE_S2 1665135272 /* 1/(2 k^2): the knee over 2 A */
-#define NMPC_NEAR_S2 1165594691 /* 0.7 times that: where braking ends */
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
 
-NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
+/* Bits by which products are shifted to the format of their result. */
+#define NMPC_RATIO_SHIFT 6
+#define NMPC_APPROACH_SHIFT 24
+#define NMPC_KNEE_SHIFT 40
+#define NMPC_SQUARE_SHIFT 1 /* to an even number of bits */
+#define NMPC_ROOT_UP 1 /* of a root to a speed, one way */
+#define NMPC_ROOT_DOWN 0 /* or the other */
+
+NMPC_COMPARISON nmpc_real_t absolute(nmpc_real_t value)
 {
     return (value < (nmpc_real_t)0) ? -value : value;
 }
 
-NMPC_INLINE nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
+NMPC_COMPARISON nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
 {
     return (a < b) ? a : b;
 }
 
-NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
+NMPC_COMPARISON nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
 {
     return (a > b) ? a : b;
 }
@@ -950,7 +951,7 @@ static nmpc_mantissa_t upper_product(nmpc_mantissa_t a, nmpc_mantissa_t b)
     return (nmpc_mantissa_t)(((nmpc_square_t)a * b) >> 32);
 }
 
-/* 1/sqrt(x) for a positive x, with a relative error of at most 1.2e-06. The start is a parabola, 2.4 % off. */
+/* 1/sqrt(x) for a positive x. */
 NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
 {
     nmpc_square_t wide = x;
@@ -981,8 +982,8 @@ NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
         scaled = scaled << 2;
         half -= 1U;
     }
-    mantissa = 2867787557UL - upper_product(3527627035UL - upper_product(1759398805UL, scaled), scaled);
-    for (k = 0; k < 2; k++) {
+    mantissa = NMPC_ROOT_START - upper_product(NMPC_ROOT_SLOPE - upper_product(NMPC_ROOT_CURVE, scaled), scaled);
+    for (k = 0; k < NMPC_ROOT_ITERATIONS; k++) {
         const nmpc_mantissa_t product = upper_product(upper_product(mantissa, mantissa), scaled);
 
         mantissa = upper_product(mantissa, ((nmpc_mantissa_t)3 << 28) - product) << 3;
@@ -1026,7 +1027,7 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
 /* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
-    return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> 6, NMPC_STEEPEST_1_S);
+    return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> NMPC_RATIO_SHIFT, NMPC_STEEPEST_1_S);
 }
 
 static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
@@ -1037,7 +1038,7 @@ static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 /* Ratio times distance, m/s, within the range of velocities. */
 NMPC_SHARED nmpc_real_t approach_product(nmpc_real_t ratio_1_s, nmpc_real_t distance_m)
 {
-    const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, 24);
+    const nmpc_sum_t speed_m_s = NMPC_ROUNDED((nmpc_sum_t)ratio_1_s * distance_m, NMPC_APPROACH_SHIFT);
 
     return (speed_m_s > NMPC_VELOCITY_RANGE_M_S)
                ? NMPC_VELOCITY_RANGE_M_S
@@ -1051,19 +1052,19 @@ static nmpc_real_t halved(nmpc_real_t value)
 
 static nmpc_real_t knee_product(nmpc_real_t knee_s2, nmpc_real_t braking_m_s2)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)knee_s2 * braking_m_s2) >> 40);
+    return (nmpc_real_t)(((nmpc_sum_t)knee_s2 * braking_m_s2) >> NMPC_KNEE_SHIFT);
 }
 
 /* The square of a speed, from twice the braking and a distance. */
 static nmpc_square_t braking_product(nmpc_real_t braking_m_s2, nmpc_real_t distance_m)
 {
-    return size_product(braking_m_s2, (nmpc_mantissa_t)distance_m) << 1;
+    return size_product(braking_m_s2, (nmpc_mantissa_t)distance_m) << NMPC_SQUARE_SHIFT;
 }
 
 /* The root of such a square, within the range of velocities. */
 static nmpc_real_t braking_speed(nmpc_square_t square)
 {
-    return at_most(length(inverse_root(square)) << 1, NMPC_VELOCITY_RANGE_M_S);
+    return at_most((length(inverse_root(square)) << NMPC_ROOT_UP) >> NMPC_ROOT_DOWN, NMPC_VELOCITY_RANGE_M_S);
 }
 
 static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
@@ -1071,10 +1072,41 @@ static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_s * share, NMPC_SINE_BITS);
 }
 
+/* ---- Limits ---------------------------------------------------------------------------------------------------------
+ *
+ * Limits of speed, braking and place (not in the paper).
+ *
+ * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
+ * desired velocity
+ *
+ *     v_d = v_T + k (p_T - p),   k = K_e/K_v, the smaller one of both axes: NMPC_APPROACH_1_S.
+ *
+ * All limits are limits of v_d. With the position p, the fence, the speed limit V and the braking limit A, at most k V:
+ *
+ *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
+ *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
+ *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
+ *      two are the same at the knee.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
+ *      Outside, it leads back in by f.
+ *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
+ *
+ * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
+ * v_d for v_T; and the change of v_d for the target's acceleration, where that is given.
+ */
+
+/* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to
+ * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: there the law brakes by itself, so that the command does not jump, and
+ * the tracker forgets the deceleration. */
+
+#define NMPC_APPROACH_1_S 862233802 /* k */
+#define NMPC_KNEE_S2 1665135272 /* 1/(2 k^2): the knee over 2 A */
+#define NMPC_NEAR_S2 1165594691 /* 0.7 times that: where braking ends */
+
 /* f(d)^2 for d = A/k^2 + excess. */
 NMPC_INLINE nmpc_square_t braking_square(const nmpc_bounds_t *bounds, nmpc_real_t excess_m)
 {
-    return braking_product(bounds->braking_m_s2, (halved(bounds->knee_m)) + excess_m);
+    return braking_product(bounds->braking_m_s2, halved(bounds->knee_m) + excess_m);
 }
 
 /* 1 if the drone is so far from every wall that none limits a velocity within the speed limit. */
@@ -1085,7 +1117,7 @@ NMPC_INLINE int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t 
 }
 
 /* 1 if the target is so near, and the desired velocity so small, that neither braking nor speed is limited. */
-NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2],
+NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, const nmpc_real_t position_m[2],
                                 const nmpc_target_t *target)
 {
     const nmpc_real_t error_x_m = target->position_m[0] - position_m[0];
@@ -1094,7 +1126,7 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + approach_product(NMPC_APPROACH_1_S, error_y_m);
 
     return (square_sum(error_x_m, error_y_m) <= squared(bounds->near_m))
-           && (square_sum(desired_x_m_s, desired_y_m_s) <= squared(bounds->speed_m_s));
+           && (square_sum(desired_x_m_s, desired_y_m_s) <= squared(fastest_m_s));
 }
 
 /* 1 if the target moves at less than A/(2 k), half the speed at which braking ends, along x and y. */
@@ -1127,8 +1159,8 @@ NMPC_SHARED unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t 
 
         if (within(place_m, half_width_m) == 0) {
             held->position_m[axis] = bounds->centre_m[axis] + clamp(place_m, half_width_m);
-            held->velocity_m_s[axis] =
-                (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0) : larger(velocity_m_s, (nmpc_real_t)0);
+            held->velocity_m_s[axis] = (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0)
+                                                                  : larger(velocity_m_s, (nmpc_real_t)0);
             active = NMPC_LIMIT_FENCE;
         }
     }
@@ -1168,8 +1200,8 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
 }
 
 /* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
-NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
-                                   nmpc_target_t *limited)
+NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, int is_clear,
+                                    const nmpc_target_t *target, nmpc_target_t *limited)
 {
     nmpc_real_t end_m = bounds->knee_m;
     nmpc_target_t held;
@@ -1206,16 +1238,16 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, c
         fence |= limits_wall(bounds, limited);
     }
     square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
-    if (square > squared(bounds->speed_m_s)) {
-        const nmpc_real_t share = speed_ratio(bounds->speed_m_s, inverse_root(square));
+    if (square > squared(fastest_m_s)) {
+        const nmpc_real_t share = speed_ratio(fastest_m_s, inverse_root(square));
 
         limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
         limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
-    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], bounds->speed_m_s);
-    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], bounds->speed_m_s);
+    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], fastest_m_s);
+    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], fastest_m_s);
     return fence + others;
 }
 
@@ -1237,12 +1269,13 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
+    const nmpc_real_t fastest_m_s = bounds->speed_m_s;
     unsigned int active = 0U;
 
-    if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
+    if ((is_clear == 0) || (limits_are_free(bounds, fastest_m_s, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
-        active = limits_act(bounds, is_clear, target, limited);
+        active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
     if (active != self->limited) {
         limits_change(self, active, target);
@@ -1250,15 +1283,45 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     return active;
 }
 
+/* ---- Set limits -----------------------------------------------------------------------------------------------------
+ *
+ * What the law of the limits needs of them, and their functions of nmpc.h.
+ */
+
+#define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
+/* Bits by which products are shifted to the format of their result. */
+#define NMPC_TILT_SHIFT 27
+#define NMPC_LEAST_SHIFT 26
+#define NMPC_BRAKING_SHIFT 1 /* to an even number of bits */
+#define NMPC_QUOTIENT_SHIFT 24
+#define NMPC_STOPPING_SHIFT 14
+
+/* What follows from the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
+static const nmpc_bounds_t default_bounds = {
+    { 0, 0 }, /* centre_m */
+    { 260899300, 260899300 }, /* clear_m */
+    1244700, /* margin_m */
+    304895, /* knee_m */
+    213426, /* near_m */
+    41943040, /* speed_m_s */
+    201326592, /* braking_m_s2 */
+    11744051, /* tilt_rad */
+    { 23041, 23041 } /* command_m_step2 */
+};
+
 /* 1 if every limit may be set; 0 if one is NaN. */
 static int limits_are_good(const nmpc_limits_t *limits)
 {
     int is_good = between(limits->speed_m_s, NMPC_SMALLEST_SPEED_LIMIT_M_S, NMPC_VELOCITY_RANGE_M_S)
-                  && within(limits->tilt_rad, NMPC_TILT_LIMIT_RAD)
-                  && between(limits->braking_m_s2, NMPC_SMALLEST_BRAKING_LIMIT_M_S2,
-                             (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad, 27));
+                  && within(limits->tilt_rad, NMPC_TILT_LIMIT_RAD);
     int axis;
 
+    if (is_good != 0) {
+        nmpc_real_t most_m_s2 =
+            (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad, NMPC_TILT_SHIFT);
+
+        is_good = between(limits->braking_m_s2, NMPC_SMALLEST_BRAKING_LIMIT_M_S2, most_m_s2);
+    }
     for (axis = 0; axis < 2; axis++) {
         is_good = is_good && within(limits->fence_min_m[axis], NMPC_POSITION_RANGE_M)
                   && within(limits->fence_max_m[axis], NMPC_POSITION_RANGE_M)
@@ -1272,11 +1335,11 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const nmpc_real_t speed_m_s = limits->speed_m_s;
-    const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> 26;
+    const nmpc_square_t most_m_s2 = ((nmpc_square_t)NMPC_APPROACH_1_S * (nmpc_square_t)speed_m_s) >> NMPC_LEAST_SHIFT;
     const nmpc_real_t braking_m_s2 = at_most(most_m_s2, limits->braking_m_s2 + limits->braking_m_s2);
-    const nmpc_root_t root = inverse_root((nmpc_square_t)braking_m_s2 << 1);
-    const nmpc_square_t quotient = (size_product(speed_m_s, root.mantissa) >> root.half) >> 24;
-    const nmpc_square_t stopping_m = (quotient * quotient) >> 14;
+    const nmpc_root_t root = inverse_root((nmpc_square_t)braking_m_s2 << NMPC_BRAKING_SHIFT);
+    const nmpc_square_t quotient = (size_product(speed_m_s, root.mantissa) >> root.half) >> NMPC_QUOTIENT_SHIFT;
+    const nmpc_square_t stopping_m = (quotient * quotient) >> NMPC_STOPPING_SHIFT;
     const nmpc_real_t knee_m = knee_product(NMPC_KNEE_S2, braking_m_s2);
     const nmpc_real_t margin_m = at_most(stopping_m + (nmpc_square_t)(halved(knee_m)), 2 * NMPC_POSITION_RANGE_M);
     int axis;
@@ -1295,12 +1358,59 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
     if (limits->tilt_rad < NMPC_TILT_LIMIT_RAD) {
-        bounds->command_m_step2[NMPC_RIGHT] = to_move(tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, limits->tilt_rad));
-        bounds->command_m_step2[NMPC_FORWARD] = to_move(tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, limits->tilt_rad));
+        const nmpc_real_t roll_rad = limits->tilt_rad;
+        const nmpc_real_t pitch_rad = limits->tilt_rad;
+
+        bounds->command_m_step2[NMPC_RIGHT] = to_move(tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, roll_rad));
+        bounds->command_m_step2[NMPC_FORWARD] = to_move(tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, pitch_rad));
     } else {
         bounds->command_m_step2[NMPC_RIGHT] = NMPC_RIGHT_LIMIT_M_STEP2;
         bounds->command_m_step2[NMPC_FORWARD] = NMPC_FORWARD_LIMIT_M_STEP2;
     }
+}
+
+void nmpc_default_limits(nmpc_limits_t *limits)
+{
+    if (limits == NULL) {
+        return;
+    }
+
+    limits->speed_m_s = NMPC_SPEED_LIMIT_M_S;
+    limits->braking_m_s2 = NMPC_BRAKING_LIMIT_M_S2;
+    limits->fence_min_m[0] = NMPC_FENCE_X_MIN_M;
+    limits->fence_min_m[1] = NMPC_FENCE_Y_MIN_M;
+    limits->fence_max_m[0] = NMPC_FENCE_X_MAX_M;
+    limits->fence_max_m[1] = NMPC_FENCE_Y_MAX_M;
+    limits->tilt_rad = NMPC_TILT_LIMIT_RAD;
+}
+
+/* Take the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
+static void limits_init(nmpc_t *self)
+{
+    self->bounds = default_bounds;
+}
+
+nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)
+{
+    int k;
+
+    if ((self == NULL) || (limits == NULL)) {
+        return NMPC_NULL_POINTER;
+    }
+    if (limits_are_good(limits) == 0) {
+        return NMPC_BAD_LIMITS;
+    }
+
+    limits_set(self, limits);
+    for (k = 0; k < NMPC_ANGLES; k++) {
+        self->command_rad[k] = clamp(self->command_rad[k], limits->tilt_rad);
+    }
+    return NMPC_OK;
+}
+
+unsigned int nmpc_limits_active(const nmpc_t *self)
+{
+    return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
 }
 
 /* ---- Step -----------------------------------------------------------------------------------------------------------
@@ -1663,62 +1773,6 @@ static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     tracker_clear(self);
 }
 
-void nmpc_default_limits(nmpc_limits_t *limits)
-{
-    if (limits == NULL) {
-        return;
-    }
-
-    limits->speed_m_s = NMPC_SPEED_LIMIT_M_S;
-    limits->braking_m_s2 = NMPC_BRAKING_LIMIT_M_S2;
-    limits->fence_min_m[0] = NMPC_FENCE_X_MIN_M;
-    limits->fence_min_m[1] = NMPC_FENCE_Y_MIN_M;
-    limits->fence_max_m[0] = NMPC_FENCE_X_MAX_M;
-    limits->fence_max_m[1] = NMPC_FENCE_Y_MAX_M;
-    limits->tilt_rad = NMPC_TILT_LIMIT_RAD;
-}
-
-/* Take the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
-static void limits_init(nmpc_t *self)
-{
-    static const nmpc_bounds_t bounds = {
-        { 0, 0 }, /* centre_m */
-        { 260899300, 260899300 }, /* clear_m */
-        1244700, /* margin_m */
-        304895, /* knee_m */
-        213426, /* near_m */
-        41943040, /* speed_m_s */
-        201326592, /* braking_m_s2 */
-        11744051, /* tilt_rad */
-        { 23041, 23041 } /* command_m_step2 */
-    };
-
-    self->bounds = bounds;
-}
-
-nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)
-{
-    int k;
-
-    if ((self == NULL) || (limits == NULL)) {
-        return NMPC_NULL_POINTER;
-    }
-    if (limits_are_good(limits) == 0) {
-        return NMPC_BAD_LIMITS;
-    }
-
-    limits_set(self, limits);
-    for (k = 0; k < NMPC_ANGLES; k++) {
-        self->command_rad[k] = clamp(self->command_rad[k], limits->tilt_rad);
-    }
-    return NMPC_OK;
-}
-
-unsigned int nmpc_limits_active(const nmpc_t *self)
-{
-    return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
-}
-
 void nmpc_init(nmpc_t *self)
 {
     if (self == NULL) {
@@ -1855,9 +1909,20 @@ nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
     return NMPC_OK;
 }
 
+const char *nmpc_version(void)
+{
+    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+}
+
+/* ---- Heading --------------------------------------------------------------------------------------------------------
+ *
+ * Set-points of a yaw loop, which this controller does not command.
+ */
+
+#define NMPC_TURN_RAD 6588397 /* a whole turn */
+
 nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
 {
-    const nmpc_real_t turn_rad = 6588397;
     nmpc_sum_t change_rad;
     nmpc_sum_t next_rad;
 
@@ -1870,7 +1935,8 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
 
     /* The shortest way: less whole turns. */
     change_rad = (nmpc_sum_t)wanted_rad - previous_rad;
-    change_rad = change_rad - (NMPC_ROUNDED(change_rad * NMPC_QUARTER_TURNS_PER_RAD, 33 + NMPC_YAW_BITS) * turn_rad);
+    change_rad =
+        change_rad - (NMPC_ROUNDED(change_rad * NMPC_QUARTER_TURNS_PER_RAD, 33 + NMPC_YAW_BITS) * NMPC_TURN_RAD);
     if (change_rad > most_change_rad) {
         change_rad = most_change_rad;
     } else if (change_rad < -most_change_rad) {
@@ -1880,20 +1946,16 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
     }
     next_rad = previous_rad + change_rad;
     if (next_rad > NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad - turn_rad;
+        next_rad = next_rad - NMPC_TURN_RAD;
     } else if (next_rad < -NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad + turn_rad;
+        next_rad = next_rad + NMPC_TURN_RAD;
     } else {
         /* The heading is within its range. */
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the heading is. */
-    return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
-                                                         : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));
-}
-
-const char *nmpc_version(void)
-{
-    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+    next_rad = (next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
+                                               : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad);
+    return (nmpc_real_t)next_rad;
 }
 
 /* ---- Float ----------------------------------------------------------------------------------------------------------
@@ -1914,6 +1976,9 @@ const char *nmpc_version(void)
 #define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
 #define NMPC_BRAKING_SCALE 3.3554432e+07f
 #define NMPC_BRAKING_UNIT 2.9802322e-08f
+
+/* Axes along which a frame jumps. */
+#define NMPC_AXES 2
 
 /* 2^31: every number is smaller. */
 #define NMPC_NUMBERS_END 2147483648.0f
@@ -1966,8 +2031,8 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
         fixed_state.roll_rad = quantize(state->roll_rad, NMPC_ANGLE_SCALE);
         fixed_state.pitch_rad = quantize(state->pitch_rad, NMPC_ANGLE_SCALE);
         fixed_state.yaw_rad = quantize(state->yaw_rad, NMPC_YAW_SCALE);
-        status = nmpc_step(self, &fixed_state, &fixed_target,
-                           quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE), &fixed_command);
+        status = nmpc_step(self, &fixed_state, &fixed_target, quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE),
+                           &fixed_command);
     }
     command->roll_rad = (float)fixed_command.roll_rad * NMPC_ANGLE_UNIT;
     command->pitch_rad = (float)fixed_command.pitch_rad * NMPC_ANGLE_UNIT;
@@ -2067,18 +2132,18 @@ nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *lim
     return nmpc_set_limits(self, &fixed_limits);
 }
 
-nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2],
-                               const float velocity_change_m_s[2], float heading_change_rad)
+nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2], const float velocity_change_m_s[2],
+                               float heading_change_rad)
 {
-    nmpc_real_t fixed_position_m[2];
-    nmpc_real_t fixed_velocity_m_s[2];
+    nmpc_real_t fixed_position_m[NMPC_AXES];
+    nmpc_real_t fixed_velocity_m_s[NMPC_AXES];
     int axis;
 
     if ((position_change_m == NULL) || (velocity_change_m_s == NULL)) {
         return NMPC_NULL_POINTER;
     }
 
-    for (axis = 0; axis < 2; axis++) {
+    for (axis = 0; axis < NMPC_AXES; axis++) {
         fixed_position_m[axis] = quantize(position_change_m[axis], NMPC_POSITION_SCALE);
         fixed_velocity_m_s[axis] = quantize(velocity_change_m_s[axis], NMPC_VELOCITY_SCALE);
     }
@@ -2087,9 +2152,9 @@ nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2],
 
 float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad)
 {
-    const nmpc_real_t slewed_rad = nmpc_slew_heading(quantize(previous_rad, NMPC_YAW_SCALE),
-                                                     quantize(wanted_rad, NMPC_YAW_SCALE),
-                                                     quantize(most_change_rad, NMPC_YAW_SCALE));
+    const nmpc_real_t slewed_rad =
+        nmpc_slew_heading(quantize(previous_rad, NMPC_YAW_SCALE), quantize(wanted_rad, NMPC_YAW_SCALE),
+                          quantize(most_change_rad, NMPC_YAW_SCALE));
 
     return (float)slewed_rad * NMPC_YAW_UNIT;
 }

@@ -2,20 +2,23 @@
  *
  * The controller of nmpc.h. Its chapters follow the control step; each opens with the equations that it computes:
  *
- *   numbers       comparisons, limits and products
- *   inputs        the checks of inputs
- *   trigonometry  sine and cosine of the heading
- *   attitude      how the drone answers the commands
- *   observer      position, velocity and disturbance
- *   tracker       acceleration of the target
- *   optimizer     the minimum of the cost
- *   limits        speed, braking and place
- *   step          what the functions of a control step hand on
- *   observe       where the drone is
- *   aim           what the next command flies to
- *   command       the command of the least cost
- *   advance       a control step
- *   interface     the functions of nmpc.h
+ *   numbers           comparisons, limits and products
+ *   inputs            the checks of inputs
+ *   trigonometry      sine and cosine of the heading
+ *   attitude          how the drone answers the commands
+ *   observer          position, velocity and disturbance
+ *   tracker           acceleration of the target
+ *   optimizer         the minimum of the cost
+ *   limits arithmetic roots and products of the limits
+ *   limits            speed, braking and place
+ *   set limits        what the limits need, and their functions of nmpc.h
+ *   step              what the functions of a control step hand on
+ *   observe           where the drone is
+ *   aim               what the next command flies to
+ *   command           the command of the least cost
+ *   advance           a control step
+ *   interface         the functions of nmpc.h
+ *   heading           set-points of a yaw loop
  *
  * MISRA C:2012: departs from rules 2.3, 8.9, 10.3, 15.5 and 19.2, for the reasons in deviations.txt.
  *
@@ -66,8 +69,11 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_INLINE static inline
 #endif
 
-/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger and
- * no faster. */
+/* A comparison, about as small as its call. */
+#define NMPC_COMPARISON NMPC_INLINE
+
+/* A function of a control step in one copy: it has several callers, is seldom called, or would make its caller larger
+ * and no faster. */
 #if defined(__GNUC__)
 #define NMPC_SHARED static __attribute__((noinline))
 #else
@@ -83,7 +89,7 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 
 /* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
- * Comparisons and limits with the same bits on every board.
+ * Comparisons, limits and, in fixed point, products with the same bits on every board.
  */
 
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
@@ -159,23 +165,24 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 
 NMPC_INLINE int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
 {
-    return within(position_m[0], NMPC_POSITION_RANGE_M)
-           && within(position_m[1], NMPC_POSITION_RANGE_M)
-           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S)
-           && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    return within(position_m[0], NMPC_POSITION_RANGE_M) && within(position_m[1], NMPC_POSITION_RANGE_M)
+           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S) && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
 }
 
 NMPC_INLINE int is_good_state(const nmpc_state_t *state)
 {
-    return is_good_point(state->position_m, state->velocity_m_s)
-           && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+    int is_good = is_good_point(state->position_m, state->velocity_m_s)
+                  && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
+                  && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD) && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_target(const nmpc_target_t *target)
 {
-    return is_good_point(target->position_m, target->velocity_m_s);
+    int is_good = is_good_point(target->position_m, target->velocity_m_s);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
@@ -185,19 +192,20 @@ NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
 
 static int is_good_command(const nmpc_command_t *command)
 {
-    return within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+    int is_good =
+        within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD) && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+
+    return is_good;
 }
 
 /* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
+ * The angle less whole quarter turns, r, which floats take off in two parts (Cody and Waite), and for |r| <= pi/4 apart
+ * from rounding the Taylor series in float64, and else the polynomials of the smallest largest error,
  *
- *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...).
  *
- * whose largest error is the smallest that so many terms allow.
- * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
- * absolute errors of at most 1.21e-07.
+ * The C libraries of different boards differ in the last bit; this function has the same bits on every board.
  */
 
 #define NMPC_SINE_TERMS 3
@@ -211,7 +219,7 @@ static int is_good_command(const nmpc_command_t *command)
 #define NMPC_QUARTER_TURN_RAD 1.5707397f
 #define NMPC_QUARTER_TURN_REST_RAD 5.6580702e-05f
 
-/* s0, s1, ... and c0, c1, ... */
+/* s0, s1, ... and c0, c1, ...: the absolute errors of sine and cosine are at most 1.21e-07. */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
     -0.16666651f, 0.008331976f, -0.00019495294f
 };
@@ -586,20 +594,24 @@ static void observer_clear(nmpc_observer_t *observer)
 /* ---- Tracker --------------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
- * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target,
- * A_T = T_s^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every
- * control step the measured acceleration M, the predicted one P and the new estimates are
+ * steps, which are T_s = NMPC_UPDATE_PERIOD_S apart; tau is a step of the prediction, which is T_s too with a quadratic
+ * cost. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its acceleration, and J_T the
+ * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
+ * predicted one P and the new estimates are
  *
- *     M = T_s (Tv_k - Tv_k-1)                P = A_T(k-1) + J_T(k-1)
+ *     M = (tau^2/T_s) (Tv_k - Tv_k-1), or tau^2 a_k where the acceleration a_k is given
+ *     P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
- * with alpha = 0.5 and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an optimal set of
- * radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an acceleration
- * that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays bounded.
- *
- * A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
- * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are 0.
+ * with alpha = NMPC_TRACKER_GAIN and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an
+ * optimal set of radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an
+ * acceleration that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays
+ * bounded.
  */
+
+/* A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
+ * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are
+ * 0. */
 
 #define NMPC_TARGET_CHANGE_LIMIT_M_S 0.0515025f /* of Tv in T_s: 1.5 g times the tilt limit, or less */
 #define NMPC_STEP_SQUARED_PER_UPDATE_S 0.01f /* T_s */
@@ -628,11 +640,10 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
     const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
     const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
 
-    tracker->acceleration_m_step2[axis] = (NMPC_TRACKER_REST * predicted_m_step2)
-                                          + (NMPC_TRACKER_GAIN * measured_m_step2);
+    tracker->acceleration_m_step2[axis] =
+        (NMPC_TRACKER_REST * predicted_m_step2) + (NMPC_TRACKER_GAIN * measured_m_step2);
     tracker->jerk_m_step2_update[axis] =
-        clamp(tracker->jerk_m_step2_update[axis]
-                  + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
+        clamp(tracker->jerk_m_step2_update[axis] + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
               NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
 }
 
@@ -668,8 +679,8 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
     }
 }
 
-/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one:
- * there the jerk begins at 0. */
+/* The frame has turned: so does the target's acceleration. Where it is estimated, the next velocity of the target is
+ * taken for its first one: there the jerk begins at 0. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
@@ -758,40 +769,19 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
     return clamp(move_m_step2, limit_m_step2);
 }
 
-/* ---- Limits ---------------------------------------------------------------------------------------------------------
+/* ---- Limits arithmetic ----------------------------------------------------------------------------------------------
  *
- * Limits of speed, braking and place (not in the paper).
- *
- * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
- * desired velocity
- *
- *     v_d = v_T + k (p_T - p),   k = K_e/K_v = 1.606 1/s (the smaller one of both axes).
- *
- * All limits are limits of v_d. With the position p, the fence, the speed limit V and the braking limit A, at most k V:
- *
- *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
- *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
- *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
- *      two are the same at the knee. A target that is slower than A/(2 k), and inside the fence, is approached with
- *      f(d + 0.3 A/k^2), down to d = 0.7 A/k^2: there the law brakes by itself, so that the command does not
- *      jump, and the tracker forgets the deceleration.
- *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
- *      Outside, it leads back in by f.
- *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
- *
- * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T.
- *
- * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
+ * Roots and products of the limits. An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start
+ * that a shift of the bits gives.
  */
 
-#define NMPC_APPROACH_1_S 1.6060356f /* k */
-#define NMPC_KNEE_S2 0.19384725f /* 1/(2 k^2): the knee over 2 A */
-#define NMPC_NEAR_S2 0.13569309f /* 0.7 times that: where braking ends */
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
-#define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
+/* The start of 1/sqrt(x), by a shift of the bits, is 3.5 % off. In Newton's iterations constants a little above 1.5
+ * halve the error of the next one; after all of them the relative error is at most 8e-07. */
+#define NMPC_ROOT_START 0x5F376908UL
+#define NMPC_ROOT_TERM_1 1.5008789f
+#define NMPC_ROOT_TERM_2 1.5000006f
 
-NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
+NMPC_COMPARISON nmpc_real_t absolute(nmpc_real_t value)
 {
 #if defined(__GNUC__)
     return __builtin_fabsf(value);
@@ -800,12 +790,12 @@ NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
 #endif
 }
 
-NMPC_INLINE nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
+NMPC_COMPARISON nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
 {
     return (a < b) ? a : b;
 }
 
-NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
+NMPC_COMPARISON nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
 {
     return (a > b) ? a : b;
 }
@@ -818,11 +808,10 @@ NMPC_INLINE nmpc_square_t square_sum(nmpc_real_t a, nmpc_real_t b)
     return (a * a) + (b * b);
 }
 
-/* 1/sqrt(x) for a positive x, with a relative error of at most 8e-07. The start is 3.5 % off; constants a little
- * above 1.5 halve the error of the next step. */
+/* 1/sqrt(x) for a positive x. */
 NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
 {
-    const nmpc_real_t half = 0.5f * x;
+    const nmpc_real_t half = NMPC_HALF * x;
     nmpc_real_t root;
     union {
         nmpc_real_t real;
@@ -830,10 +819,10 @@ NMPC_SHARED nmpc_root_t inverse_root(nmpc_square_t x)
     } view;
 
     view.real = x;
-    view.bits = (nmpc_bits_t)0x5F376908UL - (view.bits >> 1);
+    view.bits = (nmpc_bits_t)NMPC_ROOT_START - (view.bits >> 1);
     root = view.real;
-    root = root * (1.5008789f - ((half * root) * root));
-    root = root * (1.5000006f - ((half * root) * root));
+    root = root * (NMPC_ROOT_TERM_1 - ((half * root) * root));
+    root = root * (NMPC_ROOT_TERM_2 - ((half * root) * root));
     return root;
 }
 
@@ -842,6 +831,37 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
 {
     return square * inverse_root(square);
 }
+
+/* ---- Limits ---------------------------------------------------------------------------------------------------------
+ *
+ * Limits of speed, braking and place (not in the paper).
+ *
+ * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
+ * desired velocity
+ *
+ *     v_d = v_T + k (p_T - p),   k = K_e/K_v, the smaller one of both axes: NMPC_APPROACH_1_S.
+ *
+ * All limits are limits of v_d. With the position p, the fence, the speed limit V and the braking limit A, at most k V:
+ *
+ *   1. A target outside the fence is put on the wall, and the component of v_T that leads out there is 0.
+ *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
+ *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
+ *      two are the same at the knee.
+ *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
+ *      Outside, it leads back in by f.
+ *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
+ *
+ * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
+ * v_d for v_T; and the change of v_d for the target's acceleration, where that is given.
+ */
+
+/* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to
+ * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: there the law brakes by itself, so that the command does not jump, and
+ * the tracker forgets the deceleration. */
+
+#define NMPC_APPROACH_1_S 1.6060356f /* k */
+#define NMPC_KNEE_S2 0.19384725f /* 1/(2 k^2): the knee over 2 A */
+#define NMPC_NEAR_S2 0.13569309f /* 0.7 times that: where braking ends */
 
 /* f(d)^2 for d = A/k^2 + excess. */
 NMPC_INLINE nmpc_square_t braking_square(const nmpc_bounds_t *bounds, nmpc_real_t excess_m)
@@ -857,7 +877,7 @@ NMPC_INLINE int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t 
 }
 
 /* 1 if the target is so near, and the desired velocity so small, that neither braking nor speed is limited. */
-NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2],
+NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, const nmpc_real_t position_m[2],
                                 const nmpc_target_t *target)
 {
     const nmpc_real_t error_x_m = target->position_m[0] - position_m[0];
@@ -866,7 +886,7 @@ NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t p
     const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + (NMPC_APPROACH_1_S * error_y_m);
 
     return (square_sum(error_x_m, error_y_m) <= (bounds->near_m * bounds->near_m))
-           && (square_sum(desired_x_m_s, desired_y_m_s) <= (bounds->speed_m_s * bounds->speed_m_s));
+           && (square_sum(desired_x_m_s, desired_y_m_s) <= (fastest_m_s * fastest_m_s));
 }
 
 /* 1 if the target moves at less than A/(2 k), half the speed at which braking ends, along x and y. */
@@ -898,8 +918,8 @@ NMPC_SHARED unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t 
 
         if (within(place_m, half_width_m) == 0) {
             held->position_m[axis] = bounds->centre_m[axis] + clamp(place_m, half_width_m);
-            held->velocity_m_s[axis] =
-                (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0) : larger(velocity_m_s, (nmpc_real_t)0);
+            held->velocity_m_s[axis] = (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0)
+                                                                  : larger(velocity_m_s, (nmpc_real_t)0);
             active = NMPC_LIMIT_FENCE;
         }
     }
@@ -939,8 +959,8 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
 }
 
 /* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
-NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, const nmpc_target_t *target,
-                                   nmpc_target_t *limited)
+NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, int is_clear,
+                                    const nmpc_target_t *target, nmpc_target_t *limited)
 {
     nmpc_real_t end_m = bounds->knee_m;
     nmpc_target_t held;
@@ -977,16 +997,16 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, int is_clear, c
         fence |= limits_wall(bounds, limited);
     }
     square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
-    if (square > (bounds->speed_m_s * bounds->speed_m_s)) {
-        const nmpc_real_t share = bounds->speed_m_s * inverse_root(square);
+    if (square > (fastest_m_s * fastest_m_s)) {
+        const nmpc_real_t share = fastest_m_s * inverse_root(square);
 
         limited->velocity_m_s[0] = limited->velocity_m_s[0] * share;
         limited->velocity_m_s[1] = limited->velocity_m_s[1] * share;
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
-    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], bounds->speed_m_s);
-    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], bounds->speed_m_s);
+    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], fastest_m_s);
+    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], fastest_m_s);
     return fence + others;
 }
 
@@ -1008,12 +1028,13 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
+    const nmpc_real_t fastest_m_s = bounds->speed_m_s;
     unsigned int active = 0U;
 
-    if ((is_clear == 0) || (limits_are_free(bounds, position_m, target) == 0)) {
+    if ((is_clear == 0) || (limits_are_free(bounds, fastest_m_s, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
-        active = limits_act(bounds, is_clear, target, limited);
+        active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
     if (active != self->limited) {
         limits_change(self, active, target);
@@ -1021,17 +1042,41 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     return active;
 }
 
+/* ---- Set limits -----------------------------------------------------------------------------------------------------
+ *
+ * What the law of the limits needs of them, and their functions of nmpc.h.
+ */
+
+#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
+#define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
+
+/* What follows from the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
+static const nmpc_bounds_t default_bounds = {
+    { 0.0f, 0.0f }, /* centre_m */
+    { 995.2518f, 995.2518f }, /* clear_m */
+    4.74821f, /* margin_m */
+    1.1630836f, /* knee_m */
+    0.81415856f, /* near_m */
+    5.0f, /* speed_m_s */
+    6.0f, /* braking_m_s2 */
+    0.35f, /* tilt_rad */
+    { 0.00034335f, 0.00034335f } /* command_m_step2 */
+};
+
 /* 1 if every limit may be set; 0 if one is NaN. */
 static int limits_are_good(const nmpc_limits_t *limits)
 {
-    /* Not negative, as the bounds of between() must be; a negative tilt limit gives no braking. */
-    const nmpc_real_t most_m_s2 = larger((NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad), (nmpc_real_t)0);
     int is_good = between(limits->speed_m_s, NMPC_SMALLEST_SPEED_LIMIT_M_S, NMPC_VELOCITY_RANGE_M_S)
-                  && within(limits->tilt_rad, NMPC_TILT_LIMIT_RAD)
-                  && between(limits->braking_m_s2, NMPC_SMALLEST_BRAKING_LIMIT_M_S2,
-                             most_m_s2);
+                  && within(limits->tilt_rad, NMPC_TILT_LIMIT_RAD);
     int axis;
 
+    if (is_good != 0) {
+        nmpc_real_t most_m_s2 = NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad;
+
+        /* Not negative, as the bounds of between() must be; a negative tilt limit gives no braking. */
+        most_m_s2 = larger(most_m_s2, (nmpc_real_t)0);
+        is_good = between(limits->braking_m_s2, NMPC_SMALLEST_BRAKING_LIMIT_M_S2, most_m_s2);
+    }
     for (axis = 0; axis < 2; axis++) {
         is_good = is_good && within(limits->fence_min_m[axis], NMPC_POSITION_RANGE_M)
                   && within(limits->fence_max_m[axis], NMPC_POSITION_RANGE_M)
@@ -1066,12 +1111,59 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
     bounds->braking_m_s2 = braking_m_s2;
     bounds->tilt_rad = limits->tilt_rad;
     if (limits->tilt_rad < NMPC_TILT_LIMIT_RAD) {
-        bounds->command_m_step2[NMPC_RIGHT] = NMPC_ROLL_GAIN_M_STEP2_RAD * limits->tilt_rad;
-        bounds->command_m_step2[NMPC_FORWARD] = NMPC_PITCH_GAIN_M_STEP2_RAD * limits->tilt_rad;
+        const nmpc_real_t roll_rad = limits->tilt_rad;
+        const nmpc_real_t pitch_rad = limits->tilt_rad;
+
+        bounds->command_m_step2[NMPC_RIGHT] = NMPC_ROLL_GAIN_M_STEP2_RAD * roll_rad;
+        bounds->command_m_step2[NMPC_FORWARD] = NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_rad;
     } else {
         bounds->command_m_step2[NMPC_RIGHT] = NMPC_RIGHT_LIMIT_M_STEP2;
         bounds->command_m_step2[NMPC_FORWARD] = NMPC_FORWARD_LIMIT_M_STEP2;
     }
+}
+
+void nmpc_default_limits(nmpc_limits_t *limits)
+{
+    if (limits == NULL) {
+        return;
+    }
+
+    limits->speed_m_s = NMPC_SPEED_LIMIT_M_S;
+    limits->braking_m_s2 = NMPC_BRAKING_LIMIT_M_S2;
+    limits->fence_min_m[0] = NMPC_FENCE_X_MIN_M;
+    limits->fence_min_m[1] = NMPC_FENCE_Y_MIN_M;
+    limits->fence_max_m[0] = NMPC_FENCE_X_MAX_M;
+    limits->fence_max_m[1] = NMPC_FENCE_Y_MAX_M;
+    limits->tilt_rad = NMPC_TILT_LIMIT_RAD;
+}
+
+/* Take the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
+static void limits_init(nmpc_t *self)
+{
+    self->bounds = default_bounds;
+}
+
+nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)
+{
+    int k;
+
+    if ((self == NULL) || (limits == NULL)) {
+        return NMPC_NULL_POINTER;
+    }
+    if (limits_are_good(limits) == 0) {
+        return NMPC_BAD_LIMITS;
+    }
+
+    limits_set(self, limits);
+    for (k = 0; k < NMPC_ANGLES; k++) {
+        self->command_rad[k] = clamp(self->command_rad[k], limits->tilt_rad);
+    }
+    return NMPC_OK;
+}
+
+unsigned int nmpc_limits_active(const nmpc_t *self)
+{
+    return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
 }
 
 /* ---- Step -----------------------------------------------------------------------------------------------------------
@@ -1434,62 +1526,6 @@ static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     tracker_clear(self);
 }
 
-void nmpc_default_limits(nmpc_limits_t *limits)
-{
-    if (limits == NULL) {
-        return;
-    }
-
-    limits->speed_m_s = NMPC_SPEED_LIMIT_M_S;
-    limits->braking_m_s2 = NMPC_BRAKING_LIMIT_M_S2;
-    limits->fence_min_m[0] = NMPC_FENCE_X_MIN_M;
-    limits->fence_min_m[1] = NMPC_FENCE_Y_MIN_M;
-    limits->fence_max_m[0] = NMPC_FENCE_X_MAX_M;
-    limits->fence_max_m[1] = NMPC_FENCE_Y_MAX_M;
-    limits->tilt_rad = NMPC_TILT_LIMIT_RAD;
-}
-
-/* Take the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
-static void limits_init(nmpc_t *self)
-{
-    static const nmpc_bounds_t bounds = {
-        { 0.0f, 0.0f }, /* centre_m */
-        { 995.2518f, 995.2518f }, /* clear_m */
-        4.74821f, /* margin_m */
-        1.1630836f, /* knee_m */
-        0.81415856f, /* near_m */
-        5.0f, /* speed_m_s */
-        6.0f, /* braking_m_s2 */
-        0.35f, /* tilt_rad */
-        { 0.00034335f, 0.00034335f } /* command_m_step2 */
-    };
-
-    self->bounds = bounds;
-}
-
-nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)
-{
-    int k;
-
-    if ((self == NULL) || (limits == NULL)) {
-        return NMPC_NULL_POINTER;
-    }
-    if (limits_are_good(limits) == 0) {
-        return NMPC_BAD_LIMITS;
-    }
-
-    limits_set(self, limits);
-    for (k = 0; k < NMPC_ANGLES; k++) {
-        self->command_rad[k] = clamp(self->command_rad[k], limits->tilt_rad);
-    }
-    return NMPC_OK;
-}
-
-unsigned int nmpc_limits_active(const nmpc_t *self)
-{
-    return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
-}
-
 void nmpc_init(nmpc_t *self)
 {
     if (self == NULL) {
@@ -1626,9 +1662,21 @@ nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
     return NMPC_OK;
 }
 
+const char *nmpc_version(void)
+{
+    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+}
+
+/* ---- Heading --------------------------------------------------------------------------------------------------------
+ *
+ * Set-points of a yaw loop, which this controller does not command.
+ */
+
+#define NMPC_TURN_RAD 6.2831855f /* a whole turn */
+#define NMPC_TURNS_PER_RAD 0.15915494f
+
 nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
 {
-    const nmpc_real_t turn_rad = 6.2831855f;
     nmpc_sum_t change_rad;
     nmpc_sum_t next_rad;
 
@@ -1641,7 +1689,7 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
 
     /* The shortest way: less whole turns. */
     change_rad = (nmpc_sum_t)wanted_rad - previous_rad;
-    change_rad = change_rad - ((((change_rad * 0.15915494f) + NMPC_ROUNDING) - NMPC_ROUNDING) * turn_rad);
+    change_rad = change_rad - ((((change_rad * NMPC_TURNS_PER_RAD) + NMPC_ROUNDING) - NMPC_ROUNDING) * NMPC_TURN_RAD);
     if (change_rad > most_change_rad) {
         change_rad = most_change_rad;
     } else if (change_rad < -most_change_rad) {
@@ -1651,18 +1699,14 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
     }
     next_rad = previous_rad + change_rad;
     if (next_rad > NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad - turn_rad;
+        next_rad = next_rad - NMPC_TURN_RAD;
     } else if (next_rad < -NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad + turn_rad;
+        next_rad = next_rad + NMPC_TURN_RAD;
     } else {
         /* The heading is within its range. */
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the heading is. */
-    return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
-                                                         : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));
-}
-
-const char *nmpc_version(void)
-{
-    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+    next_rad = (next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
+                                               : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad);
+    return (nmpc_real_t)next_rad;
 }

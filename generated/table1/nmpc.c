@@ -2,15 +2,16 @@
  *
  * The controller of nmpc.h. Its chapters follow the control step; each opens with the equations that it computes:
  *
- *   numbers       comparisons, limits and products
- *   signs         signs and magnitudes
- *   inputs        the checks of inputs
- *   trigonometry  sine and cosine of the heading
- *   predictor     the errors over the horizon, eqs 8-11
- *   cost          their sum and its subgradient, eq 12
- *   optimizer     RPROP
- *   step          a control step
- *   interface     the functions of nmpc.h
+ *   numbers           comparisons, limits and products
+ *   signs             signs and magnitudes
+ *   inputs            the checks of inputs
+ *   trigonometry      sine and cosine of the heading
+ *   predictor         the errors over the horizon, eqs 8-11
+ *   cost              their sum and its subgradient, eq 12
+ *   optimizer         RPROP
+ *   step              a control step
+ *   interface         the functions of nmpc.h
+ *   heading           set-points of a yaw loop
  *
  * MISRA C:2012: departs from rules 2.3, 8.9, 10.3, 15.5 and 19.2, for the reasons in deviations.txt.
  *
@@ -72,7 +73,7 @@ typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
 
 /* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
- * Comparisons and limits with the same bits on every board.
+ * Comparisons, limits and, in fixed point, products with the same bits on every board.
  */
 
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
@@ -224,23 +225,24 @@ NMPC_INLINE nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
 
 NMPC_INLINE int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
 {
-    return within(position_m[0], NMPC_POSITION_RANGE_M)
-           && within(position_m[1], NMPC_POSITION_RANGE_M)
-           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S)
-           && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    return within(position_m[0], NMPC_POSITION_RANGE_M) && within(position_m[1], NMPC_POSITION_RANGE_M)
+           && within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S) && within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
 }
 
 NMPC_INLINE int is_good_state(const nmpc_state_t *state)
 {
-    return is_good_point(state->position_m, state->velocity_m_s)
-           && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+    int is_good = is_good_point(state->position_m, state->velocity_m_s)
+                  && within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
+                  && within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD) && within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_target(const nmpc_target_t *target)
 {
-    return is_good_point(target->position_m, target->velocity_m_s);
+    int is_good = is_good_point(target->position_m, target->velocity_m_s);
+
+    return is_good;
 }
 
 NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
@@ -250,19 +252,20 @@ NMPC_INLINE int is_good_thrust(nmpc_real_t thrust_acceleration_m_s2)
 
 static int is_good_command(const nmpc_command_t *command)
 {
-    return within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
-           && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+    int is_good =
+        within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD) && within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+
+    return is_good;
 }
 
 /* ---- Trigonometry ---------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
+ * The angle less whole quarter turns, r, which floats take off in two parts (Cody and Waite), and for |r| <= pi/4 apart
+ * from rounding the Taylor series in float64, and else the polynomials of the smallest largest error,
  *
- *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...).
  *
- * whose largest error is the smallest that so many terms allow.
- * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
- * absolute errors of at most 1.21e-07.
+ * The C libraries of different boards differ in the last bit; this function has the same bits on every board.
  */
 
 #define NMPC_SINE_TERMS 3
@@ -276,7 +279,7 @@ static int is_good_command(const nmpc_command_t *command)
 #define NMPC_QUARTER_TURN_RAD 1.5707397f
 #define NMPC_QUARTER_TURN_REST_RAD 5.6580702e-05f
 
-/* s0, s1, ... and c0, c1, ... */
+/* s0, s1, ... and c0, c1, ...: the absolute errors of sine and cosine are at most 1.21e-07. */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
     -0.16666651f, 0.008331976f, -0.00019495294f
 };
@@ -464,8 +467,8 @@ NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *erro
  * over the horizon of the response R to the move, each term with the sign of the error at that prediction step. With
  * S(i) = R(0) + ... + R(i), four errors with the signs + + - - give 2 S(1) - S(3); response_sum holds
  * 2 S(i), and S in its last row. The loop goes from the last change of sign to the first, as if the first error were
- * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any value
- * from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
+ * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any
+ * value from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
 NMPC_INLINE void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_real_t subgradient[NMPC_RESPONSES])
 {
     static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };
@@ -731,6 +734,14 @@ void nmpc_init(nmpc_t *self)
     self->converged = 0U;
 }
 
+/* Make a command the last one and every move of the plan, and forget the target. */
+static void hold(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    self->command_rad[0] = roll_rad;
+    self->command_rad[1] = pitch_rad;
+    set_plan(self);
+}
+
 nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
 {
     if ((self == NULL) || (command == NULL)) {
@@ -740,9 +751,7 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
         return NMPC_BAD_COMMAND;
     }
 
-    self->command_rad[0] = clamp(command->roll_rad, tilt_limit(self));
-    self->command_rad[1] = clamp(command->pitch_rad, tilt_limit(self));
-    set_plan(self);
+    hold(self, clamp(command->roll_rad, tilt_limit(self)), clamp(command->pitch_rad, tilt_limit(self)));
     return NMPC_OK;
 }
 
@@ -751,8 +760,7 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights)
     if ((self == NULL) || (weights == NULL)) {
         return NMPC_NULL_POINTER;
     }
-    if (!(within(weights->tracking, NMPC_TRACKING_WEIGHT_LIMIT)
-          && within(weights->effort, NMPC_EFFORT_WEIGHT_LIMIT)
+    if (!(within(weights->tracking, NMPC_TRACKING_WEIGHT_LIMIT) && within(weights->effort, NMPC_EFFORT_WEIGHT_LIMIT)
           && (weights->tracking >= (nmpc_real_t)0) && (weights->effort >= (nmpc_real_t)0))) {
         return NMPC_BAD_WEIGHT;
     }
@@ -809,8 +817,9 @@ int nmpc_has_converged(const nmpc_t *self)
 
 int nmpc_is_saturated(const nmpc_t *self)
 {
-    return (reaches(self->command_rad[0], tilt_limit(self)) != 0)
-           || (reaches(self->command_rad[1], tilt_limit(self)) != 0);
+    const nmpc_real_t *const command_rad = self->command_rad;
+
+    return (reaches(command_rad[0], tilt_limit(self)) != 0) || (reaches(command_rad[1], tilt_limit(self)) != 0);
 }
 
 nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m[2],
@@ -827,9 +836,21 @@ nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m
     return NMPC_OK;
 }
 
+const char *nmpc_version(void)
+{
+    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+}
+
+/* ---- Heading --------------------------------------------------------------------------------------------------------
+ *
+ * Set-points of a yaw loop, which this controller does not command.
+ */
+
+#define NMPC_TURN_RAD 6.2831855f /* a whole turn */
+#define NMPC_TURNS_PER_RAD 0.15915494f
+
 nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, nmpc_real_t most_change_rad)
 {
-    const nmpc_real_t turn_rad = 6.2831855f;
     nmpc_sum_t change_rad;
     nmpc_sum_t next_rad;
 
@@ -842,7 +863,7 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
 
     /* The shortest way: less whole turns. */
     change_rad = (nmpc_sum_t)wanted_rad - previous_rad;
-    change_rad = change_rad - ((((change_rad * 0.15915494f) + NMPC_ROUNDING) - NMPC_ROUNDING) * turn_rad);
+    change_rad = change_rad - ((((change_rad * NMPC_TURNS_PER_RAD) + NMPC_ROUNDING) - NMPC_ROUNDING) * NMPC_TURN_RAD);
     if (change_rad > most_change_rad) {
         change_rad = most_change_rad;
     } else if (change_rad < -most_change_rad) {
@@ -852,18 +873,14 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
     }
     next_rad = previous_rad + change_rad;
     if (next_rad > NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad - turn_rad;
+        next_rad = next_rad - NMPC_TURN_RAD;
     } else if (next_rad < -NMPC_YAW_RANGE_RAD) {
-        next_rad = next_rad + turn_rad;
+        next_rad = next_rad + NMPC_TURN_RAD;
     } else {
         /* The heading is within its range. */
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the heading is. */
-    return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
-                                                         : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));
-}
-
-const char *nmpc_version(void)
-{
-    return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;
+    next_rad = (next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
+                                               : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad);
+    return (nmpc_real_t)next_rad;
 }

@@ -39,6 +39,7 @@ def limits_context(method: Method) -> dict[str, object]:
     )
     numbers_of_c = method.reference_controller().stored_limits[0].tolist()
     stored = [str(number) if fixed else literals.real(float(number), scalar) for number in numbers_of_c]
+    shifts = limits_shifts(numbers.bits) if numbers.bits is not None else {}
     return {
         "limit_bits": {limit.name: limit.value for limit in ActiveLimit},
         "smallest_limit": SMALLEST_LIMIT,
@@ -47,7 +48,9 @@ def limits_context(method: Method) -> dict[str, object]:
         "root_start": start,
         "root_iterations": FIXED_ITERATIONS,
         "root_terms": () if fixed else TERMS[numbers.scalar],
-        "limits_shifts": limits_shifts(numbers.bits) if numbers.bits is not None else None,
+        "limits_shifts": shifts,
+        "root_up": max(0, -shifts.get("speed", 0)),
+        "root_down": max(0, shifts.get("speed", 0)),
         "default_bounds": _bounds(method, stored),
         "turning": limiting.turn_m_s_rad is not None,
         "turn_share": TURN_SHARE,

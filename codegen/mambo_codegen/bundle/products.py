@@ -2,7 +2,7 @@
 
 In floating point that is `gain * tilt`, and as an operand, by the filter `term`, `(gain * tilt)`. In fixed
 point it is `gain_product(gain, tilt)`: each product is a function, since it rounds and shifts to the
-format of its result (`products_fixed.c.j2`). Chapters of the kernel call these functions; for floating
+format of its result (`products_fixed`). Chapters of the kernel call these functions; for floating
 point the filter `infix` writes them with operators.
 """
 

@@ -138,7 +138,7 @@ class Method(Constants):
         """The chapters of nmpc.c with these settings, and a word on each."""
         needs = (
             *(("tracker", self.tracker), ("guard", self.guard), ("height", self.has_height)),
-            ("limits", self.limiting),
+            *((name, self.limiting) for name in ("limits_arithmetic", "limits", "set_limits")),
             ("thrust_vector", self.has_thrust_vector),
             ("tilt_gain", self.learns_tilt_gain),
             ("float", self.numbers.formats),

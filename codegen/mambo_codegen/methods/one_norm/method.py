@@ -32,9 +32,12 @@ class OneNorm(OneNormConstants, Method):
         "predictor": "the errors over the horizon, eqs 8-11",
         "cost": "their sum and its subgradient, eq 12",
         "optimizer": "RPROP",
+        "limits_arithmetic": "roots and products of the limits",
         "limits": "speed, braking and place",
+        "set_limits": "what the limits need, and their functions of nmpc.h",
         "step": "a control step",
         "interface": "the functions of nmpc.h",
+        "heading": "set-points of a yaw loop",
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_weights"
@@ -118,7 +121,6 @@ class OneNorm(OneNormConstants, Method):
         tracking_limit, effort_limit = self.weight_limits
         return {
             "quadratic": False,
-            "command_member": "sent_rad" if self.feedback_steps else "command_rad",
             "backtracking": settings.optimizer.variant == "rprop+",
             "tables": self.tables,
             "hover": settings.model.thrust == "hover",
@@ -141,5 +143,7 @@ def _parts(constants: OneNormConstants) -> dict[str, bool]:
         "WITH_LATER_STEPS": horizon.prediction > 1,
         "WITH_LONG_HORIZON": horizon.prediction > 32,
         "WITH_PRINTED_YAW": model.yaw_convention == "printed",
+        "WITH_QUADRATIC": False,
+        "WITH_SHIFT": constants.tracker is not None or constants.has_limits,
         "WITH_WARM_PLAN": settings.optimizer.warm_start == "plan",
     }

@@ -48,13 +48,16 @@ class Quadratic(QuadraticConstants, Method):
         "optimizer": "the minimum of the cost",
         "guard": "how much the commands may vary",
         "height": "the third axis, whose command is the thrust",
+        "limits_arithmetic": "roots and products of the limits",
         "limits": "speed, braking and place",
+        "set_limits": "what the limits need, and their functions of nmpc.h",
         "step": "what the functions of a control step hand on",
         "observe": "where the drone is",
         "aim": "what the next command flies to",
         "command": "the command of the least cost",
         "advance": "a control step",
         "interface": "the functions of nmpc.h",
+        "heading": "set-points of a yaw loop",
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "set_command"
@@ -144,7 +147,6 @@ class Quadratic(QuadraticConstants, Method):
         found = self.numbers.formats
         return {
             "quadratic": True,
-            "command_member": "command_rad",
             "attitude": self.attitude,
             "move_limits": AttitudeModel(self, QuadraticArithmetic(self)).command_limit.tolist(),
             "observer": self.observer,
@@ -177,10 +179,6 @@ class Quadratic(QuadraticConstants, Method):
             **_parts(self),
             "per_step2": _per_step2(self),
             "rest_m_step": REST_M_S * period_s,
-            "trims": [
-                f" {'-' if trim_rad > 0 else '+'} NMPC_{name}_TRIM_COMMAND_RAD" if trim_rad else ""
-                for name, trim_rad in zip(("ROLL", "PITCH"), self.attitude.trim_rad.tolist(), strict=True)
-            ],
         }
 
 
@@ -189,9 +187,15 @@ def _parts(constants: QuadraticConstants) -> dict[str, bool]:
     settings, feedback = constants.settings, constants.feedback_steps or (0.0, 0.0)
     return common_parts(constants) | {
         "WITH_GUARD": constants.guard is not None,
+        "WITH_LIFT": constants.height is not None and constants.height.learns_acceleration,
         "WITH_PITCH_FEEDBACK": feedback[1] != 0,
+        "WITH_PITCH_TRIM": settings.model.pitch_trim_rad != 0,
         "WITH_PREDICTED": settings.model.attitude == "predicted",
+        "WITH_QUADRATIC": True,
         "WITH_ROLL_FEEDBACK": feedback[0] != 0,
+        "WITH_ROLL_TRIM": settings.model.roll_trim_rad != 0,
+        "WITH_SHIFT": True,
+        "WITH_THRUST_GAIN": constants.height is not None and constants.height.learns_gain,
         "WITH_TILT_GAIN": constants.learns_tilt_gain,
         "WITH_VECTOR": constants.has_thrust_vector,
     }

@@ -1,7 +1,7 @@
 """Limits of speed, braking and place: what the controller aims at instead of a target that is too far.
 
 While no limit acts, the target stays as it is, in every bit. Else the controller is given its own position
-for the target's, and the limited desired velocity for the target's velocity. `limits.c.j2` derives the law.
+for the target's, and the limited desired velocity for the target's velocity. `limits.c` derives the law.
 """
 
 from dataclasses import dataclass, replace

@@ -1,7 +1,7 @@
 """Constants of the limits of speed, braking and place: what the settings ask for, whatever the method.
 
 The law K_e (p - p_T) + K_v (v - v_T) follows the desired velocity v_T + k (p_T - p), with the approach rate
-k = K_e / K_v. All limits are limits of that velocity: `limits.c.j2` derives them.
+k = K_e / K_v. All limits are limits of that velocity: `limits.c` derives them.
 """
 
 import math
@@ -27,14 +27,14 @@ BRAKING_SHARE: Final = 0.8
 """Braking limit where none is given, over what the tilt limit gives: the rest is left for wind and lag."""
 
 NEAR_SHARE: Final = 0.7
-"""Braking that is fed forward ends at this share of the distance up to which f is linear; see `limits.c.j2`.
+"""Braking that is fed forward ends at this share of the distance up to which f is linear; see `limits.c`.
 Flown with presets mambo and crazyflie: with less they overshoot, with more the command jumps."""
 
 SPELLING: Final = 1.0005
 """A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
 
 TURN_SHARE: Final = 0.9
-"""With the 1-norm a target's turns may take this share of what the tilt limit gives; see `limits.c.j2`."""
+"""With the 1-norm a target's turns may take this share of what the tilt limit gives; see `limits.c`."""
 
 LEAST_TURN_M2_S2: Final = 4e-5
 """The smallest turn that limits a speed: its square has a root in float32."""

@@ -26,8 +26,8 @@ NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *erro
  * over the horizon of the response R to the move, each term with the sign of the error at that prediction step. With
  * S(i) = R(0) + ... + R(i), four errors with the signs + + - - give 2 S(1) - S(3); response_sum holds
  * 2 S(i), and S in its last row. The loop goes from the last change of sign to the first, as if the first error were
- * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any value
- * from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
+ * positive; then the result is multiplied by the sign of the first error. An error of zero takes its sign bit: any
+ * value from -1 to 1 is a subgradient of |e| at 0. If all errors are zero so is the subgradient. */
 NMPC_INLINE void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_real_t subgradient[NMPC_RESPONSES])
 {
     static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };

@@ -3,37 +3,7 @@
  * Conversion between float and the fixed point numbers of the controller. The linker leaves out what nobody calls.
  */
 
-/* Factors from SI units to numbers, and from numbers to SI units. */
-#define NMPC_POSITION_SCALE {{ scales.position }}
-#define NMPC_VELOCITY_SCALE {{ scales.velocity }}
-#define NMPC_ANGLE_SCALE {{ scales.angle }}
-#define NMPC_YAW_SCALE {{ scales.yaw }}
-#define NMPC_THRUST_SCALE {{ scales.thrust }}
-#define NMPC_ANGLE_UNIT {{ units.angle }}
-#define NMPC_YAW_UNIT {{ units.yaw }}
-{% if quadratic %}
-#define NMPC_POSITION_UNIT {{ units.position }}
-#define NMPC_VELOCITY_UNIT {{ units.velocity }}
-#define NMPC_DISTURBANCE_UNIT {{ units.disturbance }}
-{% if height %}
-#define NMPC_THRUST_UNIT {{ units.thrust }}
-{% endif %}
-{% if (height and height.learns_gain) or tilt_gain %}
-#define NMPC_FACTOR_UNIT {{ units.factor }}
-{% endif %}
-{% else %}
-#define NMPC_TRACKING_SCALE {{ scales.tracking }}
-#define NMPC_EFFORT_SCALE {{ scales.effort }}
-#define NMPC_COST_UNIT {{ units.cost }}
-{% endif %}
-{% if limiting %}
-{% if not quadratic %}
-#define NMPC_POSITION_UNIT {{ units.position }}
-#define NMPC_VELOCITY_UNIT {{ units.velocity }}
-{% endif %}
-#define NMPC_BRAKING_SCALE {{ scales.braking }}
-#define NMPC_BRAKING_UNIT {{ units.braking }}
-{% endif %}
+#include "float_units.h"
 
 /* 2^31: every number is smaller. */
 #define NMPC_NUMBERS_END 2147483648.0f
@@ -60,8 +30,13 @@ static nmpc_real_t quantize(float value, float scale)
     return number;
 }
 
+#if WITH_HEIGHT
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
-                              {{ "float thrust_acceleration_m_s2, " if not height }}nmpc_float_command_t *command)
+                              nmpc_float_command_t *command)
+#else
+nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
+                              float thrust_acceleration_m_s2, nmpc_float_command_t *command)
+#endif
 {
     nmpc_state_t fixed_state;
     nmpc_target_t fixed_target;
@@ -73,7 +48,11 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
     }
 
     if ((state == NULL) || (target == NULL)) {
-        status = nmpc_step(self, NULL, NULL, {{ "0, " if not height }}&fixed_command);
+#if WITH_HEIGHT
+        status = nmpc_step(self, NULL, NULL, &fixed_command);
+#else
+        status = nmpc_step(self, NULL, NULL, 0, &fixed_command);
+#endif
     } else {
         int axis;
 
@@ -82,33 +61,35 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
             fixed_state.velocity_m_s[axis] = quantize(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
             fixed_target.position_m[axis] = quantize(target->position_m[axis], NMPC_POSITION_SCALE);
             fixed_target.velocity_m_s[axis] = quantize(target->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-{% if given %}
+#if WITH_GIVEN
             fixed_target.acceleration_m_s2[axis] = quantize(target->acceleration_m_s2[axis], NMPC_THRUST_SCALE);
-{% endif %}
+#endif
         }
         fixed_state.roll_rad = quantize(state->roll_rad, NMPC_ANGLE_SCALE);
         fixed_state.pitch_rad = quantize(state->pitch_rad, NMPC_ANGLE_SCALE);
         fixed_state.yaw_rad = quantize(state->yaw_rad, NMPC_YAW_SCALE);
-{% if height %}
+#if WITH_HEIGHT
         fixed_state.height_m = quantize(state->height_m, NMPC_POSITION_SCALE);
         fixed_state.climb_m_s = quantize(state->climb_m_s, NMPC_VELOCITY_SCALE);
         fixed_state.grounded = state->grounded;
         fixed_target.height_m = quantize(target->height_m, NMPC_POSITION_SCALE);
         fixed_target.climb_m_s = quantize(target->climb_m_s, NMPC_VELOCITY_SCALE);
-{% if given %}
+#endif
+#if WITH_HEIGHT and WITH_GIVEN
         fixed_target.climb_acceleration_m_s2 = quantize(target->climb_acceleration_m_s2, NMPC_THRUST_SCALE);
-{% endif %}
+#endif
+#if WITH_HEIGHT
         status = nmpc_step(self, &fixed_state, &fixed_target, &fixed_command);
-{% else %}
-        status = nmpc_step(self, &fixed_state, &fixed_target,
-                           quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE), &fixed_command);
-{% endif %}
+#else
+        status = nmpc_step(self, &fixed_state, &fixed_target, quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE),
+                           &fixed_command);
+#endif
     }
     command->roll_rad = (float)fixed_command.roll_rad * NMPC_ANGLE_UNIT;
     command->pitch_rad = (float)fixed_command.pitch_rad * NMPC_ANGLE_UNIT;
-{% if height %}
+#if WITH_HEIGHT
     command->thrust_m_s2 = (float)fixed_command.thrust_m_s2 * NMPC_THRUST_UNIT;
-{% endif %}
+#endif
     return status;
 }
 
@@ -122,13 +103,13 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
 
     fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
     fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
-{% if height %}
+#if WITH_HEIGHT
     fixed_command.thrust_m_s2 = quantize(command->thrust_m_s2, NMPC_THRUST_SCALE);
-{% endif %}
+#endif
     return nmpc_reset(self, &fixed_command);
 }
 
-{% if quadratic %}
+#if WITH_QUADRATIC
 nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command)
 {
     nmpc_command_t fixed_command;
@@ -139,18 +120,18 @@ nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *c
 
     fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
     fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
-{% if height %}
+#if WITH_HEIGHT
     fixed_command.thrust_m_s2 = quantize(command->thrust_m_s2, NMPC_THRUST_SCALE);
-{% endif %}
+#endif
     return nmpc_set_command(self, &fixed_command);
 }
-{% if height %}
+#if WITH_HEIGHT
 
 nmpc_status_t nmpc_float_set_thrust(nmpc_t *self, float thrust_m_s2)
 {
     return nmpc_set_thrust(self, quantize(thrust_m_s2, NMPC_THRUST_SCALE));
 }
-{% endif %}
+#endif
 
 nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate)
 {
@@ -166,23 +147,23 @@ nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t
         estimate->velocity_m_s[axis] = (float)fixed_estimate.velocity_m_s[axis] * NMPC_VELOCITY_UNIT;
         estimate->disturbance_m_s2[axis] = (float)fixed_estimate.disturbance_m_s2[axis] * NMPC_DISTURBANCE_UNIT;
     }
-{% if height %}
+#if WITH_HEIGHT
     estimate->height_m = (float)fixed_estimate.height_m * NMPC_POSITION_UNIT;
     estimate->climb_m_s = (float)fixed_estimate.climb_m_s * NMPC_VELOCITY_UNIT;
-{% if height.learns_gain %}
+#endif
+#if WITH_HEIGHT and WITH_THRUST_GAIN
     estimate->thrust_gain = (float)fixed_estimate.thrust_gain * NMPC_FACTOR_UNIT;
-{% elif height.learns_acceleration %}
+#elif WITH_HEIGHT and WITH_LIFT
     estimate->lift_m_s2 = (float)fixed_estimate.lift_m_s2 * NMPC_DISTURBANCE_UNIT;
-{% endif %}
-{% endif %}
-{% if tilt_gain %}
+#endif
+#if WITH_TILT_GAIN
     estimate->roll_gain = (float)fixed_estimate.roll_gain * NMPC_FACTOR_UNIT;
     estimate->pitch_gain = (float)fixed_estimate.pitch_gain * NMPC_FACTOR_UNIT;
-{% endif %}
+#endif
     estimate->is_valid = fixed_estimate.is_valid;
     return NMPC_OK;
 }
-{% else %}
+#else
 nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *weights)
 {
     nmpc_weights_t fixed_weights;
@@ -200,8 +181,8 @@ float nmpc_float_last_cost(const nmpc_t *self)
 {
     return (float)nmpc_last_cost(self) * NMPC_COST_UNIT;
 }
-{% endif %}
-{% if limiting %}
+#endif
+#if WITH_LIMITS
 
 /* The nearest float that is not larger in magnitude, so that nmpc_float_set_limits() accepts what it is a limit of. */
 static float shrink(nmpc_real_t number, float unit)
@@ -231,12 +212,12 @@ void nmpc_float_default_limits(nmpc_float_limits_t *limits)
         limits->fence_max_m[axis] = shrink(fixed_limits.fence_max_m[axis], NMPC_POSITION_UNIT);
     }
     limits->tilt_rad = shrink(fixed_limits.tilt_rad, NMPC_ANGLE_UNIT);
-{% if height %}
+#if WITH_HEIGHT
     limits->floor_m = shrink(fixed_limits.floor_m, NMPC_POSITION_UNIT);
     limits->ceiling_m = shrink(fixed_limits.ceiling_m, NMPC_POSITION_UNIT);
     limits->climb_m_s = shrink(fixed_limits.climb_m_s, NMPC_VELOCITY_UNIT);
     limits->descent_m_s = shrink(fixed_limits.descent_m_s, NMPC_VELOCITY_UNIT);
-{% endif %}
+#endif
 }
 
 nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *limits)
@@ -255,28 +236,36 @@ nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *lim
         fixed_limits.fence_max_m[axis] = quantize(limits->fence_max_m[axis], NMPC_POSITION_SCALE);
     }
     fixed_limits.tilt_rad = quantize(limits->tilt_rad, NMPC_ANGLE_SCALE);
-{% if height %}
+#if WITH_HEIGHT
     fixed_limits.floor_m = quantize(limits->floor_m, NMPC_POSITION_SCALE);
     fixed_limits.ceiling_m = quantize(limits->ceiling_m, NMPC_POSITION_SCALE);
     fixed_limits.climb_m_s = quantize(limits->climb_m_s, NMPC_VELOCITY_SCALE);
     fixed_limits.descent_m_s = quantize(limits->descent_m_s, NMPC_VELOCITY_SCALE);
-{% endif %}
+#endif
     return nmpc_set_limits(self, &fixed_limits);
 }
-{% endif %}
+#endif
 
-nmpc_status_t nmpc_float_shift({{ "const " if not (quadratic or tracker or (limiting and (given or turning))) }}nmpc_t *self, const float position_change_m[{{ 3 if height else 2 }}],
-                               const float velocity_change_m_s[{{ 3 if height else 2 }}], float heading_change_rad)
+#if WITH_HEIGHT
+nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[3], const float velocity_change_m_s[3],
+                               float heading_change_rad)
+#elif WITH_SHIFT
+nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2], const float velocity_change_m_s[2],
+                               float heading_change_rad)
+#else
+nmpc_status_t nmpc_float_shift(const nmpc_t *self, const float position_change_m[2], const float velocity_change_m_s[2],
+                               float heading_change_rad)
+#endif
 {
-    nmpc_real_t fixed_position_m[{{ 3 if height else 2 }}];
-    nmpc_real_t fixed_velocity_m_s[{{ 3 if height else 2 }}];
+    nmpc_real_t fixed_position_m[NMPC_AXES];
+    nmpc_real_t fixed_velocity_m_s[NMPC_AXES];
     int axis;
 
     if ((position_change_m == NULL) || (velocity_change_m_s == NULL)) {
         return NMPC_NULL_POINTER;
     }
 
-    for (axis = 0; axis < {{ 3 if height else 2 }}; axis++) {
+    for (axis = 0; axis < NMPC_AXES; axis++) {
         fixed_position_m[axis] = quantize(position_change_m[axis], NMPC_POSITION_SCALE);
         fixed_velocity_m_s[axis] = quantize(velocity_change_m_s[axis], NMPC_VELOCITY_SCALE);
     }
@@ -285,9 +274,9 @@ nmpc_status_t nmpc_float_shift({{ "const " if not (quadratic or tracker or (limi
 
 float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad)
 {
-    const nmpc_real_t slewed_rad = nmpc_slew_heading(quantize(previous_rad, NMPC_YAW_SCALE),
-                                                     quantize(wanted_rad, NMPC_YAW_SCALE),
-                                                     quantize(most_change_rad, NMPC_YAW_SCALE));
+    const nmpc_real_t slewed_rad =
+        nmpc_slew_heading(quantize(previous_rad, NMPC_YAW_SCALE), quantize(wanted_rad, NMPC_YAW_SCALE),
+                          quantize(most_change_rad, NMPC_YAW_SCALE));
 
     return (float)slewed_rad * NMPC_YAW_UNIT;
 }

@@ -1,5 +1,3 @@
-{% set fastest = "fastest_m_s" if turning else "bounds->speed_m_s" %}
-{% set with_fastest = ", nmpc_real_t fastest_m_s" if turning %}
 /* ---- Limits ---------------------------------------------------------------------------------------------------------
  *
  * Limits of speed, braking and place (not in the paper).
@@ -7,7 +5,7 @@
  * Near the target the command is as from a law K_e (p - p_T) + K_v (v - v_T), which is the same as following the
  * desired velocity
  *
- *     v_d = v_T + k (p_T - p),   k = K_e/K_v = {{ "%.4g" | format(limiting.approach_1_s) }} 1/s{{ " (the smaller one of both axes)" if quadratic else " (of a law like this controller's)" }}.
+ *     v_d = v_T + k (p_T - p),   k = K_e/K_v, the smaller one of both axes: NMPC_APPROACH_1_S.
  *
  * All limits are limits of v_d. With the position p, the fence, the speed limit V and the braking limit A, at most k V:
  *
@@ -15,114 +13,118 @@
  *   2. Braking: at distance d the approach has the speed f(d) = k d up to the knee d = A/k^2, and
  *      f(d) = sqrt(2 A (d - A/(2 k^2))) beyond, which the deceleration A takes away in time. Value and slope of the
  *      two are the same at the knee.
-{%- if tracker %} A target that is slower than A/(2 k), and inside the fence, is approached with
- *      f(d + {{ "%.3g" | format(1 - limiting.near_share) }} A/k^2), down to d = {{ limiting.near_share }} A/k^2: there the law brakes by itself, so that the command does not
- *      jump, and the tracker forgets the deceleration.
-{%- endif +%}
  *   3. Fence: towards a wall at distance d the component of v_d is at most f(d), unless f(d) >= V for every wall.
  *      Outside, it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
-{% if turning %}
- *   5. Turns: a target that turns at the rate w faster than A_T/|v_T| makes the speed limit at most A_T/w. A_T is
- *      {{ turn_share }} of what the tilt limit gives. Else the drone could not follow v_d, and would orbit the target.
- *      w T_s |v_T|^2 is the mean vector product of successive v_T, of which each step takes in 1/{{ 2 ** turn_bits }}.
-{% endif %}
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T{{ ", and the change of v_d for the target's acceleration" if given }}.
- *
- * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
+ * v_d for v_T; and the change of v_d for the target's acceleration, where that is given.
  */
 
-#define NMPC_APPROACH_1_S {{ limiting.approach_1_s | real("approach") }} /* k */
-{% if fixed %}
-#define NMPC_STEEPEST_1_S {{ limiting.steepest_1_s | real("approach") }} /* where braking ends: k/{{ limiting.near_share }} */
-{% endif %}
-#define NMPC_KNEE_S2 {{ limiting.knee_s2 | real("knee") }} /* 1/(2 k^2): the knee over 2 A */
-#define NMPC_NEAR_S2 {{ limiting.near_s2 | real("knee") }} /* {{ limiting.near_share }} times that: where braking ends */
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD {{ braking_slope | real("slope") }} /* what a tilt gives along the slower axis */
-{% if limiting.tilted.trim_m_s2 %}
-#define NMPC_BRAKING_TRIM_M_S2 {{ limiting.tilted.trim_m_s2 | real("braking") }} /* what its trim takes */
-{% endif %}
-{% if not fixed %}
-{% if not quadratic %}
-#define NMPC_HALF {{ 0.5 | real }}
-{% endif %}
-#define NMPC_TWICE_APPROACH_1_S {{ (2 * limiting.approach_1_s) | real }} /* 2 k */
-{% endif %}
-{% if turning %}
-#define NMPC_TURN_M_S_RAD {{ limiting.turn_m_s_rad | real("slope") }} /* {{ turn_share }} g T_s: A_T T_s over the tilt limit */
-#define NMPC_LEAST_TURN_M2_S2 {{ least_turn | real("velocity") }}
-{% if not fixed %}
-#define NMPC_TURN_GAIN {{ (1 / 2 ** turn_bits) | real }}
-#define NMPC_TURN_REST {{ (1 - 1 / 2 ** turn_bits) | real }}
-{% endif %}
-{% endif %}
-{% if given %}
-#define NMPC_UPDATES_PER_S {{ limiting.steps_per_s | real("rate") }} /* 1/T_s */
-{% endif %}
+#if WITH_TRACKER
+/* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to
+ * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: there the law brakes by itself, so that the command does not jump, and
+ * the tracker forgets the deceleration. */
 
-{% if quadratic %}
-{{ "NMPC_COMPARISON" if height else "NMPC_INLINE" }} nmpc_real_t absolute(nmpc_real_t value)
-{
-{% if not fixed %}
-#if defined(__GNUC__)
-    return __builtin_fabs{{ "f" if scalar_bytes == 4 }}(value);
-#else
-    return (value < (nmpc_real_t)0) ? -value : value;
 #endif
-{% else %}
-    return (value < (nmpc_real_t)0) ? -value : value;
-{% endif %}
-}
+#if WITH_TURNING
+/* Turns: a target that turns at the rate w faster than A_T/|v_T| makes the speed limit at most A_T/w, A_T being a share
+ * of what the tilt limit gives. Else the drone could not follow v_d, and would orbit the target. w T_s |v_T|^2 is the
+ * mean vector product of successive v_T, of which each step takes in a small share. */
 
-{{ "NMPC_COMPARISON" if height else "NMPC_INLINE" }} nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
-{
-    return (a < b) ? a : b;
-}
-
-{{ "NMPC_COMPARISON" if height else "NMPC_INLINE" }} nmpc_real_t larger(nmpc_real_t a, nmpc_real_t b)
-{
-    return (a > b) ? a : b;
-}
-
-{% endif %}
-{% include "common/_limits_fixed.c.j2" if fixed else "common/_limits_float.c.j2" %}
+#endif
+#include "limits.h"
 
 /* f(d)^2 for d = A/k^2 + excess. */
 NMPC_INLINE nmpc_square_t braking_square(const nmpc_bounds_t *bounds, nmpc_real_t excess_m)
 {
-    return {{ braking_product("bounds->braking_m_s2", "(%s) + excess_m" | format(halved("bounds->knee_m"))) }};
+    return braking_product(bounds->braking_m_s2, halved(bounds->knee_m) + excess_m);
 }
 
-{% if turning %}
-{% include "common/_limits_turn.c.j2" %}
-{% endif %}
+#if WITH_TURNING
+/* Take in the target's velocity. Returns the speed limit, or what the target's turn allows if that is less. */
+static nmpc_real_t limits_turn(nmpc_bounds_t *bounds, const nmpc_real_t velocity_m_s[2])
+{
+    const nmpc_square_t square = square_sum(velocity_m_s[0], velocity_m_s[1]);
+    const nmpc_real_t slow_m_s = NMPC_SMALLEST_SPEED_LIMIT_M_S;
+#if WITH_FIXED
+    const nmpc_sum_t product =
+        ((nmpc_sum_t)bounds->target_m_s[0] * velocity_m_s[1]) - ((nmpc_sum_t)bounds->target_m_s[1] * velocity_m_s[0]);
+    const nmpc_sum_t mean =
+        ((((nmpc_sum_t)1 << NMPC_TURN_BITS) - 1) * bounds->turn_m2_s2) + NMPC_ROUNDED(product, NMPC_VELOCITY_BITS);
+    const nmpc_sum_t turn = NMPC_ROUNDED(mean, NMPC_TURN_BITS);
+#else
+    const nmpc_real_t product = (bounds->target_m_s[0] * velocity_m_s[1]) - (bounds->target_m_s[1] * velocity_m_s[0]);
+    const nmpc_real_t turn = (NMPC_TURN_REST * bounds->turn_m2_s2) + (NMPC_TURN_GAIN * product);
+#endif
+    nmpc_real_t fastest_m_s = bounds->speed_m_s;
+
+    bounds->target_m_s[0] = velocity_m_s[0];
+    bounds->target_m_s[1] = velocity_m_s[1];
+    bounds->turn_m2_s2 = (nmpc_real_t)0;
+    if (square > squared(slow_m_s)) {
+#if WITH_FIXED
+        const nmpc_real_t turn_m2_s2 =
+            (turn > NMPC_VELOCITY_RANGE_M_S)
+                ? NMPC_VELOCITY_RANGE_M_S
+                : ((turn < -NMPC_VELOCITY_RANGE_M_S) ? -NMPC_VELOCITY_RANGE_M_S : (nmpc_real_t)turn);
+        const nmpc_real_t size_m2_s2 = (turn_m2_s2 < 0) ? -turn_m2_s2 : turn_m2_s2;
+        const nmpc_real_t speed_m_s = at_most(length(inverse_root(square)), 2 * NMPC_VELOCITY_RANGE_M_S);
+        const nmpc_sum_t turned_m_s = NMPC_ROUNDED((nmpc_sum_t)NMPC_TURN_M_S_RAD * bounds->tilt_rad, NMPC_TURN_SHIFT);
+        const nmpc_real_t change_m_s = at_most((nmpc_square_t)turned_m_s, 2 * NMPC_VELOCITY_RANGE_M_S);
+        const nmpc_sum_t most_m2_s2 = ((nmpc_sum_t)change_m_s * speed_m_s) >> NMPC_VELOCITY_BITS;
+#else
+        const nmpc_real_t turn_m2_s2 = clamp(turn, NMPC_VELOCITY_RANGE_M_S);
+        const nmpc_real_t size_m2_s2 = (turn_m2_s2 < (nmpc_real_t)0) ? -turn_m2_s2 : turn_m2_s2;
+        const nmpc_real_t speed_m_s = square * inverse_root(square);
+        const nmpc_real_t change_m_s = NMPC_TURN_M_S_RAD * bounds->tilt_rad;
+        const nmpc_real_t most_m2_s2 = change_m_s * speed_m_s;
+#endif
+
+        bounds->turn_m2_s2 = turn_m2_s2;
+        if ((size_m2_s2 > most_m2_s2) && (size_m2_s2 > NMPC_LEAST_TURN_M2_S2)) {
+#if WITH_FIXED
+            const nmpc_real_t share = speed_ratio((nmpc_real_t)most_m2_s2, inverse_root(squared(size_m2_s2)));
+#else
+            const nmpc_real_t share = speed_ratio(most_m2_s2, inverse_root(squared(size_m2_s2)));
+#endif
+
+            fastest_m_s = smaller(fastest_m_s, larger(scaled_velocity(speed_m_s, share), slow_m_s));
+        }
+    }
+    return fastest_m_s;
+}
+
+#endif
 /* 1 if the drone is so far from every wall that none limits a velocity within the speed limit. */
-{{ "NMPC_INLINE" if quadratic else "NMPC_SHARED" }} int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2])
+#if WITH_QUADRATIC
+NMPC_INLINE int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2])
+#else
+NMPC_SHARED int limits_are_clear(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2])
+#endif
 {
     return (absolute(position_m[0] - bounds->centre_m[0]) <= bounds->clear_m[0])
            && (absolute(position_m[1] - bounds->centre_m[1]) <= bounds->clear_m[1]);
 }
 
 /* 1 if the target is so near, and the desired velocity so small, that neither braking nor speed is limited. */
-NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds{{ with_fastest }}, const nmpc_real_t position_m[2],
+NMPC_INLINE int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, const nmpc_real_t position_m[2],
                                 const nmpc_target_t *target)
 {
     const nmpc_real_t error_x_m = target->position_m[0] - position_m[0];
     const nmpc_real_t error_y_m = target->position_m[1] - position_m[1];
-    const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + {{ approach_product("NMPC_APPROACH_1_S", "error_x_m") | term }};
-    const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + {{ approach_product("NMPC_APPROACH_1_S", "error_y_m") | term }};
+    const nmpc_real_t desired_x_m_s = target->velocity_m_s[0] + approach_product(NMPC_APPROACH_1_S, error_x_m);
+    const nmpc_real_t desired_y_m_s = target->velocity_m_s[1] + approach_product(NMPC_APPROACH_1_S, error_y_m);
 
-    return (square_sum(error_x_m, error_y_m) <= {{ squared("bounds->near_m") | term }})
-           && (square_sum(desired_x_m_s, desired_y_m_s) <= {{ squared(fastest) | term }});
+    return (square_sum(error_x_m, error_y_m) <= squared(bounds->near_m))
+           && (square_sum(desired_x_m_s, desired_y_m_s) <= squared(fastest_m_s));
 }
 
 /* 1 if the target moves at less than A/(2 k), half the speed at which braking ends, along x and y. */
 NMPC_INLINE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t *target)
 {
-    const nmpc_real_t half_m = {{ halved("bounds->knee_m") }};
-    const nmpc_real_t slow_m_s = {{ approach_product("NMPC_APPROACH_1_S", "half_m") }};
+    const nmpc_real_t half_m = halved(bounds->knee_m);
+    const nmpc_real_t slow_m_s = approach_product(NMPC_APPROACH_1_S, half_m);
 
     return (within(target->velocity_m_s[0], slow_m_s) != 0) && (within(target->velocity_m_s[1], slow_m_s) != 0);
 }
@@ -130,12 +132,12 @@ NMPC_INLINE int limits_are_slow(const nmpc_bounds_t *bounds, const nmpc_target_t
 /* Half the width of the fence. */
 NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
 {
-{% if fixed %}
+#if WITH_FIXED
     /* The clamp changes nothing: it tells a proof by intervals how wide the fence is. */
     return clamp(bounds->clear_m[axis] + bounds->margin_m, NMPC_POSITION_RANGE_M);
-{% else %}
+#else
     return bounds->clear_m[axis] + bounds->margin_m;
-{% endif %}
+#endif
 }
 
 /* Put a target outside the fence on the wall, with a velocity that does not lead out. Returns NMPC_LIMIT_FENCE, or 0 if
@@ -152,8 +154,8 @@ NMPC_SHARED unsigned int limits_hold(const nmpc_bounds_t *bounds, nmpc_target_t 
 
         if (within(place_m, half_width_m) == 0) {
             held->position_m[axis] = bounds->centre_m[axis] + clamp(place_m, half_width_m);
-            held->velocity_m_s[axis] =
-                (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0) : larger(velocity_m_s, (nmpc_real_t)0);
+            held->velocity_m_s[axis] = (place_m > (nmpc_real_t)0) ? smaller(velocity_m_s, (nmpc_real_t)0)
+                                                                  : larger(velocity_m_s, (nmpc_real_t)0);
             active = NMPC_LIMIT_FENCE;
         }
     }
@@ -176,7 +178,7 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
         const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
         const nmpc_real_t room_m = half_width_m - (sign * place_m);
         const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
-        nmpc_real_t most_m_s = {{ approach_product("NMPC_APPROACH_1_S", "room_m") }};
+        nmpc_real_t most_m_s = approach_product(NMPC_APPROACH_1_S, room_m);
 
         if (excess_m > (nmpc_real_t)0) {
             most_m_s = braking_speed(braking_square(bounds, excess_m));
@@ -193,8 +195,8 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
 }
 
 /* Set the velocity of `limited`, whose position is the drone's, to v_d within the limits. Returns which of them act. */
-NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds{{ with_fastest }}, int is_clear, const nmpc_target_t *target,
-                                   nmpc_target_t *limited)
+NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, int is_clear,
+                                    const nmpc_target_t *target, nmpc_target_t *limited)
 {
     nmpc_real_t end_m = bounds->knee_m;
     nmpc_target_t held;
@@ -215,40 +217,48 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds{{ with_fastest }
     error_x_m = held.position_m[0] - limited->position_m[0];
     error_y_m = held.position_m[1] - limited->position_m[1];
     square = square_sum(error_x_m, error_y_m);
-    if (square > {{ squared("end_m") | term }}) {
+    if (square > squared(end_m)) {
         const nmpc_root_t root = inverse_root(square);
-        const nmpc_real_t distance_m = {{ "at_most(length(root), 2 * NMPC_POSITION_RANGE_M)" if fixed else "square * root" }};
+#if WITH_FIXED
+        const nmpc_real_t distance_m = at_most(length(root), 2 * NMPC_POSITION_RANGE_M);
+#else
+        const nmpc_real_t distance_m = square * root;
+#endif
         /* Not less than 0, by rounding. */
         const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
-        ratio_1_s = {{ approach_ratio("speed_m_s", "root") }};
+        ratio_1_s = approach_ratio(speed_m_s, root);
         others = NMPC_LIMIT_BRAKING;
     }
-    limited->velocity_m_s[0] = held.velocity_m_s[0] + {{ approach_product("ratio_1_s", "error_x_m") | term }};
-    limited->velocity_m_s[1] = held.velocity_m_s[1] + {{ approach_product("ratio_1_s", "error_y_m") | term }};
+    limited->velocity_m_s[0] = held.velocity_m_s[0] + approach_product(ratio_1_s, error_x_m);
+    limited->velocity_m_s[1] = held.velocity_m_s[1] + approach_product(ratio_1_s, error_y_m);
     if (is_clear == 0) {
         fence |= limits_wall(bounds, limited);
     }
     square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
-    if (square > {{ squared(fastest) | term }}) {
-        const nmpc_real_t share = {{ speed_ratio(fastest, "inverse_root(square)") }};
+    if (square > squared(fastest_m_s)) {
+        const nmpc_real_t share = speed_ratio(fastest_m_s, inverse_root(square));
 
-        limited->velocity_m_s[0] = {{ scaled_velocity("limited->velocity_m_s[0]", "share") }};
-        limited->velocity_m_s[1] = {{ scaled_velocity("limited->velocity_m_s[1]", "share") }};
+        limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
+        limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
-    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], {{ fastest }});
-    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], {{ fastest }});
+    limited->velocity_m_s[0] = clamp(limited->velocity_m_s[0], fastest_m_s);
+    limited->velocity_m_s[1] = clamp(limited->velocity_m_s[1], fastest_m_s);
     return fence + others;
 }
 
-{% if tracker %}
+#if WITH_TRACKER
 /* Take in which limits act now. Where braking ends, what stood for a slow target decelerates no more. */
 NMPC_SHARED void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
 {
-    const unsigned int before = {{ "(unsigned int)self->limited % NMPC_LIMIT_HEIGHT" if height else "self->limited" }};
+#if WITH_HEIGHT
+    const unsigned int before = (unsigned int)self->limited % NMPC_LIMIT_HEIGHT;
+#else
+    const unsigned int before = self->limited;
+#endif
 
     if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(&self->bounds, target) != 0)) {
         tracker_clear(self);
@@ -256,7 +266,7 @@ NMPC_SHARED void limits_change(nmpc_t *self, unsigned int active, const nmpc_tar
     self->limited = (unsigned char)active;
 }
 
-{% endif %}
+#endif
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
  * 0, the target stays as it is, and `limited` is not to be used. */
 NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m[2], const nmpc_target_t *target,
@@ -264,43 +274,46 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const int is_clear = limits_are_clear(bounds, position_m);
-{% if turning %}
+#if WITH_TURNING
     const nmpc_real_t fastest_m_s = limits_turn(bounds, target->velocity_m_s);
-{% endif %}
+#else
+    const nmpc_real_t fastest_m_s = bounds->speed_m_s;
+#endif
     unsigned int active = 0U;
-{% if given %}
+#if WITH_GIVEN
     const nmpc_real_t *velocity_m_s = target->velocity_m_s;
-{% endif %}
+#endif
 
-    if ((is_clear == 0) || (limits_are_free(bounds{{ ", fastest_m_s" if turning }}, position_m, target) == 0)) {
+    if ((is_clear == 0) || (limits_are_free(bounds, fastest_m_s, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
-        active = limits_act(bounds{{ ", fastest_m_s" if turning }}, is_clear, target, limited);
+        active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
-{% if given %}
+#if WITH_GIVEN
     if (active != 0U) {
         int axis;
 
         for (axis = 0; axis < 2; axis++) {
-            const nmpc_sum_t rate_m_s2 = {{ rate_product("NMPC_UPDATES_PER_S", "limited->velocity_m_s[axis] - bounds->velocity_m_s[axis]") }};
+            const nmpc_sum_t rate_m_s2 =
+                rate_product(NMPC_UPDATES_PER_S, limited->velocity_m_s[axis] - bounds->velocity_m_s[axis]);
 
             /* A jump is no acceleration. */
             limited->acceleration_m_s2[axis] =
-                ((rate_m_s2 >= -NMPC_TARGET_LIMIT_M_S2) && (rate_m_s2 <= NMPC_TARGET_LIMIT_M_S2)) ? (nmpc_real_t)rate_m_s2 : (nmpc_real_t)0;
+                ((rate_m_s2 >= -NMPC_TARGET_LIMIT_M_S2) && (rate_m_s2 <= NMPC_TARGET_LIMIT_M_S2))
+                    ? (nmpc_real_t)rate_m_s2
+                    : (nmpc_real_t)0;
         }
         velocity_m_s = limited->velocity_m_s;
     }
     bounds->velocity_m_s[0] = velocity_m_s[0];
     bounds->velocity_m_s[1] = velocity_m_s[1];
-{% endif %}
-{% if tracker %}
+#endif
+#if WITH_TRACKER
     if (active != self->limited) {
         limits_change(self, active, target);
     }
-{% else %}
+#else
     self->limited = (unsigned char)active;
-{% endif %}
+#endif
     return active;
 }
-
-{% include "common/_limits_set.c.j2" %}

@@ -1,0 +1,207 @@
+/* ---- Tracker --------------------------------------------------------------------------------------------------------
+ *
+ * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
+ * steps, which are T_s = NMPC_UPDATE_PERIOD_S apart; tau is a step of the prediction, which is T_s too with a quadratic
+ * cost. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its acceleration, and J_T the
+ * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
+ * predicted one P and the new estimates are
+ *
+ *     M = (tau^2/T_s) (Tv_k - Tv_k-1), or tau^2 a_k where the acceleration a_k is given
+ *     P = A_T(k-1) + J_T(k-1)
+ *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
+ *
+ * with alpha = NMPC_TRACKER_GAIN and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an
+ * optimal set of radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an
+ * acceleration that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays
+ * bounded.
+ */
+
+#if WITH_DOUBTS
+/* Let q be the noise of the target's acceleration, c^2 = NMPC_NOISE_SQUARE, d = (M - P)/(c q), from -1 to 1, and r the
+ * mean over 0.5 s of -d_k d_k-1 where that is more than 0. Of M - P the tracker believes the share s = 1/(1 + c^2 r):
+ * noise reverses its sign from one control step to the next, a corner of the target's path does not. What is not
+ * believed is forgotten: P and J_T(k-1) are multiplied by 1 - NMPC_REVERSAL_SHARE (1 - s)^2. A control step takes one
+ * of Newton's steps to s, s (2 - s (1 + c^2 r)), which needs no division; s falls to a quarter of itself at most. */
+
+#endif
+#if WITH_GIVEN
+/* A given acceleration a_k is limited to 1.5 times what gravity and the tilt limit let the drone follow. In the first
+ * control step A_T is M, and J_T is 0. */
+#else
+/* A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
+ * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are
+ * 0. */
+#endif
+
+#include "tracker.h"
+
+/* Forget the target: no velocity, no acceleration, no jerk. */
+#if WITH_HEIGHT or WITH_LIMITS
+NMPC_SHARED void tracker_clear(nmpc_t *self)
+#else
+static void tracker_clear(nmpc_t *self)
+#endif
+{
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+#if not WITH_GIVEN
+        self->tracker.velocity_m_s[axis] = (nmpc_real_t)0;
+#endif
+        self->tracker.acceleration_m_step2[axis] = (nmpc_real_t)0;
+        self->tracker.jerk_m_step2_update[axis] = (nmpc_real_t)0;
+#if WITH_DOUBTS
+        self->tracker.noise[axis].deviation = (nmpc_real_t)0;
+        self->tracker.noise[axis].reversal = (nmpc_real_t)0;
+        self->tracker.noise[axis].doubt = (nmpc_real_t)0;
+#endif
+    }
+    self->has_target = 0U;
+}
+
+#if WITH_DOUBTS
+/* Take an acceleration M into A_T and J_T, which stay within their limits, and into d, r and 1 - s. */
+NMPC_SHARED void tracker_believe(nmpc_real_t *acceleration_m_step2, nmpc_real_t *jerk_m_step2_update,
+                                 nmpc_noise_t *noise, nmpc_real_t measured_m_step2, nmpc_real_t bound_m_step2,
+                                 nmpc_real_t limit_m_step2_update)
+{
+    const nmpc_real_t predicted_m_step2 = *acceleration_m_step2 + *jerk_m_step2_update;
+    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
+    const nmpc_real_t limited_m_step2 = clamp(difference_m_step2, NMPC_DEVIATION_LIMIT_M_STEP2);
+    const nmpc_real_t latest = noise_product(NMPC_PER_DEVIATION_STEP2_M, limited_m_step2);
+    const nmpc_real_t product = factor_product(latest, noise->deviation);
+    const nmpc_real_t reversed = (product < (nmpc_real_t)0) ? -product : (nmpc_real_t)0;
+    const nmpc_real_t mean =
+        clamp(factor_product(NMPC_REVERSAL_REST, noise->reversal) + factor_product(NMPC_REVERSAL_SHARE, reversed),
+              NMPC_WHOLE);
+    const nmpc_real_t before = NMPC_WHOLE - noise->doubt;
+    const nmpc_real_t weighed = factor_product(before, mean);
+    const nmpc_real_t counted = clamp(weighed, NMPC_MOST_COUNTED);
+    const nmpc_real_t better = factor_product(before, NMPC_TWICE - (before + (NMPC_NOISE_SQUARE * counted)));
+    const nmpc_real_t least = factor_product(NMPC_LEAST_CHANGE, before);
+    const nmpc_real_t limited = (better > NMPC_WHOLE) ? NMPC_WHOLE : better;
+    const nmpc_real_t share = (limited < least) ? least : limited;
+    const nmpc_real_t doubt = NMPC_WHOLE - share;
+    const nmpc_real_t square = factor_product(doubt, doubt);
+    const nmpc_real_t kept = NMPC_WHOLE - factor_product(NMPC_REVERSAL_SHARE, square);
+    const nmpc_real_t believed_m_step2 = factor_product(difference_m_step2, NMPC_WHOLE - doubt);
+
+    noise->deviation = latest;
+    noise->reversal = mean;
+    noise->doubt = doubt;
+    *acceleration_m_step2 = clamp(
+        factor_product(predicted_m_step2, kept) + tracker_product(NMPC_TRACKER_GAIN, believed_m_step2), bound_m_step2);
+    *jerk_m_step2_update =
+        clamp(factor_product(*jerk_m_step2_update, kept) + tracker_product(NMPC_TRACKER_JERK_GAIN, believed_m_step2),
+              limit_m_step2_update);
+}
+
+#endif
+/* Take the acceleration of the target along `axis` in this control step into the estimates. */
+NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t measured_m_step2)
+{
+#if WITH_DOUBTS
+    tracker_believe(&tracker->acceleration_m_step2[axis], &tracker->jerk_m_step2_update[axis], &tracker->noise[axis],
+                    measured_m_step2, NMPC_TARGET_BOUND_M_STEP2, NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+#else
+    const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
+    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
+
+    tracker->acceleration_m_step2[axis] =
+        tracker_product(NMPC_TRACKER_REST, predicted_m_step2) + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
+    tracker->jerk_m_step2_update[axis] =
+        clamp(tracker->jerk_m_step2_update[axis] + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
+              NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+#endif
+}
+
+#if WITH_GIVEN
+/* Take the target's acceleration of this control step into the estimates. */
+NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t acceleration_m_s2[2])
+{
+    nmpc_tracker_t *const tracker = &self->tracker;
+    int axis;
+
+#if not WITH_HEIGHT
+    NMPC_UNROLL
+#endif
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t given_m_s2 = clamp(acceleration_m_s2[axis], NMPC_TARGET_LIMIT_M_S2);
+        const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_S2, given_m_s2);
+
+        if (self->has_target != 0U) {
+            tracker_correct(tracker, axis, measured_m_step2);
+        } else {
+            tracker->acceleration_m_step2[axis] = measured_m_step2;
+            tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
+        }
+    }
+    self->has_target = 1U;
+}
+#else
+/* Take the target's velocity of this control step into the estimates. */
+NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
+{
+    nmpc_tracker_t *const tracker = &self->tracker;
+    int axis;
+
+#if not WITH_HEIGHT
+    NMPC_UNROLL
+#endif
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
+        const int is_steady = within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
+
+        if ((self->has_target != 0U) && (is_steady != 0)) {
+#if WITH_FIXED
+            /* The clamp changes nothing: it tells a proof by intervals how large the change is. */
+            const nmpc_real_t steady_m_s = clamp(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
+
+            tracker_correct(tracker, axis, target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, steady_m_s));
+#else
+            tracker_correct(tracker, axis, target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, change_m_s));
+#endif
+        } else {
+            /* The first velocity, or a jump: the acceleration stays. */
+            tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
+        }
+        tracker->velocity_m_s[axis] = velocity_m_s[axis];
+    }
+    self->has_target = 1U;
+}
+#endif
+
+#if not WITH_GIVEN
+/* The frame has jumped: the target's velocity changes with it, and that is no acceleration. */
+static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[])
+{
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        tracker->velocity_m_s[axis] = clamp(tracker->velocity_m_s[axis] + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
+    }
+}
+
+#endif
+/* The frame has turned: so does the target's acceleration. Where it is estimated, the next velocity of the target is
+ * taken for its first one: there the jerk begins at 0. */
+static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
+{
+    nmpc_tracker_t *const tracker = &self->tracker;
+    int axis;
+
+    turn_vector(tracker->acceleration_m_step2, sine, cosine);
+#if WITH_GIVEN
+    turn_vector(tracker->jerk_m_step2_update, sine, cosine);
+#endif
+    for (axis = 0; axis < 2; axis++) {
+        tracker->acceleration_m_step2[axis] = clamp(tracker->acceleration_m_step2[axis], NMPC_TARGET_BOUND_M_STEP2);
+#if WITH_GIVEN
+        tracker->jerk_m_step2_update[axis] =
+            clamp(tracker->jerk_m_step2_update[axis], NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+#endif
+    }
+#if not WITH_GIVEN
+    self->has_target = 0U;
+#endif
+}
