@@ -1706,7 +1706,7 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
         /* The heading is within its range. */
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the heading is. */
-    next_rad = (next_rad > NMPC_YAW_RANGE_RAD) ? NMPC_YAW_RANGE_RAD
-                                               : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad);
-    return (nmpc_real_t)next_rad;
+    return (nmpc_real_t)((next_rad > NMPC_YAW_RANGE_RAD)
+                             ? NMPC_YAW_RANGE_RAD
+                             : ((next_rad < -NMPC_YAW_RANGE_RAD) ? -NMPC_YAW_RANGE_RAD : next_rad));
 }

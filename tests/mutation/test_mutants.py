@@ -29,7 +29,7 @@ BACKTRACKING = Settings.model_validate(
 )
 CONTROLLER = "nmpc.c"
 ONE_NORM_FAULTS = {
-    "roll accelerates x the other way": ("gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
+    "roll accelerates x the other way": ("gain_x_m_step2_rad[NMPC_ROLL] = sine", "gain_x_m_step2_rad[NMPC_ROLL] = -sine"),
     "the sign of zero is one": ("(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
     "one predicted step too few": ("i < NMPC_HORIZON_PREDICTION; i++)", "i < NMPC_HORIZON_PREDICTION - 1; i++)"),
     "one iteration too many": ("iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
@@ -43,12 +43,12 @@ ONE_NORM_FAULTS = {
     "the cosine of every turn is even": ("*cosine = ((quadrant & 1U) == 0U) ? cosine_rest : sine_rest;", "*cosine = cosine_rest;"),
     "a quarter turn is its first part": (" - (count * NMPC_QUARTER_TURN_REST_RAD);", ";"),
     "each quadrant is the next": ("#define NMPC_ROUNDING 1.2582912e+07f", "#define NMPC_ROUNDING 1.2582913e+07f"),
-    "no lower clamp of a move": ("larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD)", "move_rad - rprop->step_rad"),
+    "no lower clamp of a move": ("larger(move_rad - rprop->step_rad, -limit_rad)", "move_rad - rprop->step_rad"),
     "no backtracking": ("        next_rad = rprop->previous_rad;\n", ""),
     "no first command": ("        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
     "the target accelerates the other way": ("rollout->acceleration_m_step2 - target_acceleration_m_step2", "rollout->acceleration_m_step2 + target_acceleration_m_step2"),
-    "x takes the target's acceleration along y": ("&prediction->x, target_acceleration_m_step2[0]", "&prediction->x, target_acceleration_m_step2[1]"),
-    "the acceleration does not displace the target": ("        - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", "        - (nmpc_real_t)0;"),
+    "x takes the target's acceleration along y": ("&prediction->x, self->tracker.acceleration_m_step2[0]", "&prediction->x, self->tracker.acceleration_m_step2[1]"),
+    "the acceleration does not displace the target": (" - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", " - (nmpc_real_t)0;"),
     "the first velocity is an acceleration": ("(self->has_target != 0U) && ", ""),
     "a jump is an acceleration": ("&& (is_steady != 0)", ""),
     "a jump keeps the jerk": ("tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;\n        }", "}"),

@@ -32,7 +32,7 @@ from tests.support.tools import require
 CONTROLLER, DRIVER = "nmpc.c", "proof/nmpc_proof.c"
 ROLL = Alarm(DRIVER, "roll_is_within_the_limit", "user assertion")
 UNINITIALISED = Harm(CONTROLLER, r"    self->cost = \(nmpc_sum_t\)0;\n", "")
-UNLIMITED = Harm(CONTROLLER, r"larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1")
+UNLIMITED = Harm(CONTROLLER, r"larger\((move_rad - [^,]*), -limit_rad\)", r"\1")
 FAULTS = {
     "NaN passes a range check": Fault(
         "refuse_nan",
@@ -80,7 +80,7 @@ FAULTS = {
     ),
     "a reset is not clamped": Fault(
         "take_numbers",
-        Harm(CONTROLLER, r"clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"),
+        Harm(CONTROLLER, r"clamp\(command->pitch_rad, tilt_limit\(self\)\)", "command->pitch_rad"),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
     ),
     "one move too many": Fault(
@@ -122,7 +122,7 @@ FIXED_FAULTS = {
     "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
     "a rest that does not fit": Fault(
         "turn_everywhere",
-        Harm(CONTROLLER, r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
+        Harm(CONTROLLER, r"NMPC_ROUNDED\(fine_rad, NMPC_FINE_BITS - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
         Alarm(CONTROLLER, "NMPC_ROUNDED(fine_rad, 8)", "signed_downcast"),
     ),
 }
