@@ -51,9 +51,10 @@ static void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2
 
 /* Whatever reads a target also calls this. */
 /*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
-    assigns \result \from *bounds, position_m[0 .. 1], *target;
+    assigns \result \from *bounds, fastest_m_s, position_m[0 .. 1], *target;
 */
-static int limits_are_free(const nmpc_bounds_t *bounds, const nmpc_real_t position_m[2], const nmpc_target_t *target);
+static int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t fastest_m_s, const nmpc_real_t position_m[2],
+                           const nmpc_target_t *target);
 
 /* More than 1/sqrt(x) for any x that is a square of a speed or of a distance beyond the knee. */
 #define ROOT_LIMIT 63245.555f
