@@ -62,8 +62,7 @@ typedef struct {
     ...;
 } nmpc_t;
 nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
-void predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, TRACKER_ARGUMENT nmpc_real_t,
-                            nmpc_prediction_t *);
+void predictor_prepare(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t);
 void predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
                                 nmpc_rollout_t *);
 void predictor_step(nmpc_rollout_t *);
@@ -108,7 +107,6 @@ _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "
     "jerk_m_step2_update[2]; ...; } nmpc_tracker_t;",
     "TRACKER_MEMBERS": "nmpc_tracker_t tracker; unsigned char has_target;",
-    "TRACKER_ARGUMENT": "const nmpc_real_t *,",
     "TRACKER_FUNCTIONS": "void tracker_clear(nmpc_t *);\nvoid tracker_update(nmpc_t *, const nmpc_real_t *);",
 }
 """What the declarations of a bundle with a tracker have besides."""

@@ -96,7 +96,8 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
     predictor = Predictor(blocks.method, blocks.products)
     limits, quantize, computed = blocks.method.limits, blocks.numbers.quantize, blocks.computed
     rng = np.random.default_rng(index)
-    prediction, controller = ffi.new("nmpc_prediction_t *"), ffi.new("nmpc_t *")
+    controller = ffi.new("nmpc_t *")
+    prediction = ffi.addressof(controller, "prediction")
 
     for _ in range(50):
         state = quantize(rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10], STATE)
@@ -115,12 +116,13 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         expected = predictor.prepare(
             given[0], given[1], given[2], None if acceleration is None else computed(acceleration)
         )
+        if acceleration is not None:
+            controller.tracker.acceleration_m_step2 = acceleration[0].tolist()
         lib.predictor_prepare(
+            controller,
             blocks.pointer("nmpc_state_t", state),
             blocks.pointer("nmpc_target_t", target),
-            *([] if acceleration is None else [blocks.pointer("nmpc_real_t", acceleration)]),
             thrust[0],
-            prediction,
         )
         gains = [blocks.unpack(prediction.gain_x_m_step2_rad), blocks.unpack(prediction.gain_y_m_step2_rad)]
         members = ("error_m", "displacement_m_step", "acceleration_m_step2")
@@ -140,7 +142,6 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
                 errors[0].astype(blocks.scalar)
             )
 
-        controller.prediction = prediction[0]
         controller.weights = blocks.pointer("nmpc_weights_t", weights)[0]
         controller.command_rad = last[0].tolist()
         controller.plan_rad = moves.ravel().tolist()

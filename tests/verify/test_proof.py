@@ -122,7 +122,11 @@ FIXED_FAULTS = {
     "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
     "a rest that does not fit": Fault(
         "turn_everywhere",
-        Harm(CONTROLLER, r"NMPC_ROUNDED\(fine_rad, NMPC_FINE_BITS - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
+        Harm(
+            CONTROLLER,
+            r"NMPC_ROUNDED\(fine_rad, NMPC_FINE_BITS - NMPC_SINE_BITS\)",
+            "NMPC_ROUNDED(fine_rad, 8)",
+        ),
         Alarm(CONTROLLER, "NMPC_ROUNDED(fine_rad, 8)", "signed_downcast"),
     ),
 }
