@@ -22,6 +22,7 @@ SOURCES: Final = (
     "bundle/episodes.py",
     "methods",
     "numbers",
+    "port",
     "settings",
 )
 """Files and folders of this package whose source determines the results."""

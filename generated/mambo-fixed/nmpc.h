@@ -198,7 +198,8 @@ typedef struct {
  * version may have more members. */
 typedef struct {
     nmpc_real_t speed_m_s;      /* NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S */
-    nmpc_real_t braking_m_s2;   /* NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives; has NMPC_BRAKING_BITS */
+    /* NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives; has NMPC_BRAKING_BITS */
+    nmpc_real_t braking_m_s2;
     nmpc_real_t fence_min_m[2]; /* the walls at the least x and y, */
     nmpc_real_t fence_max_m[2]; /* and at the largest; all within +/- NMPC_POSITION_RANGE_M */
     nmpc_real_t tilt_rad;       /* at most NMPC_TILT_LIMIT_RAD */
@@ -332,14 +333,14 @@ typedef struct {
 
 /* What follows from the limits, for the law in nmpc.c. */
 typedef struct {
-    nmpc_real_t centre_m[2];  /* of the fence, x and y */
-    nmpc_real_t clear_m[2];   /* half the width of the fence less the margin; may be less than 0 */
-    nmpc_real_t margin_m;     /* a wall that is farther limits nothing */
-    nmpc_real_t knee_m;       /* the distance up to which f is linear */
-    nmpc_real_t near_m;       /* the distance from a slow target at which braking ends */
-    nmpc_real_t speed_m_s;    /* V */
-    nmpc_real_t braking_m_s2; /* 2 A */
-    nmpc_real_t tilt_rad;     /* the tilt limit */
+    nmpc_real_t centre_m[2];        /* of the fence, x and y */
+    nmpc_real_t clear_m[2];         /* half the width of the fence less the margin; may be less than 0 */
+    nmpc_real_t margin_m;           /* a wall that is farther limits nothing */
+    nmpc_real_t knee_m;             /* the distance up to which f is linear */
+    nmpc_real_t near_m;             /* the distance from a slow target at which braking ends */
+    nmpc_real_t speed_m_s;          /* V */
+    nmpc_real_t braking_m_s2;       /* 2 A */
+    nmpc_real_t tilt_rad;           /* the tilt limit */
     nmpc_real_t command_m_step2[2]; /* the largest |u| at that limit, right and forward */
 } nmpc_bounds_t;
 

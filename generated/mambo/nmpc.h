@@ -304,14 +304,14 @@ typedef struct {
 
 /* What follows from the limits, for the law in nmpc.c. */
 typedef struct {
-    nmpc_real_t centre_m[2];  /* of the fence, x and y */
-    nmpc_real_t clear_m[2];   /* half the width of the fence less the margin; may be less than 0 */
-    nmpc_real_t margin_m;     /* a wall that is farther limits nothing */
-    nmpc_real_t knee_m;       /* the distance up to which f is linear */
-    nmpc_real_t near_m;       /* the distance from a slow target at which braking ends */
-    nmpc_real_t speed_m_s;    /* V */
-    nmpc_real_t braking_m_s2; /* 2 A */
-    nmpc_real_t tilt_rad;     /* the tilt limit */
+    nmpc_real_t centre_m[2];        /* of the fence, x and y */
+    nmpc_real_t clear_m[2];         /* half the width of the fence less the margin; may be less than 0 */
+    nmpc_real_t margin_m;           /* a wall that is farther limits nothing */
+    nmpc_real_t knee_m;             /* the distance up to which f is linear */
+    nmpc_real_t near_m;             /* the distance from a slow target at which braking ends */
+    nmpc_real_t speed_m_s;          /* V */
+    nmpc_real_t braking_m_s2;       /* 2 A */
+    nmpc_real_t tilt_rad;           /* the tilt limit */
     nmpc_real_t command_m_step2[2]; /* the largest |u| at that limit, right and forward */
 } nmpc_bounds_t;
 

@@ -241,9 +241,9 @@ const char *nmpc_version(void);
  * angle. This is its state along one axis, x or y, at one prediction step; nmpc.c derives the recurrence.
  * As m_s2 is m/s^2, m_step is m/tau, m_step2 is m/tau^2, and m_step2_rad is m/tau^2 per radian. */
 typedef struct {
-    nmpc_real_t error_m;               /* e = r - Tp, of eqs 9 and 11 */
-    nmpc_real_t displacement_m_step;   /* d: change of the error over the next prediction step */
-    nmpc_real_t acceleration_m_step2;  /* A: tau^2 times eq 8 */
+    nmpc_real_t error_m;              /* e = r - Tp, of eqs 9 and 11 */
+    nmpc_real_t displacement_m_step;  /* d: change of the error over the next prediction step */
+    nmpc_real_t acceleration_m_step2; /* A: tau^2 times eq 8 */
 } nmpc_rollout_t;
 
 /* What does not change while the plan of a control step is optimized. */

@@ -65,8 +65,8 @@ def limits_context(method: Method) -> dict[str, object]:
 
 def _bounds(method: Method, stored: list[str]) -> list[dict[str, str]]:
     """Return name and initial value of each member of nmpc_bounds_t, whose numbers are `stored`."""
-    left, members = iter(stored), method.bounds_members.items()
-    values = {name: [next(left) for _ in range(count)] for name, count in members}
+    left, port = iter(stored), method.port
+    values = {row.member: [next(left) for _ in range(port.count(row))] for row in port.rows("bounds")}
     return [
         {"name": name, "value": f"{{ {', '.join(value)} }}" if len(value) > 1 else value[0]}
         for name, value in values.items()

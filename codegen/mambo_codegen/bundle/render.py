@@ -210,8 +210,9 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             **limits_context(method),
             "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
             "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
-            "state_members": method.state_members,
-            "limits_members": method.limits_members,
+            "port": method.port,
+            "state_members": [one.member for one in method.port.numbers("state")],
+            "limits_members": [one.member for one in method.port.numbers("limits")],
             "fuzz_target": _target_inputs(method, len(method.state)),
             "proof_target": _target_inputs(method, len(method.state) - method.has_height),
             "level_columns": len(method.level_target),
@@ -263,7 +264,10 @@ def _target_inputs(method: Method, first: int) -> list[tuple[str, int]]:
     Without a height the thrust stands between velocity and acceleration.
     """
     thrust = len(TARGET) if not method.has_height else math.inf
-    return [(name, first + k + (k >= thrust)) for k, name in enumerate(method.target_members)]
+    return [
+        (name, first + k + (k >= thrust))
+        for k, name in enumerate(one.member for one in method.port.numbers("target"))
+    ]
 
 
 def _settings_id(settings: Settings) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.methods.shared.proofs import FIXED_PROOFS, with_limits
+from mambo_codegen.port.row import BYTE, NUMBER, SUM
 from mambo_codegen.settings.key import Refusal
 
 
@@ -181,9 +182,14 @@ class Method(Constants):
         """What a control step costs: predicted states per iteration, and iterations."""
 
     @property
-    @abstractmethod
     def instance_bytes(self) -> int:
         """The size of nmpc_t: its numbers, sums and single bytes, with padding."""
+        number_bytes, sum_bytes = self.numbers.bytes
+        numbers, sums, flags = (
+            sum(1 for _ in self.port.kept("controller", kind)) for kind in (NUMBER, SUM, BYTE)
+        )
+        unit = sum_bytes if sums else number_bytes
+        return _padded(_padded(numbers * number_bytes, unit) + (sums * sum_bytes) + flags, unit)
 
     @property
     @abstractmethod
@@ -211,3 +217,8 @@ class Method(Constants):
     def linear_law(self) -> LinearLaw | None:
         """The law in control terms; None for a method whose commands are not linear in the state."""
         return None
+
+
+def _padded(count: int, unit: int) -> int:
+    """Return the next multiple of `unit`."""
+    return -(-count // unit) * unit

@@ -170,7 +170,8 @@ def test_members_of_structures_are_those_of_the_header(name: str) -> None:
             for member, lengths in declared(header, structure).items()
             for place in product(*map(range, lengths))
         ]
-        assert getattr(method, f"{structure}_members") == tuple(elements)
+        assert [number.member for number in method.port.numbers(structure)] == elements
     if method.has_limits:
         counts = {member: prod(lengths) for member, lengths in declared(header, "bounds").items()}
-        assert list(method.bounds_members.items()) == list(counts.items())
+        port = method.port
+        assert {row.member: port.count(row) for row in port.rows("bounds")} == counts

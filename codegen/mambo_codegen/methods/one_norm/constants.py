@@ -9,10 +9,9 @@ from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import (
     ONE_NORM_OUTAGE_S,
     LimitsConstants,
-    one_norm_limits,
-    stored_quantities,
+    limits_constants,
 )
-from mambo_codegen.numbers.representation import WEIGHT_LIMIT
+from mambo_codegen.numbers.representation import COMMAND, WEIGHT_LIMIT
 
 
 class OneNormConstants(Constants):
@@ -34,10 +33,30 @@ class OneNormConstants(Constants):
         return one_norm_limits(self.settings)
 
     @property
+    def parts(self) -> frozenset[str]:
+        """The parts that the controller has, by the names in the rows of the port."""
+        return super().parts | ({"lag"} if self.tables.has_lag else set())
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The constants of nmpc.h that are sizes of arrays."""
+        return super().sizes | {"NMPC_MOVES": len(COMMAND) * self.settings.horizon.control}
+
+    @property
+    def names(self) -> dict[str, str]:
+        """What depends on the settings in the words of the port's rows."""
+        has_lag = self.tables.has_lag
+        return {
+            "at_moves": ", at the moves" if has_lag else "",
+            "less_target": ", less A_T" if self.tracker else "",
+            "tilt": "the measured phi_k, theta_k" if has_lag else "0, as eq 8 uses only the moves",
+            "first_moves": "first moves" if self.feedback_steps else "command",
+        }
+
+    @property
     def limits_stored(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_bounds_t, in their order."""
-        given = self.tracker is not None and self.tracker.is_given
-        return stored_quantities(*["velocity"] * (5 if given else 3))
+        return self.port.quantities("bounds")
 
     @property
     def outage_steps(self) -> int | None:

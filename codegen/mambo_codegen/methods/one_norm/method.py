@@ -100,21 +100,6 @@ class OneNorm(OneNormConstants, Method):
         return horizon.prediction * horizon.control, self.settings.optimizer.iterations
 
     @property
-    def instance_bytes(self) -> int:
-        """The size of nmpc_t: its numbers, sums and single bytes, with padding."""
-        number_bytes, sum_bytes = self.numbers.bytes
-        moves = 2 * self.settings.horizon.control
-        weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if self.tables.has_lag else 3), 2
-        tracker, flags = (4 if self.tracker.is_given else 6, 3) if self.tracker else (0, 2)
-        if self.feedback_steps:
-            command, flags = command + 4, flags + 1
-        if self.limiting:
-            command, flags = command + len(self.limits_stored), flags + 2
-        numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
-        before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
-        return -(-(before_flags + flags) // sum_bytes) * sum_bytes
-
-    @property
     def context(self) -> dict[str, object]:
         """What only the templates of the 1-norm insert."""
         settings = self.settings

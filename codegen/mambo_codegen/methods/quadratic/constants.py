@@ -14,8 +14,9 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
 )
 from mambo_codegen.methods.quadratic.tilt_gain_constants import TiltGainConstants, tilt_gain_constants
 from mambo_codegen.methods.shared.constants import Constants
-from mambo_codegen.methods.shared.limits_constants import LimitsConstants, stored_quantities
+from mambo_codegen.methods.shared.limits_constants import LimitsConstants
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
+from mambo_codegen.port.row import NUMBER
 
 
 class QuadraticConstants(Constants):
@@ -76,36 +77,22 @@ class QuadraticConstants(Constants):
         return formats(self.settings)
 
     @property
+    def parts(self) -> frozenset[str]:
+        """The parts that the controller has, by the names in the rows of the port."""
+        tells_noise = self.tracker is not None and self.tracker.noise is not None
+        learnt = {f"learns_{self.height.learn}"} if self.height else set()
+        return super().parts | {"quadratic"} | learnt | ({"doubts"} if tells_noise else set())
+
+    @property
+    def names(self) -> dict[str, str]:
+        """What depends on the settings in the words of the port's rows."""
+        gain = self.height.thrust_gain if self.height else 1.0
+        return {
+            "over_gain": "" if gain == 1 else f" / {gain}",
+            "expected": "commanded" if gain == 1 else "expected",
+        }
+
+    @property
     def stored(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_t, in their order."""
-        observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
-        attitude = [*["acceleration"] * 8, *["sine"] * 2]
-        attitude += [*["acceleration"] * 8, *["factor"] * 2] if self.tilt_gain else []
-        tracker = [quantity for quantity in self._stored_tracker for _ in "xy"]
-        limiting = stored_quantities("move", "move")
-        if self.settings.target.gives_acceleration:
-            limiting += ("velocity", "velocity")
-        height = self._stored_height
-        if self.height:
-            limiting += ("position",) * 4
-        tilt = ["angle"] * 2 if self.feedback_steps else []
-        guard = ["angle"] * 2 if self.guard else []
-        return (*observer, *attitude, *tracker, *height, *limiting, *tilt, *guard, "angle", "angle")
-
-    @property
-    def _stored_tracker(self) -> tuple[str, ...]:
-        """The quantity of each number that a tracker stores along an axis, in their order."""
-        if self.tracker is None:
-            return ()
-        velocity = () if self.tracker.is_given else ("velocity",)
-        return (*velocity, "acceleration", "acceleration", *(("factor",) * 3 if self.tracker.noise else ()))
-
-    @property
-    def _stored_height(self) -> tuple[str, ...]:
-        """The quantity of each number in nmpc_height_t, in their order."""
-        if self.height is None:
-            return ()
-        learnt = {"gain": ["factor"], "acceleration": ["acceleration"], "none": []}[self.height.learn]
-        commands = ["thrust"] * (3 if self.guard else 1)
-        moved = [*["acceleration"] * 3, "factor", *commands]
-        return ("position", "speed", *learnt, *moved, *self._stored_tracker)
+        return tuple(row.quantity for row in self.port.kept("controller", NUMBER))

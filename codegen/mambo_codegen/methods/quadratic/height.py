@@ -414,7 +414,7 @@ class HeightAxis:
         return products.move_acceleration(move)
 
     def stored(self, state: HeightState) -> list[NDArray[Any]]:
-        """Return the columns (n, 1) of nmpc_height_t, in the order of `stored_quantities`."""
+        """Return the columns (n, 1) of nmpc_height_t, in their order."""
         columns = [state.height_m, state.velocity_m_step]
         columns += [state.gain] if self._found.learns_gain else []
         columns += [state.disturbance_m_step2] if self._found.learns_acceleration else []

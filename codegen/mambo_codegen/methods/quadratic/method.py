@@ -114,13 +114,6 @@ class Quadratic(QuadraticConstants, Method):
         return _WORK
 
     @property
-    def instance_bytes(self) -> int:
-        """The size of nmpc_t: its numbers and single bytes, with padding."""
-        number_bytes, _ = self.numbers.bytes
-        flags = 2 + sum(part is not None for part in (self.tracker, self.guard))
-        return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
-
-    @property
     def outage_steps(self) -> int:
         """Control steps without a good state over which the observer predicts."""
         return self.observer.outage_steps

@@ -12,20 +12,15 @@ from mambo_codegen.methods.shared.rate_feedback import feedback_steps
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import Formats
 from mambo_codegen.numbers.representation import (
-    ACCELERATION,
     ATTITUDE_LIMIT_RAD,
     COMMAND,
-    CONTACT,
-    HEIGHT,
-    STATE,
-    TARGET,
-    THRUST,
     WEIGHTS,
     YAW_LIMIT_RAD,
     InputLimits,
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
+from mambo_codegen.port.port import Port
 from mambo_codegen.settings.sections import Sections
 
 
@@ -95,69 +90,63 @@ class Constants(ABC):
         return self.settings.observer is not None and self.settings.observer.tilt_gain == "learnt"
 
     @property
+    def parts(self) -> frozenset[str]:
+        """The parts that the controller has, by the names in the rows of the port."""
+        limiting, tracker = self.limiting, self.tracker
+        parts = {
+            "feedback": self.feedback_steps is not None,
+            "fixed": self.settings.code.scalar == "fixed",
+            "given": self.settings.target.gives_acceleration,
+            "guard": self.guard is not None,
+            "height": self.has_height,
+            "limits": limiting is not None,
+            "measured": tracker is not None and not tracker.is_given,
+            "tilt_gain": self.learns_tilt_gain,
+            "tracker": tracker is not None,
+            "turning": limiting is not None and limiting.turn_m_s_rad is not None,
+        }
+        return frozenset(name for name, is_there in parts.items() if is_there)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The constants of nmpc.h that are sizes of arrays."""
+        return {"NMPC_ANGLES": len(COMMAND)}
+
+    @property
+    @abstractmethod
+    def names(self) -> dict[str, str]:
+        """What depends on the settings in the words of the port's rows."""
+
+    @cached_property
+    def port(self) -> Port:
+        """What the controller takes, gives and keeps."""
+        return Port(self.settings.cost.norm, self.parts, self.sizes, self.names)
+
+    @property
     def state(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_state_t, in their order."""
-        return (*STATE, *HEIGHT, *CONTACT) if self.has_height else STATE
+        return self.port.quantities("state")
 
     @property
     def level_target(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_target_t but the height's, in their order."""
-        return (*TARGET, *ACCELERATION) if self.settings.target.gives_acceleration else TARGET
+        return tuple(one.quantity for one in self.port.numbers("target") if "height" not in one.row.when)
 
     @property
     def target(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_target_t, in their order."""
-        level = self.level_target
-        if not self.has_height:
-            return level
-        upward = THRUST if len(level) > len(TARGET) else ()
-        return (*level, *HEIGHT, *upward)
+        return self.port.quantities("target")
 
     @property
     def command(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_command_t, in their order."""
-        return (*COMMAND, *THRUST) if self.has_height else COMMAND
+        return self.port.quantities("command")
 
     @property
     def shift(self) -> tuple[str, ...]:
         """The quantity of each number that nmpc_shift reads, in their order."""
         axes = 3 if self.has_height else 2
         return (*["position"] * axes, *["velocity"] * axes, "yaw")
-
-    @property
-    def state_members(self) -> tuple[str, ...]:
-        """The members of nmpc_state_t, arrays by element, in the order of their numbers; likewise below."""
-        level = (*_pairs("position_m", "velocity_m_s"), "roll_rad", "pitch_rad", "yaw_rad")
-        return (*level, "height_m", "climb_m_s", "grounded") if self.has_height else level
-
-    @property
-    def target_members(self) -> tuple[str, ...]:
-        """The members of nmpc_target_t."""
-        is_given = self.settings.target.gives_acceleration
-        level = _pairs("position_m", "velocity_m_s", *(("acceleration_m_s2",) if is_given else ()))
-        upward = ("height_m", "climb_m_s", *(("climb_acceleration_m_s2",) if is_given else ()))
-        return (*level, *upward) if self.has_height else level
-
-    @property
-    def limits_members(self) -> tuple[str, ...]:
-        """The members of nmpc_limits_t."""
-        level = ("speed_m_s", "braking_m_s2", *_pairs("fence_min_m", "fence_max_m"), "tilt_rad")
-        return (*level, "floor_m", "ceiling_m", "climb_m_s", "descent_m_s") if self.has_height else level
-
-    @property
-    def bounds_members(self) -> dict[str, int]:
-        """The members of nmpc_bounds_t, and how many numbers each holds."""
-        is_given = self.settings.target.gives_acceleration
-        is_turning = self.limiting is not None and self.limiting.turn_m_s_rad is not None
-        return {
-            "centre_m": 2,
-            "clear_m": 2,
-            **dict.fromkeys(("margin_m", "knee_m", "near_m", "speed_m_s", "braking_m_s2", "tilt_rad"), 1),
-            **({"command_m_step2": 2} if self.settings.cost.norm == "quadratic" else {}),
-            **({"velocity_m_s": 2} if is_given else {}),
-            **({"target_m_s": 2, "turn_m2_s2": 1} if is_turning else {}),
-            **(dict.fromkeys(("floor_m", "ceiling_m", "up_m", "down_m"), 1) if self.has_height else {}),
-        }
 
     @cached_property
     def numbers(self) -> Representation:
@@ -190,7 +179,3 @@ class Constants(ABC):
         """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` in fixed point."""
         bits = self.numbers.bits
         return trigonometry(self.settings.code.scalar) if bits is None else fixed_trigonometry(bits["yaw"])
-
-
-def _pairs(*names: str) -> tuple[str, ...]:
-    return tuple(f"{name}[{axis}]" for name in names for axis in range(2))

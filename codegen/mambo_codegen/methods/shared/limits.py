@@ -344,7 +344,7 @@ class LimitsLaw:
         return rows
 
     def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
-        """Return the columns of nmpc_bounds_t, in the order of `stored_quantities`."""
+        """Return the columns of nmpc_bounds_t, in their order."""
         bounds = memory.bounds
         columns = [bounds.centre_m, bounds.clear_m]
         columns += [

@@ -195,11 +195,6 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
     }
 
 
-def stored_quantities(*command: str) -> tuple[str, ...]:
-    """Return the quantity of each number in nmpc_bounds_t; `command` are the command limits'."""
-    return (*["position"] * 7, "velocity", "braking", "angle", *command)
-
-
 def _height_limits(settings: Sections) -> tuple[float, ...]:
     """Return floor, ceiling, climb and descent; none without a height."""
     height, fence, reach_m = settings.height, settings.limits.fence, settings.ranges.position_m

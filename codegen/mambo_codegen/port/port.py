@@ -1,0 +1,131 @@
+"""The port of one controller: the rows of the table that its settings leave, as the lists others read."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+from mambo_codegen.port.row import NUMBER, WHOLE, Number, Row
+from mambo_codegen.port.tables import KEPT, TAKEN, Table
+
+RANGES: Final = {
+    "position": "NMPC_POSITION_RANGE_M",
+    "velocity": "NMPC_VELOCITY_RANGE_M_S",
+    "angle": "NMPC_ATTITUDE_RANGE_RAD",
+    "yaw": "NMPC_YAW_RANGE_RAD",
+    "thrust": "NMPC_THRUST_ACCELERATION_MAX_M_S2",
+}
+"""The largest magnitude of what a controller takes, in C, by quantity."""
+_CHECKED: Final = ("state", "target")
+"""The records whose comments tell the ranges."""
+_NAMED_BITS: Final = {name: f"NMPC_{name.upper()}_BITS" for name in ("thrust", "braking", "factor")}
+"""The formats that a unit does not tell."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of a struct of nmpc.h: its type, its name with the size of an array, and its comment."""
+
+    kind: str
+    name: str
+    comment: str
+
+    @property
+    def width(self) -> int:
+        """The characters before the comment."""
+        return len(f"{self.kind} {self.name};")
+
+
+@dataclass(frozen=True)
+class Port:
+    """What one controller takes, gives and keeps.
+
+    norm:  its `cost.norm`.
+    parts: the parts that it has.
+    sizes: the constants of nmpc.h that are sizes.
+    names: what stands in braces in the words of rows.
+    """
+
+    norm: str
+    parts: frozenset[str]
+    sizes: Mapping[str, int] = field(hash=False)
+    names: Mapping[str, str] = field(hash=False)
+
+    @cached_property
+    def _table(self) -> Table:
+        table = TAKEN | KEPT[self.norm]
+        return {name: tuple(row for row in rows if self.has(row)) for name, rows in table.items()}
+
+    def has(self, row: Row) -> bool:
+        """Return whether a row is there."""
+        return self.parts.issuperset(row.when)
+
+    def rows(self, record: str) -> tuple[Row, ...]:
+        """Return the rows of a record."""
+        return self._table[record]
+
+    def count(self, row: Row) -> int:
+        """Return how many numbers, or records, a row is."""
+        return row.count if isinstance(row.count, int) else self.sizes[row.count]
+
+    def kept(self, record: str, *kinds: str) -> Iterator[Row]:
+        """Yield the row of each single member of some kinds in a record and in the records inside."""
+        for row in self.rows(record):
+            for _ in range(self.count(row)):
+                if row.kind in self._table:
+                    yield from self.kept(row.kind, *kinds)
+                elif row.kind in kinds:
+                    yield row
+
+    def numbers(self, record: str) -> tuple[Number, ...]:
+        """Return the numbers of a record without records inside, integers too."""
+        found: list[Number] = []
+        for row in self.rows(record):
+            for axis in range(self.count(row)):
+                member = row.member if self.count(row) == 1 else f"{row.member}[{axis}]"
+                found.append(Number(row, axis, member, len(found)))
+        return tuple(found)
+
+    def reals(self, record: str) -> tuple[Number, ...]:
+        """Return the same less the integers, which come last."""
+        return tuple(number for number in self.numbers(record) if number.row.kind == NUMBER)
+
+    def wholes(self, record: str) -> tuple[Number, ...]:
+        """Return the integers."""
+        return tuple(number for number in self.numbers(record) if number.row.kind == WHOLE)
+
+    def quantities(self, record: str) -> tuple[str, ...]:
+        """Return the quantity of each number of a record."""
+        return tuple(number.quantity for number in self.numbers(record))
+
+    def members(self, record: str, number: str = NUMBER) -> list[Member]:
+        """Return the members of a record's struct, whose numbers have the type `number`."""
+        return [
+            Member(
+                number
+                if row.kind == NUMBER
+                else f"nmpc_{row.kind}_t"
+                if row.kind in self._table
+                else row.kind,
+                row.member if row.count == 1 else f"{row.member}[{row.count}]",
+                self._comment(record, row) if number == NUMBER else row.unit,
+            )
+            for row in self.rows(record)
+        ]
+
+    def _type(self, row: Row, number: str) -> str:
+        """Return the type of a member in C."""
+        if row.kind == NUMBER:
+            return number
+        return f"nmpc_{row.kind}_t" if row.kind in self._table else row.kind
+
+    def _comment(self, record: str, row: Row) -> str:
+        """Return the comment of a member."""
+        range_of = RANGES.get(row.quantity) if record in _CHECKED else None
+        words = [row.words.format_map(self.names)] if row.words else []
+        if range_of:
+            words.append(f"within +/- {range_of}{row.note}")
+        if record in TAKEN and "fixed" in self.parts and row.quantity in _NAMED_BITS:
+            words.append(f"has {_NAMED_BITS[row.quantity]}")
+        told = "; ".join(words)
+        return f"{told}, {row.unit}" if row.unit else told

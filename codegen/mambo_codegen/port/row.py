@@ -1,0 +1,54 @@
+"""A row of the port: what everything that lists the numbers of a controller has to know of one of them."""
+
+from dataclasses import dataclass
+from typing import Final
+
+NUMBER: Final = "nmpc_real_t"
+SUM: Final = "nmpc_sum_t"
+BYTE: Final = "unsigned char"
+WHOLE: Final = "int"
+"""The types of members in C; any other is a record of the table."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A member of a record: a number, several of one kind, or a record inside it.
+
+    member:   its name in C, with the unit.
+    quantity: what fixed point has a format for; none of a record or of an integer that is kept.
+    words:    what it is, for its comment in nmpc.h; NAMES in braces stand for what depends on the settings.
+    count:    how many there are: 2 along x and y; or the constant of nmpc.h that says it.
+    when:     the parts of the controller without which it is not there.
+    kind:     its type in C: NUMBER, SUM, BYTE, WHOLE, or the record that it is.
+    unit:     where the name has none.
+    note:     what its comment says behind the range.
+    """
+
+    member: str
+    quantity: str = ""
+    words: str = ""
+    count: int | str = 1
+    when: tuple[str, ...] = ()
+    kind: str = NUMBER
+    unit: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A single number of a record.
+
+    member: in C, such as position_m[1].
+    axis:   its place in the row.
+    column: its place among the numbers of the record.
+    """
+
+    row: Row
+    axis: int
+    member: str
+    column: int
+
+    @property
+    def quantity(self) -> str:
+        """What fixed point has a format for."""
+        return self.row.quantity

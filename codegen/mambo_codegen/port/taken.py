@@ -1,0 +1,88 @@
+"""The rows of what a controller takes and gives: state, target, command, estimate, limits and weights."""
+
+from typing import Final
+
+from mambo_codegen.port.row import WHOLE, Row
+
+_HEIGHT: Final = ("height",)
+
+STATE: Final = (
+    Row("position_m", "position", "x north, y east", 2),
+    Row("velocity_m_s", "velocity", "v_x, v_y", 2),
+    Row("roll_rad", "angle", "phi"),
+    Row("pitch_rad", "angle", "theta"),
+    Row("yaw_rad", "yaw", "psi", note=", wrapped or not"),
+    Row("height_m", "position", "up", when=_HEIGHT),
+    Row("climb_m_s", "velocity", "up", when=_HEIGHT),
+    Row("grounded", "whole", "1 while the drone touches the floor, else 0", when=_HEIGHT, kind=WHOLE),
+)
+
+TARGET: Final = (
+    Row("position_m", "position", "Tp_k = x_ref, y_ref", 2),
+    Row("velocity_m_s", "velocity", "Tv_k = vx_ref, vy_ref", 2),
+    Row("acceleration_m_s2", "thrust", "", 2, when=("given",)),
+    Row("height_m", "position", "up", when=_HEIGHT),
+    Row("climb_m_s", "velocity", "up", when=_HEIGHT),
+    Row("climb_acceleration_m_s2", "thrust", "up", when=("height", "given")),
+)
+
+COMMAND: Final = (
+    Row("roll_rad", "angle", "phi*"),
+    Row("pitch_rad", "angle", "theta*"),
+    Row(
+        "thrust_m_s2",
+        "thrust",
+        "thrust over mass{over_gain}, from NMPC_THRUST_MIN_M_S2 to NMPC_THRUST_MAX_M_S2",
+        when=_HEIGHT,
+    ),
+)
+
+ESTIMATE: Final = (
+    Row("position_m", "position", "x, y", 2),
+    Row("velocity_m_s", "velocity", "v_x, v_y", 2),
+    Row("disturbance_m_s2", "disturbance", "acceleration that tilt and drag do not explain", 2),
+    Row("height_m", "position", when=_HEIGHT),
+    Row("climb_m_s", "velocity", when=_HEIGHT),
+    Row("thrust_gain", "factor", "delivered over {expected} thrust, as learnt", when=("learns_gain",)),
+    Row(
+        "lift_m_s2",
+        "disturbance",
+        "vertical acceleration that the thrust does not explain, up",
+        when=("learns_acceleration",),
+    ),
+    Row(
+        "roll_gain",
+        "factor",
+        "measured over modelled tilt, as learnt; 1 by the settings",
+        when=("tilt_gain",),
+    ),
+    Row("pitch_gain", "factor", "the same", when=("tilt_gain",)),
+    Row("is_valid", "whole", "1, or 0 before the first good state and after an outage", kind=WHOLE),
+)
+
+LIMITS: Final = (
+    Row("speed_m_s", "velocity", "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S"),
+    Row("braking_m_s2", "braking", "NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives"),
+    Row("fence_min_m", "position", "the walls at the least x and y,", 2),
+    Row("fence_max_m", "position", "and at the largest; all within +/- NMPC_POSITION_RANGE_M", 2),
+    Row("tilt_rad", "angle", "at most NMPC_TILT_LIMIT_RAD"),
+    Row("floor_m", "position", "walls below and", when=_HEIGHT),
+    Row("ceiling_m", "position", "above, within +/- NMPC_POSITION_RANGE_M", when=_HEIGHT),
+    Row(
+        "climb_m_s",
+        "velocity",
+        "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_CLIMB_LIMIT_M_S",
+        when=_HEIGHT,
+    ),
+    Row(
+        "descent_m_s",
+        "velocity",
+        "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_DESCENT_LIMIT_M_S",
+        when=_HEIGHT,
+    ),
+)
+
+WEIGHTS: Final = (
+    Row("tracking", "tracking", "lambda_1", unit="1/m"),
+    Row("effort", "effort", "lambda_2", unit="1/rad"),
+)
