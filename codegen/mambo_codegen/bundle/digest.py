@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.bundle.draws import Words, fold, input_scales, tiny_m
+from mambo_codegen.bundle.draws import HOVER, Words, fold, input_scales, tiny_m
 from mambo_codegen.bundle.episodes import (
     CALLS_IN_TURN,
     TICKS_PER_INPUT,
@@ -137,7 +137,7 @@ class _Run:
         method, n = self._method, len(self.digests)
         state, target = np.zeros((n, len(method.state))), np.zeros((n, len(method.target)))
         state[:, 0] = tiny_m(method)
-        thrust = None if method.has_height else np.full(n, input_scales(method).hover_m_s2)
+        thrust = None if method.has_height else np.full(n, input_scales(method).of[HOVER][0])
         self._step(state, target, thrust)
 
     def make(self, step: EpisodeStep) -> list[NDArray[Any]]:

@@ -23,10 +23,12 @@ _MULTIPLIER: Final = 2654435761
 _LARGE: Final = 1e9
 """Out of every range, as NaN is."""
 _LARGEST_TURN_RAD: Final = 4.0
-_LARGEST_TILT_RAD: Final = 0.8
-"""Beyond what any small angle stands for, and the steepest that counts for a thrust."""
 _MOST_SPEED_M_S: Final = 2.0
 """Of the limits that are drawn: a drone that is slow can be far enough from a near wall."""
+
+HOVER: Final = "HOVER_M_S2"
+TINY: Final = "TINY_M"
+"""Numbers by themselves, which are not drawn."""
 
 Words = NDArray[np.uint32]
 
@@ -39,24 +41,10 @@ class InputScales:
     that small, it is integer x factor / _UNIT.
     """
 
-    target_position_m: float
-    target_velocity_m_s: float
+    of: dict[str, tuple[float, str]]
+    """By the name of its constant in C, the scale and its quantity."""
     error_position_m: tuple[float, ...]
     error_velocity_m_s: tuple[float, ...]
-    attitude_rad: float
-    yaw_rad: float
-    heading_rad: float
-    turn_rad: float
-    thrust_m_s2: float
-    """Of the thrust less that of hover, without a height; with one of the thrust."""
-    hover_m_s2: float
-    target_motion: float
-    """Of what the tracker reads: the change of the target's velocity from step to step, in m/s, or a given
-    acceleration, in m/s^2; 0 without a tracker."""
-    climb_motion: float
-    """The same of the target's climb; 0 without a height."""
-    weights: tuple[float, ...]
-    """With a 1-norm."""
     limits: tuple[float, ...]
     """What stands for the limits of the settings."""
 
@@ -73,33 +61,68 @@ def input_scales(method: Method) -> InputScales:
     if method.has_height:
         thrust_m_s2 = min(2 * GRAVITY_M_S2, most_m_s2)
     unit = 1 if fixed else _UNIT
-    motions = []
-    for tracker in (method.tracker, method.climb_tracker):
-        if tracker:
-            most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
-        motions.append(min(tracker.tested_input, most) if tracker else 0.0)
-    cost = settings.cost
-    weights = (cost.tracking_weight, cost.effort_weight) if method.weight_limits else ()
+    drawn = {
+        "TARGET_M": (position_m, "position"),
+        "TARGET_M_S": (velocity_m_s, "velocity"),
+        **_own_scales(method, "state"),
+        "HEADING_RAD": (YAW_LIMIT_RAD, "yaw"),
+        "TURN_RAD": (_LARGEST_TURN_RAD, "yaw"),
+        "THRUST_M_S2": (thrust_m_s2, "thrust"),
+        **({} if method.has_height else {HOVER: (hover_m_s2, "thrust")}),
+        **_motion_scales(method, half_m_s / 4),
+        **_weight_scales(method),
+        **_own_scales(method, "target", "command"),
+        TINY: (tiny_m(method), "position"),
+    }
     return InputScales(
-        target_position_m=position_m / unit,
-        target_velocity_m_s=velocity_m_s / unit,
+        of={
+            name: (scale if name in (HOVER, TINY) else scale / unit, quantity)
+            for name, (scale, quantity) in drawn.items()
+        },
         error_position_m=tuple(
             error / unit for error in (min(20.0, half_m), *(size * position_m for size in near))
         ),
         error_velocity_m_s=tuple(
             error / unit for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
         ),
-        attitude_rad=_LARGEST_TILT_RAD / unit,
-        yaw_rad=100.0 / unit,
-        heading_rad=YAW_LIMIT_RAD / unit,
-        turn_rad=_LARGEST_TURN_RAD / unit,
-        thrust_m_s2=thrust_m_s2 / unit,
-        hover_m_s2=hover_m_s2,
-        target_motion=motions[0] / unit,
-        climb_motion=motions[1] / unit,
-        weights=tuple(min(2 * weight, WEIGHT_LIMIT) / unit for weight in weights),
         limits=tuple(one / unit for one in _limits_scales(method.limiting, 2 * position_m)),
     )
+
+
+def _own_scales(method: Method, *records: str) -> dict[str, tuple[float, str]]:
+    """Return the scales that rows of the port have themselves."""
+    rows = (row for record in records for row in method.port.rows(record))
+    return {
+        row.draw.scale: (row.draw.largest, row.quantity)
+        for row in rows
+        if row.draw is not None and row.draw.largest is not None
+    }
+
+
+def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, str]]:
+    """Return the scales of what the trackers read: given accelerations, or changes of the target's velocity.
+
+    They are the least of what a tracker is tested with and of what the range admits.
+    """
+    found = {}
+    for tracker, name in ((method.tracker, ""), (method.climb_tracker, "CLIMB_")):
+        if tracker is not None and tracker.is_given:
+            most_m_s2 = method.settings.ranges.thrust_acceleration_max_m_s2
+            found[f"{name or 'TARGET_'}M_S2"] = (min(tracker.tested_input, most_m_s2), "thrust")
+        elif tracker is not None:
+            found[f"{name}CHANGE_M_S"] = (min(tracker.tested_input, change_m_s), "velocity")
+    return found
+
+
+def _weight_scales(method: Method) -> dict[str, tuple[float, str]]:
+    """Return the scales of weights; none if the C takes none."""
+    cost = method.settings.cost
+    if not method.weight_limits:
+        return {}
+    return {
+        name: (min(2 * weight, WEIGHT_LIMIT), name.lower())
+        for name, weight in (("TRACKING", cost.tracking_weight), ("EFFORT", cost.effort_weight))
+    }
 
 
 def _limits_scales(limits: LimitsConstants | None, wall_m: float) -> tuple[float, ...]:
@@ -114,34 +137,6 @@ def _limits_scales(limits: LimitsConstants | None, wall_m: float) -> tuple[float
     walls = (-wall_m, wall_m, wall_m, wall_m)
     height = (wall_m, wall_m, *vertical) if vertical else ()
     return (min(speed_m_s, _MOST_SPEED_M_S), braking_m_s2, *walls, tilt_rad, *height)
-
-
-def scale_constants(method: Method, scales: InputScales) -> list[tuple[str, float, str]]:
-    """Return the scales that have a constant in the C: its name, the scale and its quantity."""
-    tracker, has_height = method.tracker, method.has_height
-    is_given = method.settings.target.gives_acceleration
-    found = [
-        ("TARGET_M", scales.target_position_m, "position"),
-        ("TARGET_M_S", scales.target_velocity_m_s, "velocity"),
-        ("ATTITUDE_RAD", scales.attitude_rad, "angle"),
-        ("YAW_RAD", scales.yaw_rad, "yaw"),
-        ("HEADING_RAD", scales.heading_rad, "yaw"),
-        ("TURN_RAD", scales.turn_rad, "yaw"),
-        ("THRUST_M_S2", scales.thrust_m_s2, "thrust"),
-    ]
-    if not has_height:
-        found.append(("HOVER_M_S2", scales.hover_m_s2, "thrust"))
-    if tracker or is_given:
-        quantity = "thrust" if is_given else "velocity"
-        ending = "M_S2" if is_given else "CHANGE_M_S"
-        found.append(("TARGET_M_S2" if is_given else ending, scales.target_motion, quantity))
-        if has_height:
-            found.append((f"CLIMB_{ending}", scales.climb_motion, quantity))
-    for name, scale, quantity in zip(
-        ("TRACKING", "EFFORT"), scales.weights, ("tracking", "effort"), strict=False
-    ):
-        found.append((name, scale, quantity))
-    return [*found, ("TINY_M", tiny_m(method), "position")]
 
 
 def tiny_m(method: Method) -> float:

@@ -1,18 +1,19 @@
 """Episodes of the self-test: the inputs of their control steps, and the other calls between them."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.bundle.draws import EpisodeDraws, InputScales, Words, input_scales
+from mambo_codegen.bundle.draws import HOVER, EpisodeDraws, InputScales, Words, input_scales
 from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.numbers.representation import THRUST
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, Row
 
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
@@ -67,6 +68,28 @@ class _Input:
     target: Real
     thrust: Real
     change: Real
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What is drawn of an input of n controllers as a whole.
+
+    choice:   random bits.
+    rests:    whether the target rests.
+    is_there: whether the drone is at its target, and level.
+    size:     of the errors of position and velocity.
+    """
+
+    choice: Words
+    rests: Rows
+    is_there: Rows
+    size: NDArray[Any]
+
+    @classmethod
+    def anywhere(cls) -> "_Drawn":
+        """Return that of numbers that do not depend on it."""
+        none = np.zeros(1, np.uint32)
+        return cls(none, none > 0, none > 0, none)
 
 
 def lost_inputs(method: Method) -> tuple[int, int]:
@@ -125,104 +148,109 @@ class Episodes:
         The target's velocity changes for a tracker that measures the acceleration by it. One drone in 16 is
         at its target, and level. With a height one in eight touches the floor.
         """
-        method, scales, choice = self._method, self._scales, self._draws.next()
+        port, choice = self._method.port, self._draws.next()
         early = [index < FIRST_LOST + lost for lost in self._lost]
         rests = self._is_lost & ~self._is_brief & early[0]
         is_early = rests | (self._is_brief & early[1])
         is_there = (choice >> 2) & 15 == 0
-        size = np.where(rests, 3, np.where(is_there, 4, choice & 3))
-        self._aim = self._next_aim(rests, (size == 0) | (index == 0))
-        target = [*self._aim[0:4:2], *self._aim[1:4:2]]
-        state = self._beside(target, size)
-        attitude_rad = self._numbers.constant(scales.attitude_rad, "angle")
-        tilts_rad = np.where(is_there, np.zeros_like(attitude_rad), attitude_rad)
-        state += [self._draws.draw(tilts_rad) for _ in range(2)]
-        state += [self._draw(scales.yaw_rad, "yaw")]
-        thrust = self._next_thrust(state[0], (choice >> 6) & 15)
-        change = [np.zeros_like(thrust)] * len(method.target)
-        motion = [self._motion(scales.target_motion, rests) for _ in range(2)] if self._has_motion else []
-        if self._is_given:
-            target += motion
-        else:
-            change[2:4] = motion or change[2:4]
-        if method.has_height:
-            heights = [*self._aim[4:]]
-            target += heights
-            state += self._beside(heights, size)
-            state += [((choice >> 14) & 7 == 0).astype(self._numbers.computed)]
-            vertical = [self._motion(scales.climb_motion, rests)] if self._has_motion else []
-            if self._is_given:
-                target += vertical
-            else:
-                change[-1:] = vertical or change[-1:]
+        drawn = _Drawn(choice, rests, is_there, np.where(rests, 3, np.where(is_there, 4, choice & 3)))
+        self._aim = self._next_aim(rests, (drawn.size == 0) | (index == 0))
+        target, state, change = self._aims(), dict[str, list[Real]](), dict[str, list[Real]]()
+        thrust = np.zeros(0)
+        for upward in (False, True):
+            for row in (one for one in port.rows("state") if one.is_upward == upward):
+                state[row.member] = self._row(row, drawn, target)
+            if not upward:
+                thrust = self._next_thrust(state["position_m"][0], (choice >> 6) & 15)
+                change = {name: [np.zeros_like(thrust)] * len(each) for name, each in target.items()}
+            for row in (one for one in port.rows("target") if one.is_upward == upward):
+                if row.draw is not AIM:
+                    target[row.member] = self._row(row, drawn, target)
+                    change[row.member] = [np.zeros_like(thrust)] * port.count(row)
+                elif self._moves and row.quantity == "velocity":
+                    scale = "CLIMB_CHANGE_M_S" if upward else "CHANGE_M_S"
+                    change[row.member] = [self._moving(rests, scale) for _ in range(port.count(row))]
         if index >= FIRST_LOST:
-            state[0] = np.where(is_early, self._draws.beyond(np.zeros(1, np.uint32)), state[0])
-        return _Input(np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1))
+            first = state["position_m"]
+            first[0] = np.where(is_early, self._draws.beyond(np.zeros(1, np.uint32)), first[0])
+        return _Input(
+            np.stack([one for row in port.rows("state") for one in state[row.member]], axis=1),
+            np.stack([one for row in port.rows("target") for one in target[row.member]], axis=1),
+            thrust,
+            np.stack([one for row in port.rows("target") for one in change[row.member]], axis=1),
+        )
 
-    @property
-    def _is_given(self) -> bool:
-        """Whether targets have accelerations."""
-        return self._method.settings.target.gives_acceleration
+    def _aims(self) -> dict[str, list[Real]]:
+        """Return the numbers of the targets that the aim has, by member: position and velocity by axis."""
+        rows = [row for row in self._method.port.rows("target") if row.draw is AIM]
+        places = {name: iter(self._aim[k::2]) for k, name in enumerate(("position", "velocity"))}
+        return {
+            row.member: [next(places[row.quantity]) for _ in range(self._method.port.count(row))]
+            for row in rows
+        }
+
+    def _row(self, row: Row, drawn: "_Drawn", target: Mapping[str, list[Real]]) -> list[Real]:
+        """Draw the numbers of a row of the port."""
+        assert row.draw is not None, "a row of a state or target"
+        if row.draw is BESIDE:
+            return self._beside(target[row.member], row.quantity, drawn.size)
+        if row.draw is CHANCE:
+            return [((drawn.choice >> 14) & 7 == 0).astype(self._numbers.computed)]
+        scale = self._numbers.constant(*self._scales.of[row.draw.scale])
+        if row.draw.rests:
+            scale = np.where(drawn.is_there, np.zeros_like(scale), scale)
+        draw = self._draws.share if row.draw.way == SHARE else self._draws.draw
+        return [draw(scale) for _ in range(self._method.port.count(row))]
 
     @property
     def _moves(self) -> bool:
         """Whether targets change their velocity from step to step; a change of 0 would make a -0 a 0."""
-        return self._has_motion and not self._is_given
-
-    @property
-    def _has_motion(self) -> bool:
-        """Whether the acceleration of a target counts."""
-        return self._method.tracker is not None
+        return "measured" in self._method.parts
 
     def _next_aim(self, rests: Rows, jumps: Rows) -> Real:
         """Draw place and velocity of the targets along each axis (k, n): new ones of those that jump."""
-        pair = (self._scales.target_position_m, "position"), (self._scales.target_velocity_m_s, "velocity")
-        axes = 3 if self._method.has_height else 2
-        aim = np.stack([self._moving(rests, *one) for one in pair * axes])
+        pairs = ("TARGET_M", "TARGET_M_S") * self._method.port.axes
+        aim = np.stack([self._moving(rests, scale) for scale in pairs])
         return np.where(jumps, aim, self._aim if self._aim.size else aim)
 
-    def _beside(self, target: list[Real], size: Words) -> list[Real]:
-        """Draw positions and velocities near those of targets, by sizes of the errors."""
-        half = len(target) // 2
-        kinds = [(self._scales.error_position_m, "position")] * half
-        kinds += [(self._scales.error_velocity_m_s, "velocity")] * half
-        errors = [np.array([self._numbers.constant(one, what) for one in sizes]) for sizes, what in kinds]
-        return [place + self._draws.draw(error[size]) for place, error in zip(target, errors, strict=True)]
+    def _beside(self, target: list[Real], quantity: str, size: Words) -> list[Real]:
+        """Draw positions or velocities near those of targets, by sizes of the errors."""
+        scales = self._scales
+        sizes = scales.error_position_m if quantity == "position" else scales.error_velocity_m_s
+        errors = np.array([self._numbers.constant(one, quantity) for one in sizes])
+        return [place + self._draws.draw(errors[size]) for place in target]
 
     def _next_thrust(self, like: Real, case: NDArray[Any]) -> Real:
         """Draw thrusts within their range, at its ends in cases 0 and 1; none for one of the height."""
-        limits, scales = self._method.limits, self._scales
+        limits = self._method.limits
         if self._method.has_height:
             return np.full_like(like, limits.thrust_least)
-        thrust = self._numbers.constant(scales.hover_m_s2, "thrust") + self._draw(
-            scales.thrust_m_s2, "thrust"
-        )
+        thrust = self._numbers.constant(*self._scales.of[HOVER]) + self._draw("THRUST_M_S2")
         is_least = (case == 0) | (thrust < limits.thrust_least)
         is_most = (case == 1) | (thrust > limits.thrust_most)
         drawn: Real = np.where(is_least, limits.thrust_least, np.where(is_most, limits.thrust_most, thrust))
         return drawn
 
-    def _motion(self, scale: float, rests: Rows) -> Real:
-        """Draw accelerations of targets along an axis, or changes of their velocities in a step."""
-        return self._draw(scale, "thrust") if self._is_given else self._moving(rests, scale, "velocity")
-
-    def _moving(self, rests: Rows, scale: float, quantity: str) -> Real:
+    def _moving(self, rests: Rows, scale: str) -> Real:
         """Draw a number of targets, 0 for those that rest."""
-        constant = self._numbers.constant
-        return self._draws.draw(np.where(rests, constant(0.0, quantity), constant(scale, quantity)))
+        constant, (value, quantity) = self._numbers.constant, self._scales.of[scale]
+        return self._draws.draw(np.where(rests, constant(0.0, quantity), constant(value, quantity)))
 
     def _spoilt(self, given: _Input) -> _Input:
         """Return inputs of which one in four is out of range."""
-        spoil, last = self._draws.spoil, 9 if self._method.has_height else 7
-        state = np.column_stack([spoil(given.state[:, :last]), given.state[:, last:]])
-        target = spoil(given.target)
+        spoil = self._draws.spoil
+
+        def spoilt(record: str, numbers: Real) -> Real:
+            last = len(self._method.port.reals(record))
+            return np.column_stack([spoil(numbers[:, :last]), numbers[:, last:]])
+
+        state, target = spoilt("state", given.state), spoilt("target", given.target)
         thrust = given.thrust if self._method.has_height else spoil(given.thrust[:, None])[:, 0]
         return replace(given, state=state, target=target, thrust=thrust)
 
     def _next_headings(self) -> Real:
-        scales = self._scales
-        columns = [self._draw(scales.heading_rad, "yaw") for _ in range(2)]
-        columns += [self._share(scales.turn_rad, "yaw")]
+        columns = [self._draw("HEADING_RAD") for _ in range(2)]
+        columns += [self._share(*self._scales.of["TURN_RAD"])]
         return self._arguments(columns, ("yaw",) * 3)
 
     def _next_call(self, index: int) -> OtherCall | None:
@@ -250,23 +278,23 @@ class Episodes:
         return OtherCall(name, values)
 
     def _command(self) -> Real:
-        scales = self._scales
-        columns = [self._draw(scales.attitude_rad, "angle") for _ in range(2)]
-        columns += [self._share(scales.thrust_m_s2, "thrust")] if self._method.has_height else []
-        return self._arguments(columns, self._method.command)
+        return self._drawn_record("command")
 
     def _weights(self) -> Real:
-        quantities = self._method.setter_quantities
-        columns = [self._draw(*one) for one in zip(self._scales.weights, quantities, strict=True)]
-        return self._arguments(columns, quantities)
+        return self._drawn_record("weights")
+
+    def _drawn_record(self, record: str) -> Real:
+        """Draw the numbers of a record whose rows have scales."""
+        port, drawn = self._method.port, _Drawn.anywhere()
+        columns = [one for row in port.rows(record) for one in self._row(row, drawn, {})]
+        return self._arguments(columns, port.quantities(record))
 
     def _shift(self, *, turns: bool) -> Real:
-        scales, axes = self._scales, 3 if self._method.has_height else 2
         columns = []
-        for _ in range(axes):
-            columns.append(self._draw(scales.target_position_m, "position"))
-            columns.append(self._draw(scales.target_velocity_m_s, "velocity"))
-        heading = self._draw(scales.yaw_rad, "yaw") if turns else np.zeros_like(columns[0])
+        for _ in range(self._method.port.axes):
+            columns.append(self._draw("TARGET_M"))
+            columns.append(self._draw("TARGET_M_S"))
+        heading = self._draw("YAW_RAD") if turns else np.zeros_like(columns[0])
         return self._arguments([*columns[::2], *columns[1::2], heading], self._method.shift)
 
     def _limits(self) -> Real:
@@ -283,8 +311,8 @@ class Episodes:
         """Return arguments of a call, one of which may be out of range, in SI units."""
         return self._numbers.to_si(self._draws.spoil(np.stack(columns, axis=1)), *quantities)
 
-    def _draw(self, scale: float, quantity: str) -> Real:
-        return self._draws.draw(self._numbers.constant(scale, quantity))
+    def _draw(self, scale: str) -> Real:
+        return self._draws.draw(self._numbers.constant(*self._scales.of[scale]))
 
     def _share(self, scale: float, quantity: str) -> Real:
         return self._draws.share(self._numbers.constant(scale, quantity))

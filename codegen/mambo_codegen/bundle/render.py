@@ -11,7 +11,7 @@ import jinja2
 
 from mambo_codegen import __version__, boards
 from mambo_codegen.bundle.digest import TICKS, episode_count, kept_digest, start_up_test
-from mambo_codegen.bundle.draws import input_scales, scale_constants
+from mambo_codegen.bundle.draws import input_scales
 from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS_PER_INPUT, lost_inputs
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
@@ -41,6 +41,7 @@ from mambo_codegen.numbers.representation import (
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 
@@ -211,6 +212,9 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
             "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
             "port": method.port,
+            "aim": AIM,
+            "beside_target": BESIDE,
+            "chance": CHANCE,
             "state_members": [one.member for one in method.port.numbers("state")],
             "limits_members": [one.member for one in method.port.numbers("limits")],
             "fuzz_target": _target_inputs(method, len(method.state)),
@@ -232,11 +236,9 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             "held": TICKS_PER_INPUT,
             "self_test_steps": TICKS * episode_count(method),
             "self_test_digest": kept_digest(method) if with_digest else None,
-            "spread": (scales := input_scales(method)),
+            "spread": input_scales(method),
             "first_lost": FIRST_LOST,
             "found_again": [FIRST_LOST + lost for lost in lost_inputs(method)],
-            "estimate_numbers": method.reference_controller().last_estimate.shape[1],
-            "scale_constants": scale_constants(method, scales),
             "boards": [
                 {
                     "name": board.name,

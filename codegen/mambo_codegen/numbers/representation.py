@@ -51,6 +51,17 @@ class InputLimits:
     tilt: Any
     weights: NDArray[Any]
 
+    @property
+    def largest(self) -> dict[str, Any]:
+        """The largest magnitudes of what a controller takes, by quantity."""
+        return {
+            "position": self.position,
+            "velocity": self.velocity,
+            "angle": self.attitude,
+            "yaw": self.yaw,
+            "thrust": self.thrust_most,
+        }
+
 
 class Representation:
     """The numbers of one controller.

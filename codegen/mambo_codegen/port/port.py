@@ -98,6 +98,17 @@ class Port:
         """Return the quantity of each number of a record."""
         return tuple(number.quantity for number in self.numbers(record))
 
+    @property
+    def axes(self) -> int:
+        """Along how many axes there is a position."""
+        return self.quantities("state").count("position")
+
+    @property
+    def shift(self) -> tuple[str, ...]:
+        """Return the quantity of each number by which a frame jumps: positions, velocities and heading."""
+        state = self.quantities("state")
+        return tuple(one for one in ("position", "velocity", "yaw") for each in state if each == one)
+
     def members(self, record: str, number: str = NUMBER) -> list[Member]:
         """Return the members of a record's struct, whose numbers have the type `number`."""
         return [

@@ -10,6 +10,38 @@ WHOLE: Final = "int"
 """The types of members in C; any other is a record of the table."""
 
 
+MACROS: Final = {
+    "height": "NMPC_HAS_HEIGHT",
+    "given": "NMPC_HAS_TARGET_ACCELERATION",
+}
+"""How nmpc.h says that a part is there on which what a controller takes depends."""
+
+SIGNED: Final = "signed"
+SHARE: Final = "share"
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What the self-test draws for a number: an integer with a sign times a scale, or what its way says.
+
+    scale:   the name of the scale, NMPC_SELF_TEST_NAME in C.
+    largest: of the scale in SI units; None where the settings say it.
+    way:     SIGNED, or SHARE, without a sign. Without a scale: of AIM, where the target is; of BESIDE, near
+             the target's member of the same name; of CHANCE, 1 in one input of eight, else 0.
+    rests:   whether it is 0 of a drone that is at its target.
+    """
+
+    scale: str = ""
+    largest: float | None = None
+    way: str = SIGNED
+    rests: bool = False
+
+
+AIM: Final = Draw(way="aim")
+BESIDE: Final = Draw(way="beside")
+CHANCE: Final = Draw(way="chance")
+
+
 @dataclass(frozen=True)
 class Row:
     """A member of a record: a number, several of one kind, or a record inside it.
@@ -22,6 +54,7 @@ class Row:
     kind:     its type in C: NUMBER, SUM, BYTE, WHOLE, or the record that it is.
     unit:     where the name has none.
     note:     what its comment says behind the range.
+    draw:     what the self-test draws for it; None of what is not taken.
     """
 
     member: str
@@ -32,6 +65,12 @@ class Row:
     kind: str = NUMBER
     unit: str = ""
     note: str = ""
+    draw: Draw | None = None
+
+    @property
+    def is_upward(self) -> bool:
+        """Whether it belongs to the height, and not to the level axes or the drone as a whole."""
+        return "height" in self.when
 
 
 @dataclass(frozen=True)

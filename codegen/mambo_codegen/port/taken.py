@@ -1,39 +1,51 @@
 """The rows of what a controller takes and gives: state, target, command, estimate, limits and weights."""
 
+from dataclasses import replace
 from typing import Final
 
-from mambo_codegen.port.row import WHOLE, Row
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, Row
 
 _HEIGHT: Final = ("height",)
+_TILT: Final = Draw("ATTITUDE_RAD", 0.8)
+"""Beyond what any small angle stands for, and the steepest that counts for a thrust."""
+_STATE_TILT: Final = replace(_TILT, rests=True)
 
 STATE: Final = (
-    Row("position_m", "position", "x north, y east", 2),
-    Row("velocity_m_s", "velocity", "v_x, v_y", 2),
-    Row("roll_rad", "angle", "phi"),
-    Row("pitch_rad", "angle", "theta"),
-    Row("yaw_rad", "yaw", "psi", note=", wrapped or not"),
-    Row("height_m", "position", "up", when=_HEIGHT),
-    Row("climb_m_s", "velocity", "up", when=_HEIGHT),
-    Row("grounded", "whole", "1 while the drone touches the floor, else 0", when=_HEIGHT, kind=WHOLE),
+    Row("position_m", "position", "x north, y east", 2, draw=BESIDE),
+    Row("velocity_m_s", "velocity", "v_x, v_y", 2, draw=BESIDE),
+    Row("roll_rad", "angle", "phi", draw=_STATE_TILT),
+    Row("pitch_rad", "angle", "theta", draw=_STATE_TILT),
+    Row("yaw_rad", "yaw", "psi", note=", wrapped or not", draw=Draw("YAW_RAD", 100.0)),
+    Row("height_m", "position", "up", when=_HEIGHT, draw=BESIDE),
+    Row("climb_m_s", "velocity", "up", when=_HEIGHT, draw=BESIDE),
+    Row(
+        "grounded",
+        "whole",
+        "1 while the drone touches the floor, else 0",
+        when=_HEIGHT,
+        kind=WHOLE,
+        draw=CHANCE,
+    ),
 )
 
 TARGET: Final = (
-    Row("position_m", "position", "Tp_k = x_ref, y_ref", 2),
-    Row("velocity_m_s", "velocity", "Tv_k = vx_ref, vy_ref", 2),
-    Row("acceleration_m_s2", "thrust", "", 2, when=("given",)),
-    Row("height_m", "position", "up", when=_HEIGHT),
-    Row("climb_m_s", "velocity", "up", when=_HEIGHT),
-    Row("climb_acceleration_m_s2", "thrust", "up", when=("height", "given")),
+    Row("position_m", "position", "Tp_k = x_ref, y_ref", 2, draw=AIM),
+    Row("velocity_m_s", "velocity", "Tv_k = vx_ref, vy_ref", 2, draw=AIM),
+    Row("acceleration_m_s2", "thrust", "", 2, ("given",), draw=Draw("TARGET_M_S2")),
+    Row("height_m", "position", "up", when=_HEIGHT, draw=AIM),
+    Row("climb_m_s", "velocity", "up", when=_HEIGHT, draw=AIM),
+    Row("climb_acceleration_m_s2", "thrust", "up", when=("height", "given"), draw=Draw("CLIMB_M_S2")),
 )
 
 COMMAND: Final = (
-    Row("roll_rad", "angle", "phi*"),
-    Row("pitch_rad", "angle", "theta*"),
+    Row("roll_rad", "angle", "phi*", draw=_TILT),
+    Row("pitch_rad", "angle", "theta*", draw=_TILT),
     Row(
         "thrust_m_s2",
         "thrust",
         "thrust over mass{over_gain}, from NMPC_THRUST_MIN_M_S2 to NMPC_THRUST_MAX_M_S2",
         when=_HEIGHT,
+        draw=Draw("THRUST_M_S2", way=SHARE),
     ),
 )
 
@@ -83,6 +95,6 @@ LIMITS: Final = (
 )
 
 WEIGHTS: Final = (
-    Row("tracking", "tracking", "lambda_1", unit="1/m"),
-    Row("effort", "effort", "lambda_2", unit="1/rad"),
+    Row("tracking", "tracking", "lambda_1", unit="1/m", draw=Draw("TRACKING")),
+    Row("effort", "effort", "lambda_2", unit="1/rad", draw=Draw("EFFORT")),
 )

@@ -145,8 +145,7 @@ class Constants(ABC):
     @property
     def shift(self) -> tuple[str, ...]:
         """The quantity of each number that nmpc_shift reads, in their order."""
-        axes = 3 if self.has_height else 2
-        return (*["position"] * axes, *["velocity"] * axes, "yaw")
+        return self.port.shift
 
     @cached_property
     def numbers(self) -> Representation:

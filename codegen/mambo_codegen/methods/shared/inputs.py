@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.numbers.representation import STATE, THRUST
+from mambo_codegen.numbers.representation import THRUST
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -52,7 +52,7 @@ class Inputs:
     def __init__(self, constants: Constants) -> None:
         self._numbers, self._target = constants.numbers, constants.target
         self._state, self._command, self._shift = constants.state, constants.command, constants.shift
-        self._level_columns, self._has_height = len(constants.level_target), constants.has_height
+        self._has_height = constants.has_height
         self.limits = constants.limits
 
     def quantize(
@@ -83,27 +83,18 @@ class Inputs:
 
     def check(self, state: Real, target: Real, thrust: Real) -> tuple[Rows, Rows, Rows]:
         """Return whether each state, each target and each thrust (n,) is finite and within its range."""
-        limits, level = self.limits, self._level_columns
-        good_state = (
-            within(state[:, 0:2], limits.position)
-            & within(state[:, 2:4], limits.velocity)
-            & within(state[:, 4:6], limits.attitude)
-            & within(state[:, 6:7], limits.yaw)
-        )
-        good_target = (
-            within(target[:, 0:2], limits.position)
-            & within(target[:, 2:4], limits.velocity)
-            & within(target[:, 4:level], limits.thrust_most)
-        )
-        if self._has_height:
-            first = len(STATE)
-            good_state &= within(state[:, first : first + 1], limits.position)
-            good_state &= within(state[:, first + 1 : first + 2], limits.velocity)
-            good_target &= within(target[:, level : level + 1], limits.position)
-            good_target &= within(target[:, level + 1 : level + 2], limits.velocity)
-            good_target &= within(target[:, level + 2 :], limits.thrust_most)
+        limits = self.limits
+        good_state, good_target = self._within(state, self._state), self._within(target, self._target)
         good_thrust: Rows = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
         return good_state, good_target, good_thrust
+
+    def _within(self, values: Real, quantities: Sequence[str]) -> Rows:
+        """Return for each row of (n, k) whether all values lie in the ranges of their quantities."""
+        good: Rows = np.ones(len(values), np.bool_)
+        for quantity, limit in self.limits.largest.items():
+            columns = [column for column, name in enumerate(quantities) if name == quantity]
+            good &= within(values[:, columns], limit)
+        return good
 
     def status(self, good_state: Rows, good_target: Rows, good_thrust: Rows) -> NDArray[np.int64]:
         """Return the status (n,) of a step whose inputs are good or not; the first bad one names it."""
@@ -120,7 +111,7 @@ class Inputs:
         """
         given = self.numbers(command, self._command)
         angles = given[:, 0:2]
-        good = within(angles, self.limits.attitude) & within(given[:, 2:], self.limits.thrust_most)
+        good = self._within(given, self._command)
         return np.concatenate([clamp(angles, self.limits.tilt), given[:, 2:]], axis=1), good
 
     def shift(self, change: ArrayLike) -> tuple["FrameShift", Rows]:
@@ -129,13 +120,8 @@ class Inputs:
         The columns are changes of x, y, with a height the height, then of their velocities, then the heading.
         """
         given = self.numbers(change, self._shift)
-        axes = len(self._shift) // 2
+        axes, good = len(self._shift) // 2, self._within(given, self._shift)
         position, velocity, heading = given[:, :axes], given[:, axes : 2 * axes], given[:, 2 * axes :]
-        good = (
-            within(position, self.limits.position)
-            & within(velocity, self.limits.velocity)
-            & within(heading, self.limits.yaw)
-        )
         zero = self._numbers.computed(0)
         position, velocity, heading = (
             np.where(good[:, None], part, zero) for part in (position, velocity, heading)
