@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import COMMAND
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -34,10 +33,11 @@ from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
+from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
 from mambo_sil.flight.controllers.thrust_controller import (
     ThrustDelivery,
     adapted,
-    commands_thrust,
+    columns_of,
     numbers_of,
 )
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
@@ -48,9 +48,9 @@ from mambo_sil.flight.trajectories import Trajectory, is_spatial, vertical_of
 HEIGHT_REFERENCE_M = -HOVER_HEIGHT_M
 """Altitude reference of a flight on a level course: z points down."""
 
-LEVEL_COLUMNS: Final = 6
-HEIGHT: Final = slice(6, 9)
-"""Columns of a target: [x, y, vx, vy, ax, ay], then [height, climb, acceleration] if courses have heights."""
+_TRACED: Final = ("position_m", "velocity_m_s")
+_VERTICAL: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2")
+"""Members of a target that a trace has, and those of a course with heights."""
 
 TAKE_OFF_PHASE_S = 5.0
 """Time from the beginning of a take-off to t = 0 of the trajectory's clock."""
@@ -175,45 +175,46 @@ class Flight:
         Raises `FlightError` as `targets`.
         """
         targets, spatial = self.targets(), is_spatial(self.trajectory)
-        columns = HEIGHT.stop if spatial else LEVEL_COLUMNS
-        given = np.empty((self.flights, len(targets), columns)).swapaxes(0, 1)
-        given[..., :4] = targets
-        given[..., 4:6] = self._for_each_flight(
+        columns = (SPACE if spatial else LEVEL).target
+        given = np.zeros((self.flights, len(targets), columns)).swapaxes(0, 1)
+        given[..., TARGET["position_m"]] = targets[..., :2]
+        given[..., TARGET["velocity_m_s"]] = targets[..., 2:]
+        given[..., TARGET["acceleration_m_s2"]] = self._for_each_flight(
             "acceleration", self.trajectory.acceleration(self.times_s()), 2
         )
         if spatial:
             heights = vertical_of(self.trajectory, self.times_s())
-            given[..., HEIGHT] = self._for_each_flight("vertical", heights, 3)
+            _put_vertical(given, self._for_each_flight("vertical", heights, 3))
         return given
 
     @cached_property
     def traced_targets(self) -> FloatArray:
         """The targets as a trace has them: (k, n, 4), on a course with a height (k, n, 6)."""
         given = self.given_targets
-        if given.shape[2] == LEVEL_COLUMNS:
-            return given[..., :4]
-        by_flight = given.swapaxes(0, 1)
-        traced = np.concatenate([by_flight[..., :4], by_flight[..., 6:8]], axis=-1)
+        members = _TRACED if given.shape[2] == LEVEL.target else (*_TRACED, *_VERTICAL[:2])
+        traced = np.concatenate([given.swapaxes(0, 1)[..., TARGET[name]] for name in members], axis=-1)
         return traced.swapaxes(0, 1)
 
     @cached_property
     def targets_in_space(self) -> FloatArray:
         """The targets (k, n, 9) as controllers of the height are given them, also on a level course."""
         given = self.given_targets
-        if given.shape[2] == HEIGHT.stop:
+        if given.shape[2] == SPACE.target:
             return given
         by_flight = given.swapaxes(0, 1)
-        level = np.broadcast_to((HOVER_HEIGHT_M, 0.0, 0.0), (*by_flight.shape[:2], 3))
-        return np.concatenate([by_flight, level], axis=-1).swapaxes(0, 1)
+        space = np.zeros((*by_flight.shape[:2], SPACE.target))
+        space[..., : LEVEL.target] = by_flight
+        _put_vertical(space, np.array([HOVER_HEIGHT_M, 0.0, 0.0]))
+        return space.swapaxes(0, 1)
 
-    def targets_for(self, *, commands_thrust: bool) -> FloatArray:
+    def targets_for(self, columns: Columns) -> FloatArray:
         """Return the targets (k, n, 6 or 9) as a controller is given them."""
-        return self.targets_in_space if commands_thrust else self.given_targets
+        return self.targets_in_space if columns.commands_thrust else self.given_targets
 
     @cached_property
     def landing(self) -> NDArray[np.bool_]:
         """Which courses (n,) touch the ground; there it carries the drone."""
-        return np.asarray((self.given_targets[..., HEIGHT][..., :1] <= 0.0).any(axis=(0, 2)))
+        return np.asarray((self.given_targets[..., TARGET["height_m"]] <= 0.0).any(axis=(0, 2)))
 
     def _for_each_flight(self, method: str, values: FloatArray, columns: int) -> FloatArray:
         """Return what a method of one trajectory gives (k, m), or of each (k, n, m), as (k, n, m)."""
@@ -238,9 +239,8 @@ def fly(
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
     controller = adapted(controller)
-    has_thrust = commands_thrust(controller)
-    times_s = flight.times_s()
-    targets = flight.targets_for(commands_thrust=has_thrust)
+    columns, times_s = columns_of(controller), flight.times_s()
+    has_thrust, targets = columns.commands_thrust, flight.targets_for(columns)
     open_loop_until, landing = open_loop_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
@@ -344,10 +344,16 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
 
 def vertical_target(target: FloatArray) -> Vertical:
     """Return what the altitude loop is to follow, for targets (n, 6) or (n, 9)."""
-    if target.shape[1] < HEIGHT.stop:
+    if target.shape[1] < SPACE.target:
         return Vertical(HEIGHT_REFERENCE_M)
-    height_m, climb_m_s, acceleration_m_s2 = target[:, HEIGHT].T
+    height_m, climb_m_s, acceleration_m_s2 = (target[:, TARGET[name].start] for name in _VERTICAL)
     return Vertical(0.0 - height_m, climb_m_s, acceleration_m_s2)
+
+
+def _put_vertical(targets: FloatArray, vertical: FloatArray) -> None:
+    """Write height, climb and vertical acceleration (..., 3) into the columns of targets, in place."""
+    for k, name in enumerate(_VERTICAL):
+        targets[..., TARGET[name].start] = vertical[..., k]
 
 
 def _mark_lost(state: VehicleState) -> VehicleState:
@@ -381,6 +387,20 @@ def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) ->
     return kind(time_s=times_s, target=targets, status=np.empty(shape[::-1], np.int64).T, **arrays)
 
 
+def _measured(seen: Seen, grounded: NDArray[np.bool_]) -> dict[str, FloatArray]:
+    """Return the numbers of states by member (count, n)."""
+    return {
+        "position_m": seen.position_m[:2],
+        "velocity_m_s": seen.velocity_m_s[:2],
+        "roll_rad": seen.euler_rad[:1],
+        "pitch_rad": seen.euler_rad[1:2],
+        "yaw_rad": seen.euler_rad[2:],
+        "height_m": -seen.position_m[2:],
+        "climb_m_s": -seen.velocity_m_s[2:],
+        "grounded": grounded[np.newaxis].astype(np.float64),
+    }
+
+
 class _Caller:
     """Calls the position controller of n flights, records the trace and holds the command.
 
@@ -405,11 +425,11 @@ class _Caller:
 
         A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
-        trace, has_thrust = self._trace, len(self.command) > len(COMMAND)
-        rows = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]
-        if has_thrust:
-            rows += [-seen.position_m[2:], -seen.velocity_m_s[2:], grounded[np.newaxis].astype(np.float64)]
-        measured = np.ascontiguousarray(np.concatenate(rows).T)
+        trace, has_thrust = self._trace, len(self.command) > LEVEL.command
+        measured = np.zeros((len(grounded), (SPACE if has_thrust else LEVEL).state))
+        for member, rows in _measured(seen, grounded).items():
+            if STATE[member].stop <= measured.shape[1]:
+                measured[:, STATE[member]] = rows.T
         dropped = self._drops.next()
         if dropped is not None:
             measured[dropped] = np.nan

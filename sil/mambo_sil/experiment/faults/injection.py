@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import (
@@ -28,6 +27,7 @@ from mambo_sil.experiment.faults.fault import (
     ShiftTarget,
     WrapYaw,
 )
+from mambo_sil.flight.columns import SPACE
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import Applied, adapted, hover_command, numbers_of
 from mambo_sil.flight.engine.engine_library import ffi, pointer
@@ -135,7 +135,8 @@ def native_faulty(
     hover: the command before the first one, two or three numbers. `instances` as in `FaultyController`.
     """
     chosen = [fault or _NONE for fault in faults]
-    histories = [np.tile((*hover, 0.0)[:3], (fault.late_updates + 1, 1)) for fault in chosen]
+    first = (*hover, *[0.0] * (SPACE.command - len(hover)))
+    histories = [np.tile(first, (fault.late_updates + 1, 1)) for fault in chosen]
     saved = None if instances is None else np.empty_like(instances[0])
     records = ffi.new("engine_faulty_t[]", len(chosen))
     for row, (fault, history) in enumerate(zip(chosen, histories, strict=True)):
@@ -144,7 +145,8 @@ def native_faulty(
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
         record.controller, record.self = inner.step, inner.instance(row)
-        record.commands_thrust = inner.commands_thrust
+        record.states, record.targets = inner.columns.state, inner.columns.target
+        record.commands = inner.columns.command
         record.computed = pointer("double *", history)
         if instances is not None:
             record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))
@@ -176,8 +178,8 @@ def _fill_alteration(record: Any, alter: Alteration) -> None:
 
 def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:
     """Return n callers with `patience` (n,) around `inner` that reset `compiled`."""
-    hover_m_s2 = hover_thrust(compiled.settings)
-    reset, level = compiled.native_reset([(0.0, 0.0, hover_m_s2) if inner.commands_thrust else (0.0, 0.0)])
+    hover = hover_command(adapted(compiled))
+    reset, level = compiled.native_reset([hover])
     memory = native(engine, compiled)
     records = ffi.new("engine_levelling_t[]", len(patience))
     for row, patient in enumerate(patience.tolist()):
@@ -185,6 +187,6 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.controller, record.self = inner.step, inner.instance(row)
         record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
         record.level, record.patience = pointer("char *", level), patient
-        record.hover_m_s2, record.commands_thrust = hover_m_s2, inner.commands_thrust
+        record.hover, record.commands = (*hover, *[0.0] * (SPACE.command - len(hover))), len(hover)
     kept = memory, level
     return inner.wrapped(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept)

@@ -6,17 +6,44 @@
 
 #include "nmpc.h"
 
-#ifdef NMPC_HAS_HEIGHT
-/* Numbers of a state: as in nmpc_state_t, and 1 or 0 for the contact with the floor. */
-#define STATE_NUMBERS 10
+#ifdef NMPC_HAS_WHOLES
+#define ONE(member, column, quantity) +1
+#define STATE_NUMBERS (0 STATE_REALS(ONE) STATE_WHOLES(ONE))
+#define TARGET_NUMBERS (0 TARGET_REALS(ONE) TARGET_WHOLES(ONE))
+#define TAKE(member, column, quantity) \
+    taken.member = *next; \
+    next++;
+#define TAKE_WHOLE(member, column, quantity) \
+    taken.member = *next != (nmpc_real_t)0; \
+    next++;
 
+/* A state of its numbers in their order; an integer is 1 or 0. */
 static nmpc_state_t state_of(const nmpc_real_t *numbers)
 {
-    const nmpc_state_t state = { { numbers[0], numbers[1] }, { numbers[2], numbers[3] }, numbers[4], numbers[5],
-                                 numbers[6], numbers[7], numbers[8], numbers[9] != (nmpc_real_t)0 };
+    const nmpc_real_t *next = numbers;
+    nmpc_state_t taken;
 
-    return state;
+    STATE_REALS(TAKE)
+    STATE_WHOLES(TAKE_WHOLE)
+    return taken;
 }
+
+static nmpc_target_t target_of(const nmpc_real_t *numbers)
+{
+    const nmpc_real_t *next = numbers;
+    nmpc_target_t taken;
+
+    TARGET_REALS(TAKE)
+    TARGET_WHOLES(TAKE_WHOLE)
+    return taken;
+}
+
+#define STATE_AT(numbers, i) state_of(&(numbers)[(i) * STATE_NUMBERS])
+#define TARGET_AT(numbers, i) target_of(&(numbers)[(i) * TARGET_NUMBERS])
+#else
+/* Python passes arrays of numbers where the C reads structs: host.c asserts that they are alike. */
+#define STATE_AT(numbers, i) ((const nmpc_state_t *)(const void *)(numbers))[i]
+#define TARGET_AT(numbers, i) ((const nmpc_target_t *)(const void *)(numbers))[i]
 #endif
 
 #ifdef NMPC_STORED_NUMBERS
@@ -102,17 +129,18 @@ void nmpc_batch_init(nmpc_t *controllers, int n)
 
 #ifdef NMPC_HAS_HEIGHT
 /* There is no thrust; Python passes none. */
-void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const nmpc_target_t *target,
+void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const nmpc_real_t *target,
                      const nmpc_real_t *none, const nmpc_outcome_t *outcome)
 {
     int i;
 
     (void)none;
     for (i = 0; i < n; i++) {
-        const nmpc_state_t measured = state_of(&state[i * STATE_NUMBERS]);
+        const nmpc_state_t measured = STATE_AT(state, i);
+        const nmpc_target_t wanted = TARGET_AT(target, i);
         nmpc_command_t command;
 
-        outcome->status[i] = (int)nmpc_step(&controllers[i], &measured, &target[i], &command);
+        outcome->status[i] = (int)nmpc_step(&controllers[i], &measured, &wanted, &command);
         outcome->command_rad[i][0] = command.roll_rad;
         outcome->command_rad[i][1] = command.pitch_rad;
         outcome->thrust_m_s2[i] = command.thrust_m_s2;
@@ -129,13 +157,16 @@ void nmpc_batch_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust
     }
 }
 #else
-void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, const nmpc_target_t *target,
+void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const nmpc_real_t *target,
                             const nmpc_real_t *thrust_acceleration_m_s2, const nmpc_outcome_t *outcome)
 {
     int i;
 
     for (i = 0; i < n; i++) {
-        outcome->status[i] = (int)nmpc_step(&controllers[i], &state[i], &target[i], thrust_acceleration_m_s2[i],
+        const nmpc_state_t measured = STATE_AT(state, i);
+        const nmpc_target_t wanted = TARGET_AT(target, i);
+
+        outcome->status[i] = (int)nmpc_step(&controllers[i], &measured, &wanted, thrust_acceleration_m_s2[i],
                                             &outcome->command[i]);
         read_outcome(&controllers[i], i, outcome);
     }

@@ -16,6 +16,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.flight.controllers import controller_interface
+from mambo_sil.flight.controllers.port_lists import port_lists
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 
 DECLARATIONS: Final = """
@@ -102,7 +103,10 @@ def c_files(bundle: Mapping[str, str]) -> dict[str, str]:
 
 @lru_cache
 def _text(name: str) -> str:
-    return resources.files("mambo_sil.flight.controllers").joinpath(name).read_text("utf-8")
+    """Return C that is compiled with a bundle, with the lists of the port's rows behind its headers."""
+    text = resources.files("mambo_sil.flight.controllers").joinpath(name).read_text("utf-8")
+    before, header, after = text.partition('#include "nmpc.h"\n')
+    return before + header + port_lists() + after
 
 
 @lru_cache

@@ -7,25 +7,18 @@
 #include "nmpc.h"
 
 /* Python passes arrays of numbers where the C reads structs. */
-#ifdef NMPC_HAS_TARGET_ACCELERATION
-#define LEVEL_NUMBERS 6
-#else
-#define LEVEL_NUMBERS 4
-#endif
+#define ONE(member, column, quantity) +1
+#define NUMBERS(record) ((0 record##_REALS(ONE)) * sizeof(nmpc_real_t))
 #ifdef NMPC_HAS_HEIGHT
-#define TARGET_NUMBERS (LEVEL_NUMBERS + (LEVEL_NUMBERS / 2))
-#define COMMAND_NUMBERS 3
 #define AXES 3
-#define LIMITS_NUMBERS 11
 #else
-typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
-#define TARGET_NUMBERS LEVEL_NUMBERS
-#define COMMAND_NUMBERS 2
 #define AXES 2
-#define LIMITS_NUMBERS 7
 #endif
-typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == TARGET_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
-typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == COMMAND_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
+#ifndef NMPC_HAS_WHOLES
+typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == NUMBERS(STATE)) ? 1 : -1];
+typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == NUMBERS(TARGET)) ? 1 : -1];
+#endif
+typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == NUMBERS(COMMAND)) ? 1 : -1];
 #ifndef NMPC_STORED_NUMBERS
 typedef char assert_weights_are_an_array[(sizeof(nmpc_weights_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
 #endif
@@ -93,7 +86,7 @@ void nmpc_host_last_thrust(const nmpc_t *controllers, int n, nmpc_real_t *thrust
 #endif
 
 #ifdef NMPC_LIMIT_SPEED
-typedef char assert_limits_are_an_array[(sizeof(nmpc_limits_t) == LIMITS_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_limits_are_an_array[(sizeof(nmpc_limits_t) == NUMBERS(LIMITS)) ? 1 : -1];
 
 void nmpc_host_set_limits(nmpc_t *controllers, int n, const nmpc_limits_t *limits, int *status)
 {
@@ -149,17 +142,20 @@ static nmpc_real_t number_of(double value, int bits)
     return number;
 }
 #define NUMBER(value, quantity) number_of(value, NMPC_##quantity##_BITS)
-#define ANGLE_RAD(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_ANGLE_BITS))
-#define THRUST_M_S2(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_THRUST_BITS))
+#define IN_SI(number, quantity) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_##quantity##_BITS))
 #else
 #define NUMBER(value, quantity) ((nmpc_real_t)(value))
-#define ANGLE_RAD(number) ((double)(number))
-#define THRUST_M_S2(number) ((double)(number))
+#define IN_SI(number, quantity) ((double)(number))
 #endif
 
-/* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
- * of a state, whose last is not 0 on the floor, and 9 of a target; a thrust that is no
- * NaN is the reported one. It returns the next one behind the angles. */
+#define MEASURE(member, column, quantity) measured.member = NUMBER(state[column], quantity);
+#define MEASURE_WHOLE(member, column, quantity) measured.member = state[column] != (double)0;
+#define WANT(member, column, quantity) wanted.member = NUMBER(target[column], quantity);
+#define WANT_WHOLE(member, column, quantity) wanted.member = target[column] != (double)0;
+#define GIVE(member, column, quantity) command[column] = IN_SI(given.member, quantity);
+
+/* One step of one controller in SI units, for the engine of the simulation, with the columns of the closed loop. Of a
+ * controller of the height a thrust that is no NaN is the reported one. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
                        double thrust_acceleration_m_s2, double *command)
 {
@@ -167,38 +163,19 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     nmpc_target_t wanted;
     nmpc_command_t given;
     nmpc_status_t status;
-    int i;
 
-    for (i = 0; i < 2; i++) {
-        measured.position_m[i] = NUMBER(state[i], POSITION);
-        measured.velocity_m_s[i] = NUMBER(state[2 + i], VELOCITY);
-        wanted.position_m[i] = NUMBER(target[i], POSITION);
-        wanted.velocity_m_s[i] = NUMBER(target[2 + i], VELOCITY);
-#ifdef NMPC_HAS_TARGET_ACCELERATION
-        wanted.acceleration_m_s2[i] = NUMBER(target[4 + i], THRUST);
-#endif
-    }
-    measured.roll_rad = NUMBER(state[4], ANGLE);
-    measured.pitch_rad = NUMBER(state[5], ANGLE);
-    measured.yaw_rad = NUMBER(state[6], YAW);
+    STATE_REALS(MEASURE)
+    STATE_WHOLES(MEASURE_WHOLE)
+    TARGET_REALS(WANT)
+    TARGET_WHOLES(WANT_WHOLE)
 #ifdef NMPC_HAS_HEIGHT
     if (thrust_acceleration_m_s2 == thrust_acceleration_m_s2) {
         (void)nmpc_set_thrust((nmpc_t *)self, NUMBER(thrust_acceleration_m_s2, THRUST));
     }
-    measured.height_m = NUMBER(state[7], POSITION);
-    measured.climb_m_s = NUMBER(state[8], VELOCITY);
-    measured.grounded = state[9] != (double)0;
-    wanted.height_m = NUMBER(target[6], POSITION);
-    wanted.climb_m_s = NUMBER(target[7], VELOCITY);
-#ifdef NMPC_HAS_TARGET_ACCELERATION
-    wanted.climb_acceleration_m_s2 = NUMBER(target[8], THRUST);
-#endif
     status = nmpc_step((nmpc_t *)self, &measured, &wanted, &given);
-    command[2] = THRUST_M_S2(given.thrust_m_s2);
 #else
     status = nmpc_step((nmpc_t *)self, &measured, &wanted, NUMBER(thrust_acceleration_m_s2, THRUST), &given);
 #endif
-    command[0] = ANGLE_RAD(given.roll_rad);
-    command[1] = ANGLE_RAD(given.pitch_rad);
+    COMMAND_REALS(GIVE)
     return (int64_t)status;
 }

@@ -17,6 +17,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.columns import COMMAND, LEVEL, SPACE, Columns, own_columns
 
 CAPPED_SHARE: Final = 1e-6
 """A difference of this share of the weight is no rounding error: the thrust is another one than commanded."""
@@ -48,31 +49,46 @@ def numbers_of(outcome: Any) -> FloatArray:
     return np.concatenate(parts, axis=1, dtype=np.float64)
 
 
-class ThrustController:
-    """n controllers of the height, compiled or in NumPy, behind the interface of the closed loop."""
+class LoopController:
+    """n controllers, compiled or in NumPy, that want some of the columns of the closed loop."""
 
     def __init__(self, controller: Any) -> None:
         self.controller = controller
-        method = method_of(controller.settings)
-        level = len(method.level_target)
-        self._columns = [*range(level), *range(6, 6 + len(method.target) - level)]
+        port = method_of(controller.settings).port
+        self._state, self._target = own_columns(port, "state"), own_columns(port, "target")
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
+        """Return the next commands."""
+        return self.controller.step(*self._own(state, target), thrust_acceleration_m_s2)
+
+    def _own(self, state: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return np.ascontiguousarray(state[:, self._state]), np.ascontiguousarray(target[:, self._target])
+
+    def wrap(self, _engine: Any, inner: Any) -> Any:
+        """Return the same in the engine: `nmpc_host_step` has this interface."""
+        return replace(inner, columns=columns_of(self))
+
+
+class ThrustController(LoopController):
+    """n controllers of the height behind the interface of the closed loop."""
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
         """Tell the controllers the thrusts that are no NaN, and return the next commands."""
         if not np.isnan(thrust_acceleration_m_s2).all():
             self.controller.set_thrust(thrust_acceleration_m_s2)
-        return self.controller.step(state, np.ascontiguousarray(target[:, self._columns]))
-
-    def wrap(self, _engine: Any, inner: Any) -> Any:
-        """Return the same in the engine: `nmpc_host_step` has this interface."""
-        return replace(inner, commands_thrust=True)
+        return self.controller.step(*self._own(state, target))
 
 
 def adapted(controller: Any) -> Any:
     """Return a controller as the closed loop calls it."""
     settings = getattr(controller, "settings", None)
-    has_height = getattr(settings, "height", None) is not None
-    return ThrustController(controller) if has_height else controller
+    if settings is None:
+        return controller
+    if settings.height is not None:
+        return ThrustController(controller)
+    own = [own_columns(method_of(settings).port, record) for record in ("state", "target")]
+    are_first = all(columns == list(range(len(columns))) for columns in own)
+    return controller if are_first else LoopController(controller)
 
 
 def innermost(controller: Any) -> Any:
@@ -82,22 +98,21 @@ def innermost(controller: Any) -> Any:
     return controller
 
 
-def commands_thrust(controller: Any) -> bool:
-    """Return whether a controller, as the closed loop calls it, commands the thrust."""
+def columns_of(controller: Any) -> Columns:
+    """Return the columns of a controller, as the closed loop calls it."""
     while not isinstance(controller, ThrustController):
         if not hasattr(controller, "controller"):
-            return False
+            return LEVEL
         controller = controller.controller
-    return True
+    return SPACE
 
 
 def hover_command(controller: Any) -> tuple[float, ...]:
     """Return roll and pitch of hover and, of a controller that commands the thrust, the thrust over mass."""
-    return (
-        (0.0, 0.0, hover_thrust(innermost(controller).settings))
-        if commands_thrust(controller)
-        else (0.0, 0.0)
-    )
+    command = np.zeros(columns_of(controller).command)
+    if columns_of(controller).commands_thrust:
+        command[COMMAND["thrust_m_s2"]] = hover_thrust(innermost(controller).settings)
+    return tuple(command.tolist())
 
 
 class ThrustDelivery:

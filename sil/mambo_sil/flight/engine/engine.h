@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "lanes.h"
+#include "columns.h"
 #include "records.h"
 
 #endif

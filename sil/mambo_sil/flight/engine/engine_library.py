@@ -12,6 +12,7 @@ from mambo_codegen.settings.key import spell
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.drone.plant import elementary
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET
 from mambo_sil.flight.engine import engine_interface
 from mambo_sil.flight.names import ENGINE_NAMES, EngineName
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
@@ -50,14 +51,33 @@ ffi: Final[Any] = engine_interface.ffi
 def declarations() -> str:
     """Return what Python knows of the engine: records.h with one lane. `ffi` is made from it."""
     records = resources.files("mambo_sil.flight.engine").joinpath("records.h").read_text("utf-8")
-    return f"typedef double real_t; typedef int64_t whole_t;\n{records}"
+    return f"typedef double real_t; typedef int64_t whole_t;\n{_columns()}{records}"
 
 
 def texts() -> dict[str, str]:
     """Return the engine's C by file name."""
     folder = resources.files("mambo_sil.flight.engine")
     files = {name: folder.joinpath(name).read_text("utf-8") for name in (*SOURCES, *HEADERS)}
-    return files | {"constants.h": _constants()}
+    return files | {"constants.h": _constants(), "columns.h": _columns()}
+
+
+def _columns() -> str:
+    """Return how many columns there are, and where those are that the engine itself reads."""
+    numbers = {
+        "STATE_COLUMNS": SPACE.state,
+        "TARGET_COLUMNS": SPACE.target,
+        "COMMAND_COLUMNS": SPACE.command,
+        "LEVEL_TARGET_COLUMNS": LEVEL.target,
+        "POSITION_COLUMN": STATE["position_m"].start,
+        "VELOCITY_COLUMN": STATE["velocity_m_s"].start,
+        "ROLL_COLUMN": STATE["roll_rad"].start,
+        "YAW_COLUMN": STATE["yaw_rad"].start,
+        "HEIGHTS_COLUMN": STATE["height_m"].start,
+        "HEIGHT_COLUMN": TARGET["height_m"].start,
+        "CLIMB_COLUMN": TARGET["climb_m_s"].start,
+        "CLIMB_ACCELERATION_COLUMN": TARGET["climb_acceleration_m_s2"].start,
+    }
+    return "".join(f"#define {name} {number}\n" for name, number in numbers.items())
 
 
 def _constants() -> str:

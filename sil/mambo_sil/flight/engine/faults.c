@@ -27,7 +27,7 @@ static double remainder_of(double value, double period)
 static void alter(const engine_faulty_t *faulty, int64_t since, double *state, double *target, double *thrust_m_s2)
 {
     const double *values = faulty->values;
-    const int64_t states = faulty->commands_thrust ? 10 : 7;
+    const int64_t states = faulty->states;
     int64_t i;
 
     switch (faulty->effect) {
@@ -52,10 +52,10 @@ static void alter(const engine_faulty_t *faulty, int64_t since, double *state, d
         }
         break;
     case WRAP_YAW:
-        state[6] = remainder_of(state[6] + values[0], 2.0 * values[0]) - values[0];
+        state[YAW_COLUMN] = remainder_of(state[YAW_COLUMN] + values[0], 2.0 * values[0]) - values[0];
         break;
     case SHIFT_TARGET:
-        for (i = 0; i < 6; i++) {
+        for (i = 0; i < LEVEL_TARGET_COLUMNS; i++) {
             target[i] = target[i] + values[i];
         }
         break;
@@ -73,14 +73,14 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
     const int64_t depth = faulty->late_updates + 1;
     const int active = (faulty->begin <= faulty->update) && (faulty->update < faulty->end);
     const int dropped = active && (faulty->drop_every > 0) && ((since % faulty->drop_every) == 0);
-    const size_t states = (faulty->commands_thrust ? 10U : 7U) * sizeof(double);
-    const size_t targets = (faulty->commands_thrust ? 9U : 6U) * sizeof(double);
-    double *computed = faulty->computed + (3 * (faulty->update % depth));
-    const double *before = faulty->computed + (3 * ((faulty->update + faulty->late_updates) % depth));
+    const size_t states = (size_t)faulty->states * sizeof(double);
+    const size_t targets = (size_t)faulty->targets * sizeof(double);
+    double *computed = faulty->computed + (COMMAND_COLUMNS * (faulty->update % depth));
+    const double *before = faulty->computed + (COMMAND_COLUMNS * ((faulty->update + faulty->late_updates) % depth));
     const double *sent = computed;
-    double given[10];
-    double aimed[9];
-    double answer[3] = { 0.0, 0.0, 0.0 };
+    double given[STATE_COLUMNS];
+    double aimed[TARGET_COLUMNS];
+    double answer[COMMAND_COLUMNS] = { 0.0 };
     int64_t status;
     int i;
 
@@ -93,7 +93,7 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
         alter(faulty, since, given, aimed, &thrust_acceleration_m_s2);
     }
     if (dropped) {
-        for (i = 0; i < 10; i++) {
+        for (i = 0; i < STATE_COLUMNS; i++) {
             given[i] = NAN;
         }
         if (faulty->memory != NULL) {
@@ -112,9 +112,9 @@ int64_t engine_faulty_step(void *self, const double *state, const double *target
     if (active) {
         const int64_t late = (faulty->late_updates <= since) ? faulty->late_updates : (since + 1);
 
-        sent = faulty->computed + (3 * (((faulty->update + depth) - late) % depth));
+        sent = faulty->computed + (COMMAND_COLUMNS * (((faulty->update + depth) - late) % depth));
     }
-    memcpy(command_rad, sent, (faulty->commands_thrust ? 3U : 2U) * sizeof *sent);
+    memcpy(command_rad, sent, (size_t)faulty->commands * sizeof *sent);
     faulty->update++;
     return status;
 }
@@ -131,11 +131,7 @@ int64_t engine_levelling_step(void *self, const double *state, const double *tar
         caller->reset(caller->memory, 1, caller->level, &ignored);
     }
     if (caller->refused >= caller->patience) {
-        command_rad[0] = 0.0;
-        command_rad[1] = 0.0;
-        if (caller->commands_thrust) {
-            command_rad[2] = caller->hover_m_s2;
-        }
+        memcpy(command_rad, caller->hover, (size_t)caller->commands * sizeof *command_rad);
     }
     return status;
 }

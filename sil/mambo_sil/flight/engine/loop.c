@@ -5,10 +5,6 @@
 #include "cascade.h"
 #include "loop.h"
 
-/* Columns of a target with a height, and the first one of these. */
-#define SPATIAL_COLUMNS 9
-#define HEIGHT_COLUMN 6
-
 /* A number of the trace: all NaN are one, whatever the processor makes of them. */
 static inline double number(double value)
 {
@@ -58,16 +54,20 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         const int64_t row = ((index + lane) * simulation->updates) + update;
         const int64_t drop = (lane * simulation->updates) + update;
         const int dropped = simulation->dropping && (draws->drops[drop] < lane_of(flight->dropped_share, lane));
-        double measured[10];
-        double answer[3] = { 0.0, 0.0, 0.0 };
+        double measured[STATE_COLUMNS];
+        double answer[COMMAND_COLUMNS] = { 0.0 };
         int64_t status;
 
-        for (i = 0; i < 10; i++) {
-            const real_t value = (i < 2) ? seen->position_m[i]
-                                         : ((i < 4) ? seen->velocity_m_s[i - 2]
-                                                    : ((i < 7) ? seen->euler_rad[i - 4] : heights[i - 7]));
-
-            measured[i] = dropped ? NAN : lane_of(value, lane);
+        for (i = 0; i < STATE_COLUMNS; i++) {
+            measured[i] = dropped ? NAN : 0.0;
+        }
+        for (i = 0; (i < 3) && !dropped; i++) {
+            if (i < 2) {
+                measured[POSITION_COLUMN + i] = lane_of(seen->position_m[i], lane);
+                measured[VELOCITY_COLUMN + i] = lane_of(seen->velocity_m_s[i], lane);
+            }
+            measured[ROLL_COLUMN + i] = lane_of(seen->euler_rad[i], lane);
+            measured[HEIGHTS_COLUMN + i] = lane_of(heights[i], lane);
         }
         status = controller((char *)self + (lane * stride), measured, targets + (simulation->target_columns * row),
                             lane_of(thrust_m_s2, lane), answer);
@@ -132,14 +132,14 @@ static inline vertical_t vertical_target(const engine_simulation_t *simulation, 
     vertical_t wanted;
     int lane;
 
-    if (simulation->target_columns >= SPATIAL_COLUMNS) {
+    if (simulation->target_columns >= TARGET_COLUMNS) {
         for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
             const int64_t row = ((index + lane) * simulation->updates) + update;
             const double *target = targets + (simulation->target_columns * row);
 
             z_m.lane[lane] = 0.0 - target[HEIGHT_COLUMN];
-            climb_m_s.lane[lane] = target[HEIGHT_COLUMN + 1];
-            acceleration_m_s2.lane[lane] = target[HEIGHT_COLUMN + 2];
+            climb_m_s.lane[lane] = target[CLIMB_COLUMN];
+            acceleration_m_s2.lane[lane] = target[CLIMB_ACCELERATION_COLUMN];
         }
     }
     wanted.z_m = z_m.real;

@@ -10,6 +10,7 @@ import numpy as np
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.link import NOT_CALLED
+from mambo_sil.flight.columns import LEVEL, Columns
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import ffi as controller_ffi
 from mambo_sil.flight.controllers.pd import (
@@ -25,7 +26,7 @@ from mambo_sil.flight.controllers.pd import (
     PdFeedForwardController,
     PidFeedForwardController,
 )
-from mambo_sil.flight.controllers.thrust_controller import commands_thrust, numbers_of
+from mambo_sil.flight.controllers.thrust_controller import columns_of, numbers_of
 from mambo_sil.flight.engine.engine_library import ffi
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PdName
@@ -45,14 +46,14 @@ class Native:
     """n controllers in C: the function of a step, their instances, and the bytes from one to the next.
 
     kept: whatever the instances point to, which lives as long as this record.
-    commands_thrust: whether they command the thrust.
+    columns: what they take and give.
     """
 
     step: Any
     instances: Any
     stride: int
     kept: tuple[Any, ...] = ()
-    commands_thrust: bool = False
+    columns: Columns = LEVEL
 
     def instance(self, index: int) -> Any:
         """Return a pointer to the instance of flight `index`."""
@@ -144,15 +145,15 @@ def called_back(
     The bits are those of the loop in NumPy. After an exception, which cannot pass through C, the controller
     is not called any more.
     """
-    has_thrust, errors = commands_thrust(controller), list[BaseException]()
-    targets = flight.targets_for(commands_thrust=has_thrust)
+    columns, errors = columns_of(controller), list[BaseException]()
+    targets = flight.targets_for(columns)
     updates, done = len(targets), 0
 
     def step(_self: Any, state: Any, target: Any, thrust_m_s2: float, command: Any) -> int:
         nonlocal done
         if errors:
             return NOT_CALLED
-        measured, wanted = _row(state, 10 if has_thrust else 7), _row(target, targets.shape[2])
+        measured, wanted = _row(state, columns.state), _row(target, targets.shape[2])
         outcome = controller.step(measured, wanted, np.array([thrust_m_s2]))
         numbers = numbers_of(outcome)
         ffi.memmove(command, numbers, numbers.nbytes)
@@ -165,7 +166,7 @@ def called_back(
         errors.append(error.with_traceback(traceback))
 
     function = ffi.callback("engine_controller_t", step, error=NOT_CALLED, onerror=keep)
-    return Native(function, ffi.NULL, 0, (function,), has_thrust), errors
+    return Native(function, ffi.NULL, 0, (function,), columns), errors
 
 
 def _row(numbers: Any, columns: int) -> FloatArray:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
+ * What Python and the engine exchange. cffi reads this file as the C compiler does, behind columns.h, which Python
+ * writes. Every member is 8 bytes wide,
  * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and
  * signs are as in the Python modules that the names of the headers repeat.
  */
@@ -22,7 +23,7 @@ typedef struct {
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
     int64_t commands_thrust;  /* whether the controllers command the thrust */
-    int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
+    int64_t target_columns;   /* of a row of targets: TARGET_COLUMNS if courses have heights */
 
     double step_s;            /* a tick */
     double gravity_m_s2;
@@ -280,9 +281,11 @@ int64_t engine_pid_feedforward_step(void *self, const double *state, const doubl
 typedef struct {
     engine_controller_t controller;
     void *self;
-    int64_t commands_thrust;  /* whether the controller commands the thrust */
+    int64_t states;           /* numbers of a state, of a target, and of a command */
+    int64_t targets;
+    int64_t commands;
     int64_t effect;
-    double values[10];
+    double values[STATE_COLUMNS];
     int64_t columns[2];
     int64_t on;
     int64_t of;
@@ -293,8 +296,8 @@ typedef struct {
     char *memory;             /* of the controller, which a dropped update leaves as it is; NULL if it has none */
     char *saved;              /* as long as memory */
     int64_t memory_bytes;
-    double *computed;         /* (late_updates + 1, 3): the last commands, at the remainder of their update */
-    double began[10];         /* state at the onset */
+    double *computed;         /* (late_updates + 1, COMMAND_COLUMNS): the last commands, at the remainder of their update */
+    double began[STATE_COLUMNS];         /* state at the onset */
     int64_t update;
 } engine_faulty_t;
 
@@ -311,8 +314,8 @@ typedef struct {
     engine_setter_t reset;
     void *memory;             /* of the generated controller */
     const void *level;        /* zero tilt, and the thrust of hover if it has one, in its numbers */
-    double hover_m_s2;
-    int64_t commands_thrust;
+    double hover[COMMAND_COLUMNS];
+    int64_t commands;         /* numbers of a command */
     int64_t patience;
     int64_t refused;
 } engine_levelling_t;

@@ -25,6 +25,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MixerName,
 )
 from mambo_sil.flight import altitude_loops
+from mambo_sil.flight.columns import LEVEL, Columns
 from mambo_sil.flight.controllers.thrust_controller import CAPPED_SHARE
 from mambo_sil.flight.engine.engine_library import record_type
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, open_loop_updates, start_state
@@ -45,11 +46,8 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(flight: Flight, times_s: FloatArray, *, commands_thrust: bool = False) -> Record:
-    """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
-
-    `commands_thrust` says whether the controllers command the thrust.
-    """
+def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LEVEL) -> Record:
+    """Return the engine_simulation_t of a simulation with updates at `times_s` (k,), for some controllers."""
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
     transition, input_gain = instruments.discretize_imu(STEP_S)
@@ -74,8 +72,8 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, commands_thrust: b
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
-            "commands_thrust": commands_thrust,
-            "target_columns": flight.targets_for(commands_thrust=commands_thrust).shape[2],
+            "commands_thrust": columns.commands_thrust,
+            "target_columns": flight.targets_for(columns).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,

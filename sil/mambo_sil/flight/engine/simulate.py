@@ -169,9 +169,8 @@ class _Simulation:
 
     def fly(self, first: int, called: Native, record: Any, place: int) -> None:
         """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
-        flight, has_thrust = self._flight, called.commands_thrust
-        common = self._records(commands_thrust=has_thrust)
-        targets = flight.targets_for(commands_thrust=has_thrust)
+        flight = self._flight
+        common, targets = self._records(called.columns), flight.targets_for(called.columns)
         common["flights"] = place + min(self.lanes, flight.flights - first)
         self._engine.engine_fly(
             pointer("engine_simulation_t *", common),
