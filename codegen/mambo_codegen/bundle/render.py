@@ -26,7 +26,7 @@ from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix, products, term
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
-from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -34,7 +34,6 @@ from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
     STATE,
-    TARGET,
     THRUST,
     WEIGHTS,
     YAW_LIMIT_RAD,
@@ -209,18 +208,10 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             "limiting": method.limiting,
             "tilt_limit": "self->bounds.tilt_rad" if method.has_limits else "NMPC_TILT_LIMIT_RAD",
             **limits_context(method),
-            "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
-            "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
             "port": method.port,
             "aim": AIM,
             "beside_target": BESIDE,
             "chance": CHANCE,
-            "state_members": [one.member for one in method.port.numbers("state")],
-            "limits_members": [one.member for one in method.port.numbers("limits")],
-            "fuzz_target": _target_inputs(method, len(method.state)),
-            "proof_target": _target_inputs(method, len(method.state) - method.has_height),
-            "level_columns": len(method.level_target),
-            "target_numbers": len(method.target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
             "given": settings.target.gives_acceleration,
@@ -258,18 +249,6 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             "rule_flags": " ".join(RULE_FLAGS),
         }
     )
-
-
-def _target_inputs(method: Method, first: int) -> list[tuple[str, int]]:
-    """Return the members of a target and their indices among inputs from `first` on.
-
-    Without a height the thrust stands between velocity and acceleration.
-    """
-    thrust = len(TARGET) if not method.has_height else math.inf
-    return [
-        (name, first + k + (k >= thrust))
-        for k, name in enumerate(one.member for one in method.port.numbers("target"))
-    ]
 
 
 def _settings_id(settings: Settings) -> str:

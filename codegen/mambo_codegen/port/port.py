@@ -5,17 +5,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
-from mambo_codegen.port.row import NUMBER, WHOLE, Number, Row
+from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, Row
 from mambo_codegen.port.tables import KEPT, TAKEN, Table
 
-RANGES: Final = {
-    "position": "NMPC_POSITION_RANGE_M",
-    "velocity": "NMPC_VELOCITY_RANGE_M_S",
-    "angle": "NMPC_ATTITUDE_RANGE_RAD",
-    "yaw": "NMPC_YAW_RANGE_RAD",
-    "thrust": "NMPC_THRUST_ACCELERATION_MAX_M_S2",
-}
-"""The largest magnitude of what a controller takes, in C, by quantity."""
 _CHECKED: Final = ("state", "target")
 """The records whose comments tell the ranges."""
 _NAMED_BITS: Final = {name: f"NMPC_{name.upper()}_BITS" for name in ("thrust", "braking", "factor")}
@@ -34,6 +26,20 @@ class Member:
     def width(self) -> int:
         """The characters before the comment."""
         return len(f"{self.kind} {self.name};")
+
+
+@dataclass(frozen=True)
+class StepNumber:
+    """A number among the inputs of a step in one row.
+
+    record: state, target or thrust.
+    member: in C; none of the thrust, which is an argument.
+    """
+
+    record: str
+    member: str
+    quantity: str
+    column: int
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,24 @@ class Port:
     def quantities(self, record: str) -> tuple[str, ...]:
         """Return the quantity of each number of a record."""
         return tuple(number.quantity for number in self.numbers(record))
+
+    def step_row(self, *, wholes: bool = True) -> tuple[StepNumber, ...]:
+        """Return the inputs of a step in one row: state, target, thrust, and what of the target is optional.
+
+        With a height state and target, and no thrust. Without `wholes` only numbers that are no integers.
+        """
+        of = self.numbers if wholes else self.reals
+        target = [("target", one.member, one.quantity) for one in of("target")]
+        if "height" not in self.parts:
+            optional = sum(bool(one.row.when) for one in of("target"))
+            target.insert(len(target) - optional, ("thrust", "", "thrust"))
+        row = [*(("state", one.member, one.quantity) for one in of("state")), *target]
+        return tuple(StepNumber(*one, column) for column, one in enumerate(row))
+
+    def thrust_column(self, *, wholes: bool = True) -> int | None:
+        """Return the column of the thrust in such a row; None with a height."""
+        found = [one.column for one in self.step_row(wholes=wholes) if one.record == "thrust"]
+        return found[0] if found else None
 
     @property
     def axes(self) -> int:

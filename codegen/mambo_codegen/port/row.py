@@ -16,6 +16,15 @@ MACROS: Final = {
 }
 """How nmpc.h says that a part is there on which what a controller takes depends."""
 
+RANGES: Final = {
+    "position": "NMPC_POSITION_RANGE_M",
+    "velocity": "NMPC_VELOCITY_RANGE_M_S",
+    "angle": "NMPC_ATTITUDE_RANGE_RAD",
+    "yaw": "NMPC_YAW_RANGE_RAD",
+    "thrust": "NMPC_THRUST_ACCELERATION_MAX_M_S2",
+}
+"""The largest magnitude of what a controller takes, in C, by quantity."""
+
 SIGNED: Final = "signed"
 SHARE: Final = "share"
 
@@ -55,6 +64,7 @@ class Row:
     unit:     where the name has none.
     note:     what its comment says behind the range.
     draw:     what the self-test draws for it; None of what is not taken.
+    reset:    what nmpc_init() makes of a command's, a constant of nmpc.h; 0 without.
     """
 
     member: str
@@ -66,6 +76,7 @@ class Row:
     unit: str = ""
     note: str = ""
     draw: Draw | None = None
+    reset: str = ""
 
     @property
     def is_upward(self) -> bool:
@@ -91,3 +102,8 @@ class Number:
     def quantity(self) -> str:
         """What fixed point has a format for."""
         return self.row.quantity
+
+    @property
+    def range(self) -> str:
+        """Its largest magnitude in C if a controller takes it; none of what has no range."""
+        return RANGES.get(self.row.quantity, "")

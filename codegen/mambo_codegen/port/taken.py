@@ -46,6 +46,7 @@ COMMAND: Final = (
         "thrust over mass{over_gain}, from NMPC_THRUST_MIN_M_S2 to NMPC_THRUST_MAX_M_S2",
         when=_HEIGHT,
         draw=Draw("THRUST_M_S2", way=SHARE),
+        reset="NMPC_HOVER_M_S2",
     ),
 )
 

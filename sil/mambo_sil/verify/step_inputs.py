@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import STATE, TARGET, THRUST
+from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -46,15 +46,15 @@ class StepRows:
 
     def __init__(self, method: Method) -> None:
         self._hover_m_s2 = hover_thrust(method.settings)
-        first, is_given = len(method.state), len(method.level_target) > len(TARGET)
-        after = first + len(TARGET)
-        self.target, self.thrust = slice(first, after), slice(after, after + (not method.has_height))
-        self.acceleration = slice(self.thrust.stop, self.thrust.stop + (2 * is_given))
-        self.quantities: tuple[str, ...] = (
-            (*method.state, *method.target)
-            if method.has_height
-            else (*STATE, *TARGET, *THRUST, *method.target[len(TARGET) :])
+        row = method.port.step_row()
+        self.quantities: tuple[str, ...] = tuple(one.quantity for one in row)
+        self._state, self._target, thrust = (
+            [one.column for one in row if one.record == record] for record in ("state", "target", "thrust")
         )
+        after = self._target[0] + len(TARGET)
+        self.target, self.thrust = slice(self._target[0], after), slice(after, after + len(thrust))
+        places = [one.column for one in row if one.member.startswith("acceleration_m_s2")]
+        self.acceleration = slice(self.thrust.stop, self.thrust.stop + len(places))
 
     def hovering(self, n: int) -> Array:
         """Return rows (n, k) of drones that hover in the origin, which is their target."""
@@ -64,15 +64,20 @@ class StepRows:
 
     def join(self, inputs: StepInputs) -> Array:
         """Return the rows (n, k) of inputs."""
-        n, level, target = len(inputs.state), len(TARGET), inputs.target
-        thrust = np.zeros((n, 0)) if inputs.thrust is None else inputs.thrust[:, None]
-        return np.concatenate([inputs.state, target[:, :level], thrust, target[:, level:]], axis=1)
+        rows = np.zeros((len(inputs.state), len(self.quantities)))
+        rows[:, self._state], rows[:, self._target] = inputs.state, inputs.target
+        if inputs.thrust is not None:
+            rows[:, self.thrust] = inputs.thrust[:, np.newaxis]
+        return rows
 
     def split(self, rows: NDArray[Any]) -> StepInputs:
         """Return the inputs of rows (n, k)."""
-        target = np.concatenate([rows[:, self.target], rows[:, self.thrust.stop :]], axis=1)
         thrust = rows[:, self.thrust]
-        return StepInputs(rows[:, : self.target.start], target, thrust[:, 0] if thrust.size else None)
+        return StepInputs(
+            np.ascontiguousarray(rows[:, self._state]),
+            np.ascontiguousarray(rows[:, self._target]),
+            thrust[:, 0] if thrust.size else None,
+        )
 
 
 def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
