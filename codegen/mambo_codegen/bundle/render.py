@@ -26,7 +26,7 @@ from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix, products, term
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
-from mambo_codegen.methods import method_of
+from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -104,6 +104,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         "ticks_per_update": ticks,
         "update_period_ns": round(1e9 * settings.horizon.update_period_s),
         "variables": fmu_variables(settings),
+        "pil_payload_bytes": _pil_payload_bytes(method_of(settings)),
         "for_flow": settings.observer is not None and settings.observer.position_noise >= FLOW_NOISE_M,
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }
@@ -114,6 +115,13 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         if path.startswith(own)
     }
     return library | _finish(files, settings)
+
+
+def _pil_payload_bytes(method: Method) -> int:
+    """Return the longest payload of the processor in the loop, for the inputs of a step behind its head."""
+    port = method.port
+    numbers = len(port.numbers("state")) + len(port.numbers("target")) + 1
+    return 128 if 5 + (numbers * method.numbers.bytes[0]) <= 128 else 192
 
 
 def _places(name: str, context: Mapping[str, object]) -> list[str]:

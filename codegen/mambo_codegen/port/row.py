@@ -65,6 +65,7 @@ class Row:
     note:     what its comment says behind the range.
     draw:     what the self-test draws for it; None of what is not taken.
     reset:    what nmpc_init() makes of a command's, a constant of nmpc.h; 0 without.
+    told:     of each number the name and the description as a variable of a functional mock-up unit.
     """
 
     member: str
@@ -77,6 +78,7 @@ class Row:
     note: str = ""
     draw: Draw | None = None
     reset: str = ""
+    told: tuple[tuple[str, str], ...] = ()
 
     @property
     def is_upward(self) -> bool:
@@ -102,6 +104,14 @@ class Number:
     def quantity(self) -> str:
         """What fixed point has a format for."""
         return self.row.quantity
+
+    @property
+    def told(self) -> tuple[str, str]:
+        """Name and description of a variable; without any in the row made of the member's and its words."""
+        if self.row.told:
+            return self.row.told[self.axis]
+        name = self.member.replace("[", "_").rstrip("]")
+        return name, self.row.words or name
 
     @property
     def range(self) -> str:

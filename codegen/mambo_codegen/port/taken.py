@@ -11,13 +11,48 @@ _TILT: Final = Draw("ATTITUDE_RAD", 0.8)
 _STATE_TILT: Final = replace(_TILT, rests=True)
 
 STATE: Final = (
-    Row("position_m", "position", "x north, y east", 2, draw=BESIDE),
-    Row("velocity_m_s", "velocity", "v_x, v_y", 2, draw=BESIDE),
-    Row("roll_rad", "angle", "phi", draw=_STATE_TILT),
-    Row("pitch_rad", "angle", "theta", draw=_STATE_TILT),
-    Row("yaw_rad", "yaw", "psi", note=", wrapped or not", draw=Draw("YAW_RAD", 100.0)),
-    Row("height_m", "position", "up", when=_HEIGHT, draw=BESIDE),
-    Row("climb_m_s", "velocity", "up", when=_HEIGHT, draw=BESIDE),
+    Row(
+        "position_m",
+        "position",
+        "x north, y east",
+        2,
+        draw=BESIDE,
+        told=(("x", "measured position north"), ("y", "measured position east")),
+    ),
+    Row(
+        "velocity_m_s",
+        "velocity",
+        "v_x, v_y",
+        2,
+        draw=BESIDE,
+        told=(("vx", "measured velocity north"), ("vy", "measured velocity east")),
+    ),
+    Row("roll_rad", "angle", "phi", draw=_STATE_TILT, told=(("roll", "measured roll, right side down"),)),
+    Row("pitch_rad", "angle", "theta", draw=_STATE_TILT, told=(("pitch", "measured pitch, nose up"),)),
+    Row(
+        "yaw_rad",
+        "yaw",
+        "psi",
+        note=", wrapped or not",
+        draw=Draw("YAW_RAD", 100.0),
+        told=(("yaw", "measured yaw, clockwise from above"),),
+    ),
+    Row(
+        "height_m",
+        "position",
+        "up",
+        when=_HEIGHT,
+        draw=BESIDE,
+        told=(("height", "measured height, upwards"),),
+    ),
+    Row(
+        "climb_m_s",
+        "velocity",
+        "up",
+        when=_HEIGHT,
+        draw=BESIDE,
+        told=(("climb", "measured velocity upwards"),),
+    ),
     Row(
         "grounded",
         "whole",
@@ -25,21 +60,68 @@ STATE: Final = (
         when=_HEIGHT,
         kind=WHOLE,
         draw=CHANCE,
+        told=(("grounded", "1 while the drone touches the floor, else 0"),),
     ),
 )
 
 TARGET: Final = (
-    Row("position_m", "position", "Tp_k = x_ref, y_ref", 2, draw=AIM),
-    Row("velocity_m_s", "velocity", "Tv_k = vx_ref, vy_ref", 2, draw=AIM),
-    Row("acceleration_m_s2", "thrust", "", 2, ("given",), draw=Draw("TARGET_M_S2")),
-    Row("height_m", "position", "up", when=_HEIGHT, draw=AIM),
-    Row("climb_m_s", "velocity", "up", when=_HEIGHT, draw=AIM),
-    Row("climb_acceleration_m_s2", "thrust", "up", when=("height", "given"), draw=Draw("CLIMB_M_S2")),
+    Row(
+        "position_m",
+        "position",
+        "Tp_k = x_ref, y_ref",
+        2,
+        draw=AIM,
+        told=(("target_x", "position of the target north"), ("target_y", "position of the target east")),
+    ),
+    Row(
+        "velocity_m_s",
+        "velocity",
+        "Tv_k = vx_ref, vy_ref",
+        2,
+        draw=AIM,
+        told=(("target_vx", "velocity of the target north"), ("target_vy", "velocity of the target east")),
+    ),
+    Row(
+        "acceleration_m_s2",
+        "thrust",
+        "",
+        2,
+        ("given",),
+        draw=Draw("TARGET_M_S2"),
+        told=(
+            ("target_ax", "acceleration of the target north"),
+            ("target_ay", "acceleration of the target east"),
+        ),
+    ),
+    Row(
+        "height_m",
+        "position",
+        "up",
+        when=_HEIGHT,
+        draw=AIM,
+        told=(("target_height", "height of the target"),),
+    ),
+    Row(
+        "climb_m_s",
+        "velocity",
+        "up",
+        when=_HEIGHT,
+        draw=AIM,
+        told=(("target_climb", "velocity of the target upwards"),),
+    ),
+    Row(
+        "climb_acceleration_m_s2",
+        "thrust",
+        "up",
+        when=("height", "given"),
+        draw=Draw("CLIMB_M_S2"),
+        told=(("target_az", "acceleration of the target upwards"),),
+    ),
 )
 
 COMMAND: Final = (
-    Row("roll_rad", "angle", "phi*", draw=_TILT),
-    Row("pitch_rad", "angle", "theta*", draw=_TILT),
+    Row("roll_rad", "angle", "phi*", draw=_TILT, told=(("roll_command", "roll command"),)),
+    Row("pitch_rad", "angle", "theta*", draw=_TILT, told=(("pitch_command", "pitch command"),)),
     Row(
         "thrust_m_s2",
         "thrust",
@@ -47,6 +129,7 @@ COMMAND: Final = (
         when=_HEIGHT,
         draw=Draw("THRUST_M_S2", way=SHARE),
         reset="NMPC_HOVER_M_S2",
+        told=(("thrust_command", "thrust over mass"),),
     ),
 )
 
@@ -74,28 +157,74 @@ ESTIMATE: Final = (
 )
 
 LIMITS: Final = (
-    Row("speed_m_s", "velocity", "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S"),
-    Row("braking_m_s2", "braking", "NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives"),
-    Row("fence_min_m", "position", "the walls at the least x and y,", 2),
-    Row("fence_max_m", "position", "and at the largest; all within +/- NMPC_POSITION_RANGE_M", 2),
+    Row(
+        "speed_m_s",
+        "velocity",
+        "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S",
+        told=(("speed_limit", "speed limit"),),
+    ),
+    Row(
+        "braking_m_s2",
+        "braking",
+        "NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives",
+        told=(("braking_limit", "braking limit"),),
+    ),
+    Row(
+        "fence_min_m",
+        "position",
+        "the walls at the least x and y,",
+        2,
+        told=(("fence_x_min", "least x in the fence"), ("fence_y_min", "least y in the fence")),
+    ),
+    Row(
+        "fence_max_m",
+        "position",
+        "and at the largest; all within +/- NMPC_POSITION_RANGE_M",
+        2,
+        told=(("fence_x_max", "largest x in the fence"), ("fence_y_max", "largest y in the fence")),
+    ),
     Row("tilt_rad", "angle", "at most NMPC_TILT_LIMIT_RAD"),
-    Row("floor_m", "position", "walls below and", when=_HEIGHT),
-    Row("ceiling_m", "position", "above, within +/- NMPC_POSITION_RANGE_M", when=_HEIGHT),
+    Row(
+        "floor_m", "position", "walls below and", when=_HEIGHT, told=(("floor", "least height in the fence"),)
+    ),
+    Row(
+        "ceiling_m",
+        "position",
+        "above, within +/- NMPC_POSITION_RANGE_M",
+        when=_HEIGHT,
+        told=(("ceiling", "largest height in the fence"),),
+    ),
     Row(
         "climb_m_s",
         "velocity",
         "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_CLIMB_LIMIT_M_S",
         when=_HEIGHT,
+        told=(("climb_limit", "speed limit upwards, refused where the thrust cannot brake it in time"),),
     ),
     Row(
         "descent_m_s",
         "velocity",
         "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_DESCENT_LIMIT_M_S",
         when=_HEIGHT,
+        told=(("descent_limit", "speed limit downwards, refused where the thrust cannot brake it in time"),),
     ),
 )
 
 WEIGHTS: Final = (
-    Row("tracking", "tracking", "lambda_1", unit="1/m", draw=Draw("TRACKING")),
-    Row("effort", "effort", "lambda_2", unit="1/rad", draw=Draw("EFFORT")),
+    Row(
+        "tracking",
+        "tracking",
+        "lambda_1",
+        unit="1/m",
+        draw=Draw("TRACKING"),
+        told=(("tracking_weight", "lambda1, eq 12"),),
+    ),
+    Row(
+        "effort",
+        "effort",
+        "lambda_2",
+        unit="1/rad",
+        draw=Draw("EFFORT"),
+        told=(("effort_weight", "lambda2, eq 12"),),
+    ),
 )
