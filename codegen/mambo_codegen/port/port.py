@@ -105,15 +105,15 @@ class Port:
         return tuple(number.quantity for number in self.numbers(record))
 
     def step_row(self, *, wholes: bool = True) -> tuple[StepNumber, ...]:
-        """Return the inputs of a step in one row: state, target, thrust, and what of the target is optional.
+        """Return the inputs of a step in one row: state and target, the thrust before what of it is optional.
 
         With a height state and target, and no thrust. Without `wholes` only numbers that are no integers.
         """
         of = self.numbers if wholes else self.reals
         target = [("target", one.member, one.quantity) for one in of("target")]
         if "height" not in self.parts:
-            optional = sum(bool(one.row.when) for one in of("target"))
-            target.insert(len(target) - optional, ("thrust", "", "thrust"))
+            optional = [place for place, one in enumerate(of("target")) if one.row.when]
+            target.insert(min(optional, default=len(target)), ("thrust", "", "thrust"))
         row = [*(("state", one.member, one.quantity) for one in of("state")), *target]
         return tuple(StepNumber(*one, column) for column, one in enumerate(row))
 

@@ -1,7 +1,7 @@
 """Controllers for programs: the generated C of some settings, compiled for this machine, for n drones."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Self, Unpack
 
@@ -307,16 +307,11 @@ class Controller:
         return batch
 
     def _places(self, state: DroneState) -> list[FloatArray]:
-        """Return the columns of states, the height's upwards."""
-        columns = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
-        if self._method.has_height:
-            contact = state.grounded.reshape(-1).astype(np.float64)
-            columns += [*_heights(state.position_m, state.velocity_m_s), contact]
-        return columns
+        """Return the columns of states, the height's upwards; raises ArgumentError for a member too few."""
+        return self._columns_of("state", state, _STATE)
 
     def _aims(self, target: TargetState) -> list[FloatArray]:
         """Return the columns of targets; raises ArgumentError if the controller is not told enough."""
-        aims = [target.position_m, target.velocity_m_s]
         given = self.settings.target
         if given.gives_acceleration:
             acceleration = target.acceleration_m_s2
@@ -324,8 +319,22 @@ class Controller:
                 raise ArgumentError(_missing("acceleration_m_s2", given.acceleration))
             if self._method.has_height and acceleration.shape[-1] != 3:
                 raise ArgumentError("target: acceleration_m_s2 has no z; [height] wants x, y, z (..., 3)")
-            aims.append(acceleration)
-        return _columns(*aims) + (_heights(*aims) if self._method.has_height else [])
+        return self._columns_of("target", target, _TARGET)
+
+    def _columns_of(
+        self, record: str, given: Any, sources: Mapping[str, Callable[[Any], list[FloatArray]]]
+    ) -> list[FloatArray]:
+        """Return the columns of the members of a record, from their sources or of the same name."""
+        columns = list[FloatArray]()
+        for row in self._method.port.rows(record):
+            if row.member in sources:
+                columns += sources[row.member](given)
+            elif (values := getattr(given, row.member, None)) is None:
+                raise ArgumentError(f"{record}: {row.member} is missing; the settings want it")
+            else:
+                flat = np.reshape(values, (self.n, -1)).astype(np.float64)
+                columns += [flat[:, axis] for axis in range(self._method.port.count(row))]
+        return columns
 
     def _empty_inputs(self) -> list[NDArray[Any]]:
         """Return the arrays that the C reads: states and targets (n, k), thrusts (n,) without `[height]`."""
@@ -407,6 +416,27 @@ def _columns(*batches: FloatArray, count: int = 2) -> list[FloatArray]:
 def _heights(*batches: FloatArray) -> list[FloatArray]:
     """Return minus z (n,) of each of several batches of vectors: up is positive in the C."""
     return [-values[..., 2].reshape(-1) for values in batches]
+
+
+_STATE: Final[Mapping[str, Callable[[DroneState], list[FloatArray]]]] = {
+    "position_m": lambda state: _columns(state.position_m),
+    "velocity_m_s": lambda state: _columns(state.velocity_m_s),
+    "roll_rad": lambda state: _columns(state.attitude_rad, count=3)[:1],
+    "pitch_rad": lambda state: _columns(state.attitude_rad, count=3)[1:2],
+    "yaw_rad": lambda state: _columns(state.attitude_rad, count=3)[2:],
+    "height_m": lambda state: _heights(state.position_m),
+    "climb_m_s": lambda state: _heights(state.velocity_m_s),
+    "grounded": lambda state: [state.grounded.reshape(-1).astype(np.float64)],
+}
+_TARGET: Final[Mapping[str, Callable[[Any], list[FloatArray]]]] = {
+    "position_m": lambda target: _columns(target.position_m),
+    "velocity_m_s": lambda target: _columns(target.velocity_m_s),
+    "acceleration_m_s2": lambda target: _columns(target.acceleration_m_s2),
+    "height_m": lambda target: _heights(target.position_m),
+    "climb_m_s": lambda target: _heights(target.velocity_m_s),
+    "climb_acceleration_m_s2": lambda target: _heights(target.acceleration_m_s2),
+}
+"""Where the columns of members come from: axes are x, y, z with z down."""
 
 
 def _require_z(state: DroneState, target: TargetState) -> None:

@@ -22,7 +22,16 @@ from mambo_codegen.numbers.representation import (
 )
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.calls import ApiFunction, Outcomes, Tape, answers, api_of, calls
-from mambo_sil.verify.step_inputs import POSITION, TILT, VELOCITY, YAW, StepInputs, StepRows, random_steps
+from mambo_sil.verify.step_inputs import (
+    POSITION,
+    TILT,
+    VELOCITY,
+    YAW,
+    StepInputs,
+    StepRows,
+    completed,
+    random_steps,
+)
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -450,12 +459,15 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
         accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * given_limit_m_s2(settings)
         target = np.concatenate([target, accelerations], axis=1)
     if not method.has_height:
+        state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
         return StepRows(method).join(StepInputs(state, target, thrust))
     own = rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
     goal = own + 0.1 * rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
-    climbs = rng.uniform(-1, 1, (n, len(method.target) - target.shape[1] - 2))
+    climbs = rng.uniform(-1, 1, (n, int(settings.target.gives_acceleration)))
     state = np.concatenate([state, own, np.zeros((n, 1))], axis=1)
-    return StepRows(method).join(StepInputs(state, np.concatenate([target, goal, climbs], axis=1), None))
+    target = np.concatenate([target, goal, climbs], axis=1)
+    state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
+    return StepRows(method).join(StepInputs(state, target, None))
 
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:

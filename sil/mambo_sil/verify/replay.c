@@ -121,13 +121,13 @@ static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
 {
     const nmpc_fuzz_call_t call = nmpc_fuzz_decode(bytes);
     nmpc_command_t command;
+    nmpc_real_t *const numbers = (nmpc_real_t *)(void *)&command;
     int32_t status;
+    size_t i;
 
-    command.roll_rad = NMPC_REPLAY_UNWRITTEN;
-    command.pitch_rad = NMPC_REPLAY_UNWRITTEN;
-#ifdef NMPC_FUZZ_SET_THRUST
-    command.thrust_m_s2 = NMPC_REPLAY_UNWRITTEN;
-#endif
+    for (i = 0; i < (sizeof(command) / sizeof(*numbers)); i++) {
+        numbers[i] = NMPC_REPLAY_UNWRITTEN;
+    }
     if ((call.function == NMPC_FUZZ_INIT) && ((call.nulls & NMPC_FUZZ_NULL_SELF) == 0U)) {
         status = (int32_t)nmpc_replay_init(self);
     } else {

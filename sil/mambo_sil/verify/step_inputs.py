@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import TARGET
+from mambo_codegen.port.row import WHOLE
 from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
 
 NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
+_DRAWN = {
+    *("position_m", "velocity_m_s", "roll_rad", "pitch_rad", "yaw_rad", "height_m", "climb_m_s", "grounded"),
+    *("acceleration_m_s2", "climb_acceleration_m_s2"),
+}
+"""Members that are drawn to suit each other."""
 POSITION = slice(0, 2)
 VELOCITY = slice(2, 4)
 TILT = slice(4, 6)
@@ -51,10 +57,11 @@ class StepRows:
         self._state, self._target, thrust = (
             [one.column for one in row if one.record == record] for record in ("state", "target", "thrust")
         )
-        after = self._target[0] + len(TARGET)
-        self.target, self.thrust = slice(self._target[0], after), slice(after, after + len(thrust))
         places = [one.column for one in row if one.member.startswith("acceleration_m_s2")]
-        self.acceleration = slice(self.thrust.stop, self.thrust.stop + len(places))
+        self.target = slice(self._target[0], self._target[0] + len(TARGET))
+        self.thrust, self.acceleration = (
+            slice(columns[0], columns[-1] + 1) if columns else slice(0, 0) for columns in (thrust, places)
+        )
 
     def hovering(self, n: int) -> Array:
         """Return rows (n, k) of drones that hover in the origin, which is their target."""
@@ -113,7 +120,23 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
         state, target = np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1)
         if climb and climb.is_given:
             target = np.concatenate([target, _accelerations(climb.input_limit, high, (n, 1), rng)], axis=1)
+    state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
     return StepInputs(state, target, None if method.has_height else thrust)
+
+
+def completed(method: Method, record: str, known: Array, rng: np.random.Generator) -> Array:
+    """Return states or targets (n, k) with draws for all members that `known` (n, j) does not have."""
+    numbers = method.port.numbers(record)
+    there = [one.column for one in numbers if one.row.member in _DRAWN]
+    whole = np.zeros((len(known), len(numbers)))
+    whole[:, there] = known
+    for one in (one for one in numbers if one.row.member not in _DRAWN):
+        if one.row.kind == WHOLE:
+            whole[:, one.column] = rng.integers(2, size=len(known))
+        else:
+            most = one.row.draw.largest if one.row.draw is not None else None
+            whole[:, one.column] = rng.uniform(-1, 1, len(known)) * (most or 1.0)
+    return whole
 
 
 def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tuple[Array, Array]:

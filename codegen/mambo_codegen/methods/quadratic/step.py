@@ -23,6 +23,9 @@ from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_
 _GROUNDED: Final = 9
 """The column of a state that says whether the drone touches the floor, if there is a height."""
 
+_LEVEL: Final = ("position_m", "velocity_m_s", "acceleration_m_s2")
+_UPWARD: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2")
+"""What is read of a target along x and y, and up."""
 REST_M_S: Final = 0.02
 """After an outage the model brakes to this speed along both axes; then the command is level."""
 
@@ -139,7 +142,10 @@ class ControlStep:
         self._feedback = constants.feedback_steps and np.array(
             [constant(steps, "feedback") for steps in constants.feedback_steps]
         )
-        self._level_columns = len(constants.level_target)
+        numbers = constants.port.numbers("target")
+        self._level, self._upward = (
+            [one.column for one in numbers if one.row.member in members] for members in (_LEVEL, _UPWARD)
+        )
         self._is_predicted = constants.settings.model.attitude == "predicted"
         self._no_estimate = constants.observer.outage_steps + 1
         """`missed` while the model brakes after an outage."""
@@ -269,7 +275,7 @@ class ControlStep:
     def _aim(self, memory: QuadraticMemory, inputs: CheckedInputs, seen: _Observed) -> _Aim:
         """Return what the next commands fly to; the height has its next thrust."""
         follows = inputs.allows_command & (seen.missed < self._no_estimate)
-        level, upward = np.split(inputs.target, [self._level_columns], axis=1)
+        level, upward = inputs.target[:, self._level], inputs.target[:, self._upward]
         height, limit_active = self.height.aim(
             seen.lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from mambo_codegen.port.port import Port
 from mambo_sil.model.identify.columns import KNOWN, Column
 from mambo_sil.model.identify.signals import (
     DEGREE,
@@ -10,17 +11,37 @@ from mambo_sil.model.identify.signals import (
     JUMP,
     JUMPS,
     LEVELLED,
+    POSITION,
     START_THRUST,
     TAKE_OVERS,
+    TARGET,
     TARGET_ACCELERATION,
     THRUST,
+    TILTS,
     UPDATE,
+    VELOCITY,
+    YAW,
 )
 
-STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
-HEIGHT_STATE: Final = (HEIGHT, "vz_m_s")
-"""What a controller of the height reads besides; z points down, the signals of its target up."""
+DOWNWARD: Final = (HEIGHT, "vz_m_s")
+"""Signals of a state whose z points down; those of a target point up."""
 TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
+_MEMBERS: Final = {
+    "state": {
+        "position_m": POSITION,
+        "velocity_m_s": VELOCITY,
+        "height_m": DOWNWARD[:1],
+        "climb_m_s": DOWNWARD[1:],
+        **{name: (name,) for name in (*TILTS, YAW)},
+    },
+    "target": {
+        "position_m": TARGET[:2],
+        "velocity_m_s": TARGET[2:],
+        "acceleration_m_s2": TARGET_ACCELERATION,
+        **{name.removeprefix("target_"): (name,) for name in TARGET_HEIGHT},
+    },
+}
+"""The signals of the members of a state and of a target; another one is read from the column of its name."""
 ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
 """Signals that are read only where the controller needs them."""
 APP_GROUP: Final = "nmpc."
@@ -82,3 +103,11 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
 }
 """Known columns of each signal, the first one that a file has is read: of trace.csv, of the app's
 steps, and of the Crazyflie, whose y has the other sign. The commands are the controller's own."""
+
+
+def signals_of(port: Port, record: str) -> tuple[str, ...]:
+    """Return the signals of the numbers of a state or target, in their order, but of integers."""
+    return tuple(
+        _MEMBERS[record].get(one.row.member, (f"{record}_{one.member}",) * (one.axis + 1))[one.axis]
+        for one in port.reals(record)
+    )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -20,6 +21,7 @@ from mambo_sil.model.identify.resolution import Resolution
 from mambo_sil.model.identify.signals import (
     COMMANDS,
     GROUNDED,
+    HEIGHT,
     JUMP,
     JUMPS,
     LEVELLED,
@@ -28,8 +30,6 @@ from mambo_sil.model.identify.signals import (
     START_THRUST,
     START_TILTS,
     TAKE_OVERS,
-    TARGET,
-    TARGET_ACCELERATION,
     THRUST,
     UPDATE,
     VELOCITY,
@@ -43,10 +43,9 @@ from mambo_sil.model.replay.interpolation import fill
 from mambo_sil.model.replay.logged_columns import (
     APP_GROUP,
     ASKED,
-    HEIGHT_STATE,
+    DOWNWARD,
     SIGNALS,
-    STATE,
-    TARGET_HEIGHT,
+    signals_of,
 )
 from mambo_sil.model.replay.update_clock import UpdateClock, read_clock
 
@@ -130,10 +129,8 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     A row is of the update that the log counts, or of the one at its time; where the rows of several blocks
     have times of their own, each is of the nearest update. Raises LogError.
     """
-    is_given, commands_thrust = settings.target.acceleration == "given", settings.height is not None
-    wanted: tuple[str, ...] = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
-    wanted += (TARGET_HEIGHT if is_given else TARGET_HEIGHT[:2]) if commands_thrust else ()
-    measured = (*STATE, *HEIGHT_STATE) if commands_thrust else STATE
+    port, commands_thrust = method_of(settings).port, settings.height is not None
+    measured, wanted = signals_of(port, "state"), signals_of(port, "target")
     log = _read(path, columns, (*measured, *wanted), settings.code.prefix)
     period_s = settings.horizon.update_period_s
     clock = read_clock(log, period_s)
@@ -152,9 +149,9 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         raise LogError((f"{log.name}: has no two updates with all inputs and commands",))
     filled, spread = _filled(needed, found)
     state, target, command = np.split(filled, [len(measured), len(inputs)], axis=1)
-    if commands_thrust:
-        own = -state[:, len(STATE) :]
-        state = np.column_stack([state[:, : len(STATE)], own, _held_or(log, GROUNDED, time_s, 0.0)])
+    state = state * [-1.0 if name in DOWNWARD else 1.0 for name in measured]
+    contacts = [_held_or(log, one.member, time_s, 0.0) for one in port.wholes("state")]
+    state = np.column_stack([state, *contacts])
     thrust_m_s2 = command[:, 2] if has_thrust else _held_or(log, THRUST, time_s, GRAVITY_M_S2)
     starts = [_held_or(log, name, time_s, state[:, 4 + axis]) for axis, name in enumerate(START_TILTS)]
     start_m_s2 = _held_or(log, START_THRUST, time_s, thrust_m_s2)
@@ -186,7 +183,9 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         jump=jump,
         from_start=is_from_start(log, period_s),
         gaps=int(behind.sum()),
-        may_lie=_near_floor(state[:, -3], 0.0 if is_simulated(log, period_s) else math.inf)
+        may_lie=_near_floor(
+            state[:, measured.index(HEIGHT)], 0.0 if is_simulated(log, period_s) else math.inf
+        )
         if commands_thrust and GROUNDED not in log.signals
         else np.zeros_like(begins),
         is_exact=not clock.resampled and _is_of_rows(log, needed),
@@ -225,6 +224,7 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
         for name, each in SIGNALS.items()
         if name in wanted or name not in ASKED
     }
+    known |= {name: (Column(name),) for name in wanted if name not in SIGNALS}
     log = read_ulog(path) if is_ulog else read_csv(path, columns, known, binary=ULOG)
     missing = [name for name in wanted if name not in log.signals]
     if missing and is_ulog:

@@ -7,9 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
-from mambo_sil.model.identify.signals import COMMANDS, TARGET, UPDATE, UPDATES, FlightLog, Signal
-from mambo_sil.model.replay.logged_columns import STATE
+from mambo_sil.model.identify.signals import (
+    COMMANDS,
+    POSITION,
+    TARGET,
+    TILTS,
+    UPDATE,
+    UPDATES,
+    VELOCITY,
+    YAW,
+    FlightLog,
+    Signal,
+)
 
+_READ: Final = (*POSITION, *VELOCITY, *TILTS, YAW, *TARGET)
+"""Signals that every controller reads."""
 _SAME_PERIOD: Final = 0.1
 """Share by which a log's period may differ from a multiple of the update period: its rows are updates."""
 _MOST_BETWEEN: Final = 2
@@ -66,8 +78,8 @@ def read_clock(log: FlightLog, period_s: float) -> UpdateClock:
     between = float(np.median(np.diff(row_s))) / period_s
     nearest = round(between)
     if not 1 <= nearest <= _MOST_BETWEEN or abs(between - nearest) > _SAME_PERIOD * nearest:
-        begin_s = max(log.signals[name].time_s[0] for name in (*COMMANDS, *STATE, *TARGET))
-        end_s = min(log.signals[name].time_s[-1] for name in (*COMMANDS, *STATE, *TARGET))
+        begin_s = max(log.signals[name].time_s[0] for name in (*COMMANDS, *_READ))
+        end_s = min(log.signals[name].time_s[-1] for name in (*COMMANDS, *_READ))
         time_s = begin_s + period_s * np.arange(1 + max(int((end_s - begin_s) / period_s), -1))
         return UpdateClock(time_s, np.zeros(len(time_s), bool))
     if UPDATE in log.signals and _counts_each(log.signals[UPDATE]):
