@@ -14,11 +14,11 @@ from tests.support.tools import toolchain
 
 ROWS = """
 from mambo_codegen.port import tables
-from mambo_codegen.port.row import WHOLE, CHANCE, Draw, Row
+from mambo_codegen.port.row import WHOLE, CHANCE, Draw, PortRow
 tables.TAKEN["target"] += (
-    Row("swirl_1_s", "factor", "made up", 2, draw=Draw("SWIRL_1_S", 0.5),
+    PortRow("swirl_1_s", "factor", "made up", 2, draw=Draw("SWIRL_1_S", 0.5),
         told=(("swirl_x", "x"), ("swirl_y", "y"))),
-    Row("known", "whole", "made up", kind=WHOLE, draw=CHANCE),
+    PortRow("known", "whole", "made up", kind=WHOLE, draw=CHANCE),
 )
 """
 """Run before anything of ours is imported, so that no list is made without the rows."""

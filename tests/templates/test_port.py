@@ -7,14 +7,14 @@ import pytest
 
 from mambo_codegen.bundle.render import render
 from mambo_codegen.methods import method_of
-from mambo_codegen.port.port import Port
+from mambo_codegen.port.port import ControllerPort
 from mambo_codegen.port.row import NUMBER, WHOLE
 from mambo_sil.flight.controllers.controller_library import with_default_prefix
 from tests.support.options import OPTIONS
 from tests.support.tools import toolchain
 
 
-def kept_numbers(port: Port, record: str, before: str = "") -> Iterator[str]:
+def kept_numbers(port: ControllerPort, record: str, before: str = "") -> Iterator[str]:
     """Yield where each number of a record and of those inside is, in C, in the order of the table."""
     for row in port.rows(record):
         for axis in range(port.count(row)):

@@ -13,7 +13,7 @@ from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.numbers.representation import THRUST
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, Row
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, PortRow
 
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
@@ -189,7 +189,7 @@ class Episodes:
             for row in rows
         }
 
-    def _row(self, row: Row, drawn: "_Drawn", target: Mapping[str, list[Real]]) -> list[Real]:
+    def _row(self, row: PortRow, drawn: "_Drawn", target: Mapping[str, list[Real]]) -> list[Real]:
         """Draw the numbers of a row of the port."""
         assert row.draw is not None, "a row of a state or target"
         if row.draw is BESIDE:

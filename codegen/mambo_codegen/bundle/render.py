@@ -33,14 +33,12 @@ from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
-    STATE,
-    THRUST,
-    WEIGHTS,
     YAW_LIMIT_RAD,
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.port.row import AIM, BESIDE, CHANCE
+from mambo_codegen.port.tables import TAKEN
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 
@@ -277,8 +275,9 @@ def _add_guard(path: str, text: str, settings_id: str) -> str:
 def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     """Spell 2^(sign * bits) of each quantity as float: integers per unit; for sign -1 units per integer."""
     bits = numbers.bits or {}
+    taken = {row.quantity for rows in TAKEN.values() for row in rows}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
-        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking", "factor")
+        for name in sorted(taken | {"cost"})
         if name in bits
     }

@@ -16,11 +16,8 @@ from mambo_codegen.numbers.literals import SCALARS
 
 STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
 TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
-ACCELERATION: Final = ("thrust", "thrust")
 THRUST: Final = ("thrust",)
 COMMAND: Final = ("angle", "angle")
-HEIGHT: Final = ("position", "velocity")
-CONTACT: Final = ("whole",)
 WEIGHTS: Final = ("tracking", "effort")
 """The quantity of each column of an input."""
 

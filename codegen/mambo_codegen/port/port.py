@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
-from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, Row
+from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, PortRow
 from mambo_codegen.port.tables import KEPT, TAKEN, Table
 
 _CHECKED: Final = ("state", "target")
@@ -43,7 +43,7 @@ class StepNumber:
 
 
 @dataclass(frozen=True)
-class Port:
+class ControllerPort:
     """What one controller takes, gives and keeps.
 
     norm:  its `cost.norm`.
@@ -62,19 +62,19 @@ class Port:
         table = TAKEN | KEPT[self.norm]
         return {name: tuple(row for row in rows if self.has(row)) for name, rows in table.items()}
 
-    def has(self, row: Row) -> bool:
+    def has(self, row: PortRow) -> bool:
         """Return whether a row is there."""
         return self.parts.issuperset(row.when)
 
-    def rows(self, record: str) -> tuple[Row, ...]:
+    def rows(self, record: str) -> tuple[PortRow, ...]:
         """Return the rows of a record."""
         return self._table[record]
 
-    def count(self, row: Row) -> int:
+    def count(self, row: PortRow) -> int:
         """Return how many numbers, or records, a row is."""
         return row.count if isinstance(row.count, int) else self.sizes[row.count]
 
-    def kept(self, record: str, *kinds: str) -> Iterator[Row]:
+    def kept(self, record: str, *kinds: str) -> Iterator[PortRow]:
         """Yield the row of each single member of some kinds in a record and in the records inside."""
         for row in self.rows(record):
             for _ in range(self.count(row)):
@@ -148,13 +148,13 @@ class Port:
             for row in self.rows(record)
         ]
 
-    def _type(self, row: Row, number: str) -> str:
+    def _type(self, row: PortRow, number: str) -> str:
         """Return the type of a member in C."""
         if row.kind == NUMBER:
             return number
         return f"nmpc_{row.kind}_t" if row.kind in self._table else row.kind
 
-    def _comment(self, record: str, row: Row) -> str:
+    def _comment(self, record: str, row: PortRow) -> str:
         """Return the comment of a member."""
         range_of = RANGES.get(row.quantity) if record in _CHECKED else None
         words = [row.words.format_map(self.names)] if row.words else []

@@ -52,7 +52,7 @@ CHANCE: Final = Draw(way="chance")
 
 
 @dataclass(frozen=True)
-class Row:
+class PortRow:
     """A member of a record: a number, several of one kind, or a record inside it.
 
     member:   its name in C, with the unit.
@@ -95,7 +95,7 @@ class Number:
     column: its place among the numbers of the record.
     """
 
-    row: Row
+    row: PortRow
     axis: int
     member: str
     column: int

@@ -3,9 +3,9 @@
 from typing import Final
 
 from mambo_codegen.port import kept, taken
-from mambo_codegen.port.row import Row
+from mambo_codegen.port.row import PortRow
 
-Table = dict[str, tuple[Row, ...]]
+Table = dict[str, tuple[PortRow, ...]]
 """The rows of each record, nmpc_NAME_t in C; `controller` is nmpc_t."""
 
 TAKEN: Final[Table] = {

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Final
 
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, Row
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, PortRow
 
 _HEIGHT: Final = ("height",)
 _TILT: Final = Draw("ATTITUDE_RAD", 0.8)
@@ -11,7 +11,7 @@ _TILT: Final = Draw("ATTITUDE_RAD", 0.8)
 _STATE_TILT: Final = replace(_TILT, rests=True)
 
 STATE: Final = (
-    Row(
+    PortRow(
         "position_m",
         "position",
         "x north, y east",
@@ -19,7 +19,7 @@ STATE: Final = (
         draw=BESIDE,
         told=(("x", "measured position north"), ("y", "measured position east")),
     ),
-    Row(
+    PortRow(
         "velocity_m_s",
         "velocity",
         "v_x, v_y",
@@ -27,9 +27,9 @@ STATE: Final = (
         draw=BESIDE,
         told=(("vx", "measured velocity north"), ("vy", "measured velocity east")),
     ),
-    Row("roll_rad", "angle", "phi", draw=_STATE_TILT, told=(("roll", "measured roll, right side down"),)),
-    Row("pitch_rad", "angle", "theta", draw=_STATE_TILT, told=(("pitch", "measured pitch, nose up"),)),
-    Row(
+    PortRow("roll_rad", "angle", "phi", draw=_STATE_TILT, told=(("roll", "measured roll, right side down"),)),
+    PortRow("pitch_rad", "angle", "theta", draw=_STATE_TILT, told=(("pitch", "measured pitch, nose up"),)),
+    PortRow(
         "yaw_rad",
         "yaw",
         "psi",
@@ -37,7 +37,7 @@ STATE: Final = (
         draw=Draw("YAW_RAD", 100.0),
         told=(("yaw", "measured yaw, clockwise from above"),),
     ),
-    Row(
+    PortRow(
         "height_m",
         "position",
         "up",
@@ -45,7 +45,7 @@ STATE: Final = (
         draw=BESIDE,
         told=(("height", "measured height, upwards"),),
     ),
-    Row(
+    PortRow(
         "climb_m_s",
         "velocity",
         "up",
@@ -53,7 +53,7 @@ STATE: Final = (
         draw=BESIDE,
         told=(("climb", "measured velocity upwards"),),
     ),
-    Row(
+    PortRow(
         "grounded",
         "whole",
         "1 while the drone touches the floor, else 0",
@@ -65,7 +65,7 @@ STATE: Final = (
 )
 
 TARGET: Final = (
-    Row(
+    PortRow(
         "position_m",
         "position",
         "Tp_k = x_ref, y_ref",
@@ -73,7 +73,7 @@ TARGET: Final = (
         draw=AIM,
         told=(("target_x", "position of the target north"), ("target_y", "position of the target east")),
     ),
-    Row(
+    PortRow(
         "velocity_m_s",
         "velocity",
         "Tv_k = vx_ref, vy_ref",
@@ -81,7 +81,7 @@ TARGET: Final = (
         draw=AIM,
         told=(("target_vx", "velocity of the target north"), ("target_vy", "velocity of the target east")),
     ),
-    Row(
+    PortRow(
         "acceleration_m_s2",
         "thrust",
         "",
@@ -93,7 +93,7 @@ TARGET: Final = (
             ("target_ay", "acceleration of the target east"),
         ),
     ),
-    Row(
+    PortRow(
         "height_m",
         "position",
         "up",
@@ -101,7 +101,7 @@ TARGET: Final = (
         draw=AIM,
         told=(("target_height", "height of the target"),),
     ),
-    Row(
+    PortRow(
         "climb_m_s",
         "velocity",
         "up",
@@ -109,7 +109,7 @@ TARGET: Final = (
         draw=AIM,
         told=(("target_climb", "velocity of the target upwards"),),
     ),
-    Row(
+    PortRow(
         "climb_acceleration_m_s2",
         "thrust",
         "up",
@@ -120,9 +120,9 @@ TARGET: Final = (
 )
 
 COMMAND: Final = (
-    Row("roll_rad", "angle", "phi*", draw=_TILT, told=(("roll_command", "roll command"),)),
-    Row("pitch_rad", "angle", "theta*", draw=_TILT, told=(("pitch_command", "pitch command"),)),
-    Row(
+    PortRow("roll_rad", "angle", "phi*", draw=_TILT, told=(("roll_command", "roll command"),)),
+    PortRow("pitch_rad", "angle", "theta*", draw=_TILT, told=(("pitch_command", "pitch command"),)),
+    PortRow(
         "thrust_m_s2",
         "thrust",
         "thrust over mass{over_gain}, from NMPC_THRUST_MIN_M_S2 to NMPC_THRUST_MAX_M_S2",
@@ -134,74 +134,74 @@ COMMAND: Final = (
 )
 
 ESTIMATE: Final = (
-    Row("position_m", "position", "x, y", 2),
-    Row("velocity_m_s", "velocity", "v_x, v_y", 2),
-    Row("disturbance_m_s2", "disturbance", "acceleration that tilt and drag do not explain", 2),
-    Row("height_m", "position", when=_HEIGHT),
-    Row("climb_m_s", "velocity", when=_HEIGHT),
-    Row("thrust_gain", "factor", "delivered over {expected} thrust, as learnt", when=("learns_gain",)),
-    Row(
+    PortRow("position_m", "position", "x, y", 2),
+    PortRow("velocity_m_s", "velocity", "v_x, v_y", 2),
+    PortRow("disturbance_m_s2", "disturbance", "acceleration that tilt and drag do not explain", 2),
+    PortRow("height_m", "position", when=_HEIGHT),
+    PortRow("climb_m_s", "velocity", when=_HEIGHT),
+    PortRow("thrust_gain", "factor", "delivered over {expected} thrust, as learnt", when=("learns_gain",)),
+    PortRow(
         "lift_m_s2",
         "disturbance",
         "vertical acceleration that the thrust does not explain, up",
         when=("learns_acceleration",),
     ),
-    Row(
+    PortRow(
         "roll_gain",
         "factor",
         "measured over modelled tilt, as learnt; 1 by the settings",
         when=("tilt_gain",),
     ),
-    Row("pitch_gain", "factor", "the same", when=("tilt_gain",)),
-    Row("is_valid", "whole", "1, or 0 before the first good state and after an outage", kind=WHOLE),
+    PortRow("pitch_gain", "factor", "the same", when=("tilt_gain",)),
+    PortRow("is_valid", "whole", "1, or 0 before the first good state and after an outage", kind=WHOLE),
 )
 
 LIMITS: Final = (
-    Row(
+    PortRow(
         "speed_m_s",
         "velocity",
         "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S",
         told=(("speed_limit", "speed limit"),),
     ),
-    Row(
+    PortRow(
         "braking_m_s2",
         "braking",
         "NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives",
         told=(("braking_limit", "braking limit"),),
     ),
-    Row(
+    PortRow(
         "fence_min_m",
         "position",
         "the walls at the least x and y,",
         2,
         told=(("fence_x_min", "least x in the fence"), ("fence_y_min", "least y in the fence")),
     ),
-    Row(
+    PortRow(
         "fence_max_m",
         "position",
         "and at the largest; all within +/- NMPC_POSITION_RANGE_M",
         2,
         told=(("fence_x_max", "largest x in the fence"), ("fence_y_max", "largest y in the fence")),
     ),
-    Row("tilt_rad", "angle", "at most NMPC_TILT_LIMIT_RAD"),
-    Row(
+    PortRow("tilt_rad", "angle", "at most NMPC_TILT_LIMIT_RAD"),
+    PortRow(
         "floor_m", "position", "walls below and", when=_HEIGHT, told=(("floor", "least height in the fence"),)
     ),
-    Row(
+    PortRow(
         "ceiling_m",
         "position",
         "above, within +/- NMPC_POSITION_RANGE_M",
         when=_HEIGHT,
         told=(("ceiling", "largest height in the fence"),),
     ),
-    Row(
+    PortRow(
         "climb_m_s",
         "velocity",
         "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_CLIMB_LIMIT_M_S",
         when=_HEIGHT,
         told=(("climb_limit", "speed limit upwards, refused where the thrust cannot brake it in time"),),
     ),
-    Row(
+    PortRow(
         "descent_m_s",
         "velocity",
         "NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_LARGEST_DESCENT_LIMIT_M_S",
@@ -211,7 +211,7 @@ LIMITS: Final = (
 )
 
 WEIGHTS: Final = (
-    Row(
+    PortRow(
         "tracking",
         "tracking",
         "lambda_1",
@@ -219,7 +219,7 @@ WEIGHTS: Final = (
         draw=Draw("TRACKING"),
         told=(("tracking_weight", "lambda1, eq 12"),),
     ),
-    Row(
+    PortRow(
         "effort",
         "effort",
         "lambda_2",

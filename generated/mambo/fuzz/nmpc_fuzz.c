@@ -84,6 +84,8 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.target.velocity_m_s[0] = values[9];
     call.target.velocity_m_s[1] = values[10];
     call.thrust_acceleration_m_s2 = values[11];
+    call.start.roll_rad = values[0];
+    call.start.pitch_rad = values[1];
     (void)memcpy(call.position_change_m, &values[0], sizeof(call.position_change_m));
     (void)memcpy(call.velocity_change_m_s, &values[NMPC_FUZZ_AXES], sizeof(call.velocity_change_m_s));
     call.heading_change_rad = values[2 * NMPC_FUZZ_AXES];
@@ -96,8 +98,6 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     if ((call.function == NMPC_FUZZ_RESET) && (((unsigned int)bytes[0] & 64U) != 0U)) {
         call.function = NMPC_FUZZ_SLEW_HEADING;
     }
-    call.start.roll_rad = values[0];
-    call.start.pitch_rad = values[1];
     if ((call.function == 2U) && (((unsigned int)bytes[0] & 64U) != 0U)) {
         call.function = NMPC_FUZZ_SET_LIMITS;
     }
@@ -153,23 +153,61 @@ static int nmpc_fuzz_lies_in(nmpc_real_t value, nmpc_real_t least, nmpc_real_t m
     return !((value != value) || (value < least) || (value > most));
 }
 
-static int nmpc_fuzz_is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
+static int nmpc_fuzz_is_within(nmpc_real_t value, nmpc_real_t most)
 {
-    return nmpc_fuzz_lies_in(position_m[0], -NMPC_POSITION_RANGE_M, NMPC_POSITION_RANGE_M)
-           && nmpc_fuzz_lies_in(position_m[1], -NMPC_POSITION_RANGE_M, NMPC_POSITION_RANGE_M)
-           && nmpc_fuzz_lies_in(velocity_m_s[0], -NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_RANGE_M_S)
-           && nmpc_fuzz_lies_in(velocity_m_s[1], -NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_RANGE_M_S);
+    return nmpc_fuzz_lies_in(value, -most, most);
+}
+
+static int nmpc_fuzz_is_good_state(const nmpc_state_t *state)
+{
+    int good = 1;
+
+    good = good && nmpc_fuzz_is_within(state->position_m[0], NMPC_POSITION_RANGE_M);
+    good = good && nmpc_fuzz_is_within(state->position_m[1], NMPC_POSITION_RANGE_M);
+    good = good && nmpc_fuzz_is_within(state->velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S);
+    good = good && nmpc_fuzz_is_within(state->velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    good = good && nmpc_fuzz_is_within(state->roll_rad, NMPC_ATTITUDE_RANGE_RAD);
+    good = good && nmpc_fuzz_is_within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+    good = good && nmpc_fuzz_is_within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
+    return good;
 }
 
 static int nmpc_fuzz_is_good_target(const nmpc_target_t *target)
 {
-    return nmpc_fuzz_is_good_point(target->position_m, target->velocity_m_s);
+    int good = 1;
+
+    good = good && nmpc_fuzz_is_within(target->position_m[0], NMPC_POSITION_RANGE_M);
+    good = good && nmpc_fuzz_is_within(target->position_m[1], NMPC_POSITION_RANGE_M);
+    good = good && nmpc_fuzz_is_within(target->velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S);
+    good = good && nmpc_fuzz_is_within(target->velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    return good;
+}
+
+static int nmpc_fuzz_is_good_command(const nmpc_command_t *command)
+{
+    int good = 1;
+
+    good = good && nmpc_fuzz_is_within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD);
+    good = good && nmpc_fuzz_is_within(command->pitch_rad, NMPC_ATTITUDE_RANGE_RAD);
+    return good;
+}
+
+/* Return whether a jump of the frame is within its ranges. */
+static int nmpc_fuzz_is_good_shift(const nmpc_fuzz_call_t *call)
+{
+    int good = nmpc_fuzz_is_within(call->heading_change_rad, NMPC_YAW_RANGE_RAD);
+    int axis;
+
+    for (axis = 0; axis < NMPC_FUZZ_AXES; axis++) {
+        good = good && nmpc_fuzz_is_within(call->position_change_m[axis], NMPC_POSITION_RANGE_M)
+               && nmpc_fuzz_is_within(call->velocity_change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
+    }
+    return good;
 }
 
 /* Return the status that nmpc.h promises for a step without null pointers. */
 static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
 {
-    const nmpc_real_t tilt_rad = NMPC_ATTITUDE_RANGE_RAD;
     nmpc_status_t status = NMPC_OK;
 
     if (!nmpc_fuzz_lies_in(call->thrust_acceleration_m_s2, NMPC_THRUST_ACCELERATION_MIN_M_S2,
@@ -179,10 +217,7 @@ static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
     if (!nmpc_fuzz_is_good_target(&call->target)) {
         status = NMPC_BAD_TARGET;
     }
-    if (!(nmpc_fuzz_is_good_point(call->state.position_m, call->state.velocity_m_s)
-          && nmpc_fuzz_lies_in(call->state.roll_rad, -tilt_rad, tilt_rad)
-          && nmpc_fuzz_lies_in(call->state.pitch_rad, -tilt_rad, tilt_rad)
-          && nmpc_fuzz_lies_in(call->state.yaw_rad, -NMPC_YAW_RANGE_RAD, NMPC_YAW_RANGE_RAD))) {
+    if (!nmpc_fuzz_is_good_state(&call->state)) {
         status = NMPC_BAD_STATE;
     }
     return status;
@@ -216,7 +251,6 @@ static nmpc_status_t nmpc_fuzz_promised_limits(const nmpc_limits_t *limits)
 /* Return the status that nmpc.h promises for `call`; NMPC_OK for nmpc_init(), which returns none. */
 static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
 {
-    const nmpc_real_t tilt_rad = NMPC_ATTITUDE_RANGE_RAD;
     unsigned int pointers = NMPC_FUZZ_NULL_SELF | NMPC_FUZZ_NULL_FIRST;
     nmpc_status_t status = NMPC_OK;
 
@@ -227,8 +261,7 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
         break;
     case NMPC_FUZZ_RESET:
     case NMPC_FUZZ_SET_COMMAND:
-        if (!(nmpc_fuzz_lies_in(call->start.roll_rad, -tilt_rad, tilt_rad)
-              && nmpc_fuzz_lies_in(call->start.pitch_rad, -tilt_rad, tilt_rad))) {
+        if (!nmpc_fuzz_is_good_command(&call->start)) {
             status = NMPC_BAD_COMMAND;
         }
         break;
@@ -237,8 +270,7 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
         break;
     case NMPC_FUZZ_SHIFT:
         pointers |= NMPC_FUZZ_NULL_SECOND;
-        if (!(nmpc_fuzz_is_good_point(call->position_change_m, call->velocity_change_m_s)
-              && nmpc_fuzz_lies_in(call->heading_change_rad, -NMPC_YAW_RANGE_RAD, NMPC_YAW_RANGE_RAD))) {
+        if (!nmpc_fuzz_is_good_shift(call)) {
             status = NMPC_BAD_SHIFT;
         }
         break;

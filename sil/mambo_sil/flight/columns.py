@@ -7,8 +7,8 @@ first, so that all columns of a level controller are the first ones of the other
 from dataclasses import dataclass
 from typing import Final
 
-from mambo_codegen.port.port import Port
-from mambo_codegen.port.row import Row
+from mambo_codegen.port.port import ControllerPort
+from mambo_codegen.port.row import PortRow
 from mambo_codegen.port.tables import TAKEN
 
 
@@ -41,7 +41,7 @@ class Columns:
         """Return those of all rows, or of those that are not the height's."""
 
         def count(record: str, places: dict[str, slice]) -> int:
-            rows: list[Row] = [row for row in TAKEN[record] if upward or not row.is_upward]
+            rows: list[PortRow] = [row for row in TAKEN[record] if upward or not row.is_upward]
             return sum(places[row.member].stop - places[row.member].start for row in rows)
 
         return cls(count("state", STATE), count("target", TARGET), count("command", COMMAND))
@@ -57,7 +57,7 @@ SPACE: Final = Columns.of(upward=True)
 """Those of controllers without and with a height."""
 
 
-def own_columns(port: Port, record: str) -> list[int]:
+def own_columns(port: ControllerPort, record: str) -> list[int]:
     """Return where the numbers of a controller's state or target stand in the closed loop."""
     places = STATE if record == "state" else TARGET
     return [places[number.row.member].start + number.axis for number in port.numbers(record)]

@@ -20,7 +20,7 @@ from mambo_codegen.numbers.representation import (
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
-from mambo_codegen.port.port import Port
+from mambo_codegen.port.port import ControllerPort
 from mambo_codegen.settings.sections import Sections
 
 
@@ -118,9 +118,9 @@ class Constants(ABC):
         """What depends on the settings in the words of the port's rows."""
 
     @cached_property
-    def port(self) -> Port:
+    def port(self) -> ControllerPort:
         """What the controller takes, gives and keeps."""
-        return Port(self.settings.cost.norm, self.parts, self.sizes, self.names)
+        return ControllerPort(self.settings.cost.norm, self.parts, self.sizes, self.names)
 
     @property
     def state(self) -> tuple[str, ...]:

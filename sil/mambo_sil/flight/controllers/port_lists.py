@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from mambo_codegen.port.row import MACROS, WHOLE, Row
+from mambo_codegen.port.row import MACROS, WHOLE, PortRow
 from mambo_codegen.port.tables import TAKEN
 from mambo_sil.flight.columns import COMMAND, STATE, TARGET
 
@@ -29,7 +29,7 @@ def port_lists() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _listed(name: str, row: Row, record: str) -> Iterator[str]:
+def _listed(name: str, row: PortRow, record: str) -> Iterator[str]:
     """Yield the lines of the list of one row, which is empty where the controller has not got it."""
     conditions = [f"defined({MACROS[part]})" for part in row.when]
     entries = " ".join(_entries(row, record))
@@ -44,7 +44,7 @@ def _listed(name: str, row: Row, record: str) -> Iterator[str]:
         yield "#endif"
 
 
-def _entries(row: Row, record: str) -> Iterator[str]:
+def _entries(row: PortRow, record: str) -> Iterator[str]:
     """Yield an entry for each number of a row; of limits, which are not in the loop, with column 0."""
     assert isinstance(row.count, int), "what is taken has a size"
     first = _PLACES[record][row.member].start if record in _PLACES else 0

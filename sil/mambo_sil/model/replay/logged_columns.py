@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from mambo_codegen.port.port import Port
+from mambo_codegen.port.port import ControllerPort
 from mambo_sil.model.identify.columns import KNOWN, Column
 from mambo_sil.model.identify.signals import (
     DEGREE,
@@ -105,7 +105,7 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
 steps, and of the Crazyflie, whose y has the other sign. The commands are the controller's own."""
 
 
-def signals_of(port: Port, record: str) -> tuple[str, ...]:
+def signals_of(port: ControllerPort, record: str) -> tuple[str, ...]:
     """Return the signals of the numbers of a state or target, in their order, but of integers."""
     return tuple(
         _MEMBERS[record].get(one.row.member, (f"{record}_{one.member}",) * (one.axis + 1))[one.axis]
