@@ -6,6 +6,7 @@
  *   inputs            the checks of inputs
  *   trigonometry      sine and cosine of the heading
  *   attitude          how the drone answers the commands
+ *   axis              what x, y and the height have in common
  *   observer          position, velocity and disturbance
  *   tracker           acceleration of the target
  *   optimizer         the minimum of the cost
@@ -408,13 +409,8 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
  * the command behind the dead time and the quick lags, a the acceleration that the tilt gives, and i the integral part
  * of the attitude loop, all in m/step^2. They obey
  *
- *     lag a' = c - a + i,   i' = integral (u - a) - i / 1000 s,   delay c' = u - c
+ *     lag a' = c - a + i,   i' = integral (u - a) - i / 1000 s,   delay c' = u - c.
  *
- * with these times, in seconds, and rates, in 1/s:        lag      delay    integral
- *     roll                                              0.2300     0.0450      1.0000
- *     pitch                                             0.1540     0.0600      0.7700
- *
- * The lag of roll is the setting, 0.28 s, less what rate feedback takes off it, 0.05 s (see the chapter observe).
  * The leak of i, with 1000 s, is slower than anything in flight: it only gives i a bound.
  *
  * u is held over a control step; the rows below are the exact solution. a, i and u are limited, so that what is stored
@@ -423,6 +419,11 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
  * of c and u, needs no limit.
  */
 
+/* Times in seconds, rates in 1/s:           lag      delay    integral
+ *     roll                               0.2300     0.0450      1.0000
+ *     pitch                              0.1540     0.0600      0.7700
+ * The lag of roll is the setting, 0.28 s, less what rate feedback takes off it, 0.05 s (see the chapter observe).
+ */
 #define NMPC_RIGHT 0
 #define NMPC_FORWARD 1
 #define NMPC_ATTITUDE_STATES 4
@@ -492,10 +493,8 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
 NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine, int is_followed)
 {
     /* Sine and cosine of the change of the heading. */
-    const nmpc_real_t sine_change =
-        sine_difference(sine, attitude->cosine, cosine, attitude->sine);
-    const nmpc_real_t cosine_change =
-        sine_sum(cosine, attitude->cosine, sine, attitude->sine);
+    const nmpc_real_t sine_change = sine_difference(sine, attitude->cosine, cosine, attitude->sine);
+    const nmpc_real_t cosine_change = sine_sum(cosine, attitude->cosine, sine, attitude->sine);
 
     turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
     if (is_followed != 0) {
@@ -509,8 +508,8 @@ NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
     attitude->cosine = cosine;
 }
 
-/* The frame has turned by the angle of which sine and cosine are given: the axes of the model belong to the body, which has
- * not; they lie at another heading. */
+/* The frame has turned by the angle of which sine and cosine are given: the axes of the model belong to the body, which
+ * has not; they lie at another heading. */
 static void attitude_shift(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine)
 {
     const nmpc_real_t sine_before = attitude->sine;
@@ -523,8 +522,11 @@ static void attitude_shift(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_rea
 /* Set `tilt_m_step2` to the accelerations, right and forward, of a measured attitude. */
 NMPC_INLINE void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2])
 {
-    tilt_m_step2[NMPC_RIGHT] = tilt_product(NMPC_GAIN_M_STEP2_RAD, state->roll_rad);
-    tilt_m_step2[NMPC_FORWARD] = -tilt_product(NMPC_GAIN_M_STEP2_RAD, state->pitch_rad);
+    const nmpc_real_t right_m_step2 = tilt_product(NMPC_GAIN_M_STEP2_RAD, state->roll_rad);
+    const nmpc_real_t forward_m_step2 = tilt_product(NMPC_GAIN_M_STEP2_RAD, state->pitch_rad);
+
+    tilt_m_step2[NMPC_RIGHT] = right_m_step2;
+    tilt_m_step2[NMPC_FORWARD] = -forward_m_step2;
 }
 
 /* The commands, in rad, of u to the right and of u forward; within the tilt limit for a move within its limit. */
@@ -541,24 +543,24 @@ NMPC_INLINE nmpc_real_t attitude_pitch(nmpc_real_t forward_m_step2)
 /* Set the last command of the model, u. */
 static void attitude_set_command(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
 {
-    attitude->command_m_step2[NMPC_RIGHT] =
-        tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, roll_rad);
-    attitude->command_m_step2[NMPC_FORWARD] =
-        -tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, pitch_rad);
+    const nmpc_real_t right_m_step2 = tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, roll_rad);
+    const nmpc_real_t forward_m_step2 = tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, pitch_rad);
+
+    attitude->command_m_step2[NMPC_RIGHT] = right_m_step2;
+    attitude->command_m_step2[NMPC_FORWARD] = -forward_m_step2;
 }
 
 /* Change the last command of the model, u, by what was sent in its place less what it was. */
 static void attitude_change_command(nmpc_attitude_t *attitude, nmpc_real_t roll_change_rad,
                                     nmpc_real_t pitch_change_rad)
 {
+    const nmpc_real_t right_m_step2 = tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, roll_change_rad);
+    const nmpc_real_t forward_m_step2 = -tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, pitch_change_rad);
+
     attitude->command_m_step2[NMPC_RIGHT] =
-        clamp(attitude->command_m_step2[NMPC_RIGHT]
-                  + tilt_product(NMPC_ROLL_GAIN_M_STEP2_RAD, roll_change_rad),
-              NMPC_ATTITUDE_LIMIT_M_STEP2);
+        clamp(attitude->command_m_step2[NMPC_RIGHT] + right_m_step2, NMPC_ATTITUDE_LIMIT_M_STEP2);
     attitude->command_m_step2[NMPC_FORWARD] =
-        clamp(attitude->command_m_step2[NMPC_FORWARD]
-                  - tilt_product(NMPC_PITCH_GAIN_M_STEP2_RAD, pitch_change_rad),
-              NMPC_ATTITUDE_LIMIT_M_STEP2);
+        clamp(attitude->command_m_step2[NMPC_FORWARD] + forward_m_step2, NMPC_ATTITUDE_LIMIT_M_STEP2);
 }
 
 /* Set the model to the steady attitude of a command. */
@@ -576,41 +578,99 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
     attitude->cosine = NMPC_ONE;
 }
 
+/* ---- Axis -----------------------------------------------------------------------------------------------------------
+ *
+ * What x, y and the height have in common: position p and velocity v along an axis. With a measured position r and
+ * velocity v_k that are `age` steps old, and the acceleration A, the innovations are
+ *
+ *     n_p = r + age v - p,   n_v = T_s v_k + age A - v,
+ *
+ * and they correct p += L11 n_p + L12 n_v, v += L21 n_p + L22 n_v. To the next control step
+ *
+ *     p(k+1) = p + v + A/2,   v(k+1) = v + A.
+ *
+ * Without age its terms are 0. Both are limited where they are predicted, so that they stay finite for any input.
+ */
+
+#define NMPC_VELOCITY_LIMIT_M_STEP 134217728 /* of v */
+
+/* Set `n` to the innovations of a measured position and velocity. */
+NMPC_INLINE void axis_innovate(nmpc_real_t position_m, nmpc_real_t velocity_m_step, nmpc_real_t acceleration_m_step2,
+                               nmpc_real_t measured_m, nmpc_real_t measured_m_step, nmpc_real_t n[2])
+{
+    (void)acceleration_m_step2;
+    n[0] = measured_m - position_m;
+    n[1] = measured_m_step - velocity_m_step;
+}
+
+/* Correct position and velocity by the innovations `n`, with the first two rows of gains. */
+NMPC_INLINE void axis_correct(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, const nmpc_real_t gains[][2],
+                              const nmpc_real_t n[2])
+{
+    *position_m = *position_m + position_correction(gains[0][0], n[0], gains[0][1], n[1]);
+    *velocity_m_step = *velocity_m_step + velocity_correction(gains[1][0], n[0], gains[1][1], n[1]);
+}
+
+/* Predict position and velocity at the next control step. */
+NMPC_INLINE void axis_predict(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nmpc_real_t acceleration_m_step2)
+{
+    const nmpc_real_t mean_m_step = *velocity_m_step + half_change(acceleration_m_step2);
+
+    *position_m = clamp(*position_m + position_change(mean_m_step), NMPC_ESTIMATED_POSITION_LIMIT_M);
+    *velocity_m_step = clamp(*velocity_m_step + velocity_change(acceleration_m_step2), NMPC_VELOCITY_LIMIT_M_STEP);
+}
+
+/* The frame has jumped, and the measured position and velocity with it. Measurements are old by `age` steps, so a jump
+ * of v also moves p by age * change. */
+static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nmpc_real_t change_m,
+                       nmpc_real_t change_m_step)
+{
+    const nmpc_real_t moved_m = change_m;
+
+    *position_m = clamp(*position_m + moved_m, NMPC_ESTIMATED_POSITION_LIMIT_M);
+    *velocity_m_step = clamp(*velocity_m_step + change_m_step, NMPC_VELOCITY_LIMIT_M_STEP);
+}
+
+/* A row of the law times the first `count` numbers of a state. */
+NMPC_INLINE nmpc_real_t axis_row(const nmpc_real_t row[], const nmpc_real_t state[], int count)
+{
+    nmpc_sum_t sum = wide_product(row[0], state[0]);
+    int k;
+
+    NMPC_UNROLL
+    for (k = 1; k < count; k++) {
+        sum = sum + wide_product(row[k], state[k]);
+    }
+    return row_sum(sum);
+}
+
 /* ---- Observer -------------------------------------------------------------------------------------------------------
  *
  * A Kalman filter with fixed gains for position, velocity and disturbance (not in the paper). Index k counts control
- * steps of T_s = 0.01 s, which are the unit of time here: m_step is m/T_s and m_step2 is m/T_s^2. Along one axis of
- * the world, x or y, let p, v and d be the estimates of position, velocity and disturbance: the acceleration that tilt
- * and drag do not explain, as wind and model errors make it. With the measured position r_k and velocity v_k, the
- * innovations correct the estimates,
+ * steps, which are the unit of time here: m_step is m/T_s and m_step2 is m/T_s^2. Along x and y, let p, v and d be the
+ * estimates of position, velocity and disturbance: the acceleration that tilt and drag do not explain, as wind and
+ * model errors make it. p and v are corrected and predicted as in the chapter axis, with A = a + d - drag v, where a is
+ * the acceleration of the tilt; without drag its term is 0. And
  *
- *     n_p = r_k - p,   n_v = T_s v_k - v,   p += L11 n_p + L12 n_v,   v += L21 n_p + L22 n_v,
- *     d += L31 n_p + L32 n_v,
+ *     d += L31 n_p + L32 n_v.
  *
- * and from one control step to the next they follow the acceleration A = a + d - drag v, where a is that of the tilt:
- *
- *     p(k+1) = p + v + A/2,   v(k+1) = v + A,   d(k+1) = d.
- *
- * The gains L are those of the stationary Kalman filter for the noise densities of the settings. Every estimate is
- * limited, p and v where they are predicted, so that it stays finite for any input.
+ * The gains L are those of the stationary Kalman filter for the noise densities of the settings. d is limited.
  */
 
-#define NMPC_POSITION_BY_POSITION 1525991370 /* L11 */
-#define NMPC_POSITION_BY_VELOCITY 38236942 /* L12 */
-#define NMPC_VELOCITY_BY_POSITION 1566185142 /* L21 */
-#define NMPC_VELOCITY_BY_VELOCITY 127383981 /* L22 */
-#define NMPC_DISTURBANCE_BY_POSITION 1590094610 /* L31 */
-#define NMPC_DISTURBANCE_BY_VELOCITY 145694194 /* L32 */
+/* L: p, v and d by n_p and n_v. */
+static const nmpc_real_t observer_gains[1][3][2] = {
+    { { 1525991370, 38236942 },
+      { 1566185142, 127383981 },
+      { 1590094610, 145694194 } }
+};
 #define NMPC_REST_M_STEP 26844 /* up to this |v| along each axis the drone is at rest */
-#define NMPC_VELOCITY_LIMIT_M_STEP 134217728 /* of v */
 #define NMPC_DISTURBANCE_LIMIT_M_STEP2 20615843 /* of d */
 #define NMPC_DRAG_1_STEP 1473345581 /* deceleration per velocity */
 
-/* The acceleration along `axis` that the tilt does not explain: d - drag v. */
+/* The acceleration along `axis` that the tilt does not explain. */
 NMPC_INLINE nmpc_real_t observer_disturbance(const nmpc_observer_t *observer, int axis)
 {
-    return observer->disturbance_m_step2[axis]
-           - drag_product(NMPC_DRAG_1_STEP, observer->velocity_m_step[axis]);
+    return observer->disturbance_m_step2[axis] - drag_product(NMPC_DRAG_1_STEP, observer->velocity_m_step[axis]);
 }
 
 /* Set position and velocity to the measured ones. The disturbance stays. */
@@ -624,30 +684,27 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
     }
 }
 
-/* Correct the estimates by a measured state. */
-NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state,
+/* Correct the estimates by a measured state, with the gains number `which`; `tilt_m_step2` is the acceleration of the
+ * tilt along x and y. */
+NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state, int which,
                                   const nmpc_real_t tilt_m_step2[2])
 {
     int axis;
 
-    (void)tilt_m_step2;
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t position_m = observer->position_m[axis];
-        const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
-        const nmpc_real_t measured_m = state->position_m[axis];
+        const nmpc_real_t acceleration_m_step2 = tilt_m_step2[axis] + observer_disturbance(observer, axis);
         const nmpc_real_t measured_m_step = speed_product(NMPC_UPDATE_STEP_S, state->velocity_m_s[axis]);
-        const nmpc_real_t n_m = measured_m - position_m;                 /* n_p, n_v: the innovations */
-        const nmpc_real_t n_m_step = measured_m_step - velocity_m_step;
+        nmpc_real_t n[2];
+        nmpc_real_t disturbance_m_step2;
 
-        observer->position_m[axis] =
-            position_m + position_correction(NMPC_POSITION_BY_POSITION, n_m, NMPC_POSITION_BY_VELOCITY, n_m_step);
-        observer->velocity_m_step[axis] =
-            velocity_m_step + velocity_correction(NMPC_VELOCITY_BY_POSITION, n_m, NMPC_VELOCITY_BY_VELOCITY, n_m_step);
-        observer->disturbance_m_step2[axis] =
-            clamp(observer->disturbance_m_step2[axis]
-                      + disturbance_correction(NMPC_DISTURBANCE_BY_POSITION, n_m, NMPC_DISTURBANCE_BY_VELOCITY, n_m_step),
-                  NMPC_DISTURBANCE_LIMIT_M_STEP2);
+        axis_innovate(observer->position_m[axis], observer->velocity_m_step[axis], acceleration_m_step2,
+                      state->position_m[axis], measured_m_step, n);
+        axis_correct(&observer->position_m[axis], &observer->velocity_m_step[axis], observer_gains[which], n);
+        disturbance_m_step2 =
+            observer->disturbance_m_step2[axis]
+            + disturbance_correction(observer_gains[which][2][0], n[0], observer_gains[which][2][1], n[1]);
+        observer->disturbance_m_step2[axis] = clamp(disturbance_m_step2, NMPC_DISTURBANCE_LIMIT_M_STEP2);
     }
 }
 
@@ -658,19 +715,13 @@ NMPC_INLINE void observer_predict(nmpc_observer_t *observer, const nmpc_real_t t
 
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t acceleration_m_step2 = tilt_m_step2[axis] + observer_disturbance(observer, axis);
-        const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
-        const nmpc_real_t mean_m_step = velocity_m_step + half_change(acceleration_m_step2);
-
-        observer->position_m[axis] =
-            clamp(observer->position_m[axis] + position_change(mean_m_step), NMPC_ESTIMATED_POSITION_LIMIT_M);
-        observer->velocity_m_step[axis] =
-            clamp(velocity_m_step + velocity_change(acceleration_m_step2), NMPC_VELOCITY_LIMIT_M_STEP);
+        axis_predict(&observer->position_m[axis], &observer->velocity_m_step[axis],
+                     tilt_m_step2[axis] + observer_disturbance(observer, axis));
     }
 }
 
-/* The frame has jumped, and the measured position and velocity with it. The acceleration that the tilt does not explain has
- * not: d takes up what the change of v does to the drag. */
+/* The frame has jumped. The acceleration that the tilt does not explain has not: d takes up what the change of v does
+ * to the drag. */
 static void observer_shift(nmpc_observer_t *observer, const nmpc_real_t position_change_m[],
                            const nmpc_real_t velocity_change_m_s[])
 {
@@ -678,11 +729,9 @@ static void observer_shift(nmpc_observer_t *observer, const nmpc_real_t position
 
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t change_m_step = speed_product(NMPC_UPDATE_STEP_S, velocity_change_m_s[axis]);
-        const nmpc_real_t change_m = position_change_m[axis];
 
-        observer->position_m[axis] = clamp(observer->position_m[axis] + change_m, NMPC_ESTIMATED_POSITION_LIMIT_M);
-        observer->velocity_m_step[axis] =
-            clamp(observer->velocity_m_step[axis] + change_m_step, NMPC_VELOCITY_LIMIT_M_STEP);
+        axis_shift(&observer->position_m[axis], &observer->velocity_m_step[axis], position_change_m[axis],
+                   change_m_step);
         observer->disturbance_m_step2[axis] =
             clamp(observer->disturbance_m_step2[axis] + drag_product(NMPC_DRAG_1_STEP, change_m_step),
                   NMPC_DISTURBANCE_LIMIT_M_STEP2);
@@ -828,8 +877,8 @@ static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
  * The exact minimum of the quadratic cost (not in the paper).
  *
  * Along one axis of the heading, right or forward, let e and v be the errors of position and velocity, w the
- * disturbance, drag less the target's acceleration, j the target's jerk, and a, i, c, u the attitude model's states.
- * In seconds and metres
+ * disturbance, with drag, less the target's acceleration, j the target's jerk, and a, i, c, u the attitude model's
+ * states; a is the measured tilt's acceleration where the tilt is measured. In seconds and metres
  *
  *     e' = v,   v' = a + w,   w' = -j - w / 1000 s,   j' = -j / 1 s,
  *
@@ -838,20 +887,20 @@ static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
  *
  *     e^2 + (velocity_weight v)^2 + (response_time^3 (u(k+i) - u(k+i-1)) / T_s)^2.
  *
- * Free are U1, the command of this control step, and U2, to which the command then runs in a ramp of 0.4 s; behind
- * it the cost to go is that of the Riccati equation. Without limits the minimum is U = rows [e v w j a i c u]. Each of
- * U1 and U2 is limited to the same box. With H the second derivatives of the cost, the minimum in the box has
+ * The axes do not interact, so there is one such problem for each.
+ */
+
+/* Free are U1, the command of this control step, and U2, to which the command then runs in a ramp; behind it the cost
+ * to go is that of the Riccati equation. Without limits the minimum is U = rows * state. Each of U1 and U2 is limited
+ * to the same box. With H the second derivatives of the cost, the minimum in the box has
  *
  *     U1 = clamp(U1 - H12/H11 (clamp(U2) - U2)):
  *
  * the best U1 beside U2 at its limit, if U2 is beyond it. The minimum could be elsewhere only with U1 at its limit and
- * U2 within: then U1 is so far beyond, H12^2 being less than H11 H22, that this line cuts it off at the same limit.
- * The axes do not interact, so there is one such problem for each.
- */
-
+ * U2 within: then U1 is so far beyond, H12^2 being less than H11 H22, that this line cuts it off at the same limit. */
 #define NMPC_STATES 8
 
-/* U1 and U2 from e, v, w, j, a, i, c, u, for right and forward. */
+/* U1 and U2, a ramp of 0.4 s apart, from e, v, w, j, a, i, c, u, for right and forward. */
 static const nmpc_real_t move_rows[2][2][NMPC_STATES] = {
     {
         { -339762385, -41319035, -2425026, 37249335, -1108732, -1185716, -198544, 7270462 },
@@ -866,25 +915,12 @@ static const nmpc_real_t move_rows[2][2][NMPC_STATES] = {
 /* H12/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
 static const nmpc_real_t move_ratios[2] = { 1359810574, 1363286600 };
 
-/* A row times the state. */
-NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
-{
-    nmpc_sum_t sum = wide_product(row[0], state[0]);
-    int k;
-
-    NMPC_UNROLL
-    for (k = 1; k < NMPC_STATES; k++) {
-        sum = sum + wide_product(row[k], state[k]);
-    }
-    return row_sum(sum);
-}
-
-/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
- * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`. */
+/* Return the first free move along `axis` that minimises the cost from `state`, of the members that the rows name, in
+ * m, m/step and m/step^2. The moves lie within +/- `limit_m_step2`. */
 NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
-    nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
-    const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
+    nmpc_real_t move_m_step2 = axis_row(move_rows[axis][0], state, NMPC_STATES);
+    const nmpc_real_t second_m_step2 = axis_row(move_rows[axis][1], state, NMPC_STATES);
 
     if (within(second_m_step2, limit_m_step2) == 0) {
         const nmpc_real_t change_m_step2 =
@@ -892,6 +928,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 
         move_m_step2 = move_m_step2 - ratio_product(move_ratios[axis], change_m_step2);
     }
+
     return clamp(move_m_step2, limit_m_step2);
 }
 
@@ -1499,7 +1536,7 @@ NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
         if (has_estimate(self) == 0) {
             observer_start(&step->observer, step->state);
         } else {
-            observer_correct(&step->observer, step->state, step->world_m_step2);
+            observer_correct(&step->observer, step->state, 0, step->world_m_step2);
         }
     }
 }
@@ -1685,6 +1722,15 @@ NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
     step->command_rad[1] = limited_angle(self, step->command_rad[1]);
 }
 
+/* Tell the attitude model that `after_rad` is sent in place of `before_rad`. */
+static void replace_command(nmpc_t *self, const nmpc_real_t before_rad[2], const nmpc_real_t after_rad[2])
+{
+    const nmpc_real_t roll_change_rad = after_rad[0] - before_rad[0];
+    const nmpc_real_t pitch_change_rad = after_rad[1] - before_rad[1];
+
+    attitude_change_command(&self->attitude, roll_change_rad, pitch_change_rad);
+}
+
 /* Hold the last command, less its rate feedback: that is for the rate of one control step only. The level command after
  * an outage has none. */
 NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
@@ -1759,32 +1805,48 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
  * The functions of nmpc.h.
  */
 
-/* Forget everything that was measured; the drone holds the attitude of a command within the tilt limit. */
-static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+/* Forget everything that was measured; the drone holds a command within its limits. */
+static void restart(nmpc_t *self, const nmpc_command_t *command)
 {
-    self->command_rad[0] = roll_rad;
-    self->command_rad[1] = pitch_rad;
+    self->command_rad[0] = command->roll_rad;
+    self->command_rad[1] = command->pitch_rad;
     self->tilt_rad[0] = (nmpc_real_t)0;
     self->tilt_rad[1] = (nmpc_real_t)0;
     self->limited = 0U;
     self->missed = NMPC_AT_REST;
-    attitude_reset(&self->attitude, roll_rad, pitch_rad);
+    attitude_reset(&self->attitude, command->roll_rad, command->pitch_rad);
     observer_clear(&self->observer);
     tracker_clear(self);
 }
 
 void nmpc_init(nmpc_t *self)
 {
+    nmpc_command_t level;
+
     if (self == NULL) {
         return;
     }
 
+    level.roll_rad = (nmpc_real_t)0;
+    level.pitch_rad = (nmpc_real_t)0;
     limits_init(self);
-    restart(self, (nmpc_real_t)0, (nmpc_real_t)0);
+    restart(self, &level);
+}
+
+/* A command within the tilt limit. */
+static nmpc_command_t limited_command(const nmpc_t *self, const nmpc_command_t *command)
+{
+    nmpc_command_t limited = *command;
+
+    limited.roll_rad = clamp(command->roll_rad, self->bounds.tilt_rad);
+    limited.pitch_rad = clamp(command->pitch_rad, self->bounds.tilt_rad);
+    return limited;
 }
 
 nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
 {
+    nmpc_command_t limited;
+
     if ((self == NULL) || (command == NULL)) {
         return NMPC_NULL_POINTER;
     }
@@ -1792,14 +1854,14 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
         return NMPC_BAD_COMMAND;
     }
 
-    restart(self, clamp(command->roll_rad, self->bounds.tilt_rad), clamp(command->pitch_rad, self->bounds.tilt_rad));
+    limited = limited_command(self, command);
+    restart(self, &limited);
     return NMPC_OK;
 }
 
 nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
 {
-    nmpc_real_t roll_rad;
-    nmpc_real_t pitch_rad;
+    nmpc_real_t given_rad[2];
 
     if ((self == NULL) || (command == NULL)) {
         return NMPC_NULL_POINTER;
@@ -1808,11 +1870,11 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
         return NMPC_BAD_COMMAND;
     }
 
-    roll_rad = clamp(command->roll_rad, self->bounds.tilt_rad);
-    pitch_rad = clamp(command->pitch_rad, self->bounds.tilt_rad);
-    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);
-    self->command_rad[0] = roll_rad;
-    self->command_rad[1] = pitch_rad;
+    given_rad[0] = clamp(command->roll_rad, self->bounds.tilt_rad);
+    given_rad[1] = clamp(command->pitch_rad, self->bounds.tilt_rad);
+    replace_command(self, self->command_rad, given_rad);
+    self->command_rad[0] = given_rad[0];
+    self->command_rad[1] = given_rad[1];
     return NMPC_OK;
 }
 
@@ -1854,16 +1916,27 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
     return status;
 }
 
+/* The angle, roll or pitch, that stands for a move along `axis`. */
+static nmpc_real_t angle_of_move(const nmpc_t *self, int axis, nmpc_real_t move_m_step2)
+{
+    const nmpc_real_t acceleration_m_step2 = move_acceleration(move_m_step2);
+    nmpc_real_t angle_rad;
+
+    angle_rad = (axis == NMPC_RIGHT) ? attitude_roll(acceleration_m_step2) : attitude_pitch(acceleration_m_step2);
+    (void)self;
+    return angle_rad;
+}
+
 int nmpc_is_saturated(const nmpc_t *self)
 {
     /* The largest moves; with a trim their commands lie closer to level on one side. */
     const nmpc_real_t right_m_step2 = self->bounds.command_m_step2[NMPC_RIGHT];
     const nmpc_real_t forward_m_step2 = self->bounds.command_m_step2[NMPC_FORWARD];
 
-    return (self->command_rad[0] >= attitude_roll(move_acceleration(right_m_step2)))
-           || (self->command_rad[0] <= attitude_roll(move_acceleration(-right_m_step2)))
-           || (self->command_rad[1] >= attitude_pitch(move_acceleration(-forward_m_step2)))
-           || (self->command_rad[1] <= attitude_pitch(move_acceleration(forward_m_step2)));
+    return (self->command_rad[0] >= angle_of_move(self, NMPC_RIGHT, right_m_step2))
+           || (self->command_rad[0] <= angle_of_move(self, NMPC_RIGHT, -right_m_step2))
+           || (self->command_rad[1] >= angle_of_move(self, NMPC_FORWARD, -forward_m_step2))
+           || (self->command_rad[1] <= angle_of_move(self, NMPC_FORWARD, forward_m_step2));
 }
 
 nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
@@ -1884,8 +1957,8 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
     return NMPC_OK;
 }
 
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2],
-                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
+nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], const nmpc_real_t velocity_change_m_s[2],
+                         nmpc_real_t heading_change_rad)
 {
     if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {
         return NMPC_NULL_POINTER;

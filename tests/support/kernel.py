@@ -31,8 +31,7 @@ class PlainLoader(KernelLoader):
 
 def parts_of(settings: Settings) -> dict[str, bool]:
     """Return the parts of a controller, by the names of their conditions."""
-    context = method_of(settings).context
-    return {name: bool(value) for name, value in context.items() if name.startswith("WITH_")}
+    return {f"WITH_{name.upper()}": is_there for name, is_there in method_of(settings).presence.items()}
 
 
 def defines(parts: dict[str, bool]) -> list[str]:

@@ -34,16 +34,16 @@ LIMIT_S = 20
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+(?:e-?\d+)?f)?(?!\w)")
 _TABLE = re.compile(r"^ *static const nmpc_real_t (\w+)(?:\[\w*\])+ = \{(.*?)\};$", re.MULTILINE | re.DOTALL)
 _ANGLES = {"sine_terms", "cosine_terms"}
-_PLANE = {*_ANGLES, "tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios"}
-_HEIGHT = {*_PLANE, "thrust_row", "thrust_lagged_row", "height_rows", "observer_gains"}
+_PLANE = {*_ANGLES, "tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios", "observer_gains"}
+_HEIGHT = {*_PLANE, "thrust_row", "thrust_lagged_row", "height_rows", "height_gains"}
 _CRAZYFLIE, _MAMBO = presets.load("crazyflie"), presets.load("mambo")
 TABLED = {
     "every function": (EVERY_FUNCTION, _HEIGHT),
-    "crazyflie": (_CRAZYFLIE, {*_PLANE, "observer_gains"}),
+    "crazyflie": (_CRAZYFLIE, _PLANE),
     "mambo": (_MAMBO, _PLANE),
     "table1": (presets.load("table1"), {*_ANGLES, "response_sum"}),
     "mambo-1norm": (presets.load("mambo-1norm"), {*_ANGLES, "response_sum"}),
-    "crazyflie, fixed": (with_option(_CRAZYFLIE, "code.scalar", "fixed"), {*_PLANE, "observer_gains"}),
+    "crazyflie, fixed": (with_option(_CRAZYFLIE, "code.scalar", "fixed"), _PLANE),
     "mambo, fixed": (with_option(_MAMBO, "code.scalar", "fixed"), _PLANE),
 }
 """Settings, and the tables that their C has."""
@@ -57,9 +57,9 @@ BREAKS = {
     "no braking before a wall": ("most_m_s = braking_speed(braking_square(bounds, excess_m));", "most_m_s = braking_speed(bounds->braking_m_s2);"),
     "the wall behind": ("(towards < (nmpc_real_t)0) ? (nmpc_real_t)-1", "(towards > (nmpc_real_t)0) ? (nmpc_real_t)-1"),
     "a heading turns the long way": ("change_rad = (nmpc_sum_t)wanted_rad - previous_rad;", "change_rad = (nmpc_sum_t)previous_rad - wanted_rad;"),
-    "a heading beyond its range": ("        next_rad = next_rad + turn_rad;", "        next_rad = next_rad - turn_rad;"),
+    "a heading beyond its range": ("        next_rad = next_rad + NMPC_TURN_RAD;", "        next_rad = next_rad - NMPC_TURN_RAD;"),
     "a heading turns at once": ("        change_rad = -most_change_rad;", "        change_rad = change_rad;"),
-    "a command set changes no pitch": ("    self->command_rad[1] = pitch_rad;\n    return NMPC_OK;", "    return NMPC_OK;"),
+    "a command set changes no pitch": ("    self->command_rad[1] = given_rad[1];\n    return NMPC_OK;", "    return NMPC_OK;"),
     "a thrust set is not limited": ("height->thrust_m_s2 = confine(thrust_m_s2, NMPC_THRUST_MIN_M_S2, NMPC_THRUST_MAX_M_S2);\n    height->command_m_step2", "height->thrust_m_s2 = thrust_m_s2;\n    height->command_m_step2"),
     "a bad thrust is set": ("if (is_good_thrust(thrust_m_s2) == 0) {", "if (is_good_thrust(thrust_m_s2) != 0) {"),
     "a shift does not move the height": ("    height_shift(&self->height, position_change_m[2], velocity_change_m_s[2]);\n", ""),
@@ -68,7 +68,7 @@ BREAKS = {
     "a bad shift is made": ("        || (within(velocity_change_m_s[2], NMPC_VELOCITY_RANGE_M_S) == 0)\n", ""),
     "a reset keeps the tilt": ("        attitude->tilt_m_step2[axis] = attitude->command_m_step2[axis];\n", ""),
     "a reset keeps the budget": ("    self->budget_rad[1] = NMPC_TILT_BUDGET_RAD;\n", ""),
-    "a reset is not clamped": ("clamp(command->pitch_rad, self->bounds.tilt_rad), command->thrust", "command->pitch_rad, command->thrust"),
+    "a reset is not clamped": ("limited.pitch_rad = clamp(command->pitch_rad, self->bounds.tilt_rad);", "limited.pitch_rad = command->pitch_rad;"),
     "coarse gains for a measured position": ("(is_measured != 0) ? 0U : 1U", "(is_measured != 0) ? 1U : 0U"),
     "an outage ends at once": ("        step->missed = (unsigned int)self->missed + 1U;", "        step->missed = (unsigned int)self->missed + 2U;"),
     "no rest after an outage": ("        step->missed = NMPC_AT_REST;\n", ""),

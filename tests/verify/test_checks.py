@@ -105,7 +105,7 @@ QUADRATIC_FAULTS: Final[dict[str, tuple[Check, Harm]]] = {
     ),
     "another bit": (
         bits.check,
-        Harm(CONTROLLER, r"\(NMPC_VELOCITY_BY_POSITION", "(NMPC_VELOCITY_BY_VELOCITY"),
+        Harm(CONTROLLER, r"gains\[1\]\[0\] \* n\[0\]", "gains[1][1] * n[0]"),
     ),
     "another state": (bits.check, Harm(CONTROLLER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
     "a flag that stays": (bits.check, Harm(CONTROLLER, r"    self->has_target = 0U;\n", "")),

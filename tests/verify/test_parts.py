@@ -44,7 +44,7 @@ FAULTS = {
             "nmpc.c", r"NMPC_THRUST_MAX_M_STEP2 \* share", "NMPC_THRUST_MIN_M_STEP2 * share"
         ),
         "the ceiling is not minded": Harm(
-            "nmpc.c", r"confine\(bounds->ceiling_m", "confine(height_m + bounds->up_m"
+            "nmpc.c", r"confine\(bounds->ceiling_m", "confine(height->height_m + bounds->up_m"
         ),
         "the gain is not learnt": Harm("nmpc.c", r"height->gain = confine\([^;]*;", ""),
         "the tilt does not count": Harm(
@@ -67,7 +67,7 @@ FAULTS = {
             "height->thrust_m_s2, height->thrust_m_s2)",
         ),
         "a reset fills no budget": Harm("nmpc.c", r"    self->budget_rad\[1\] = [^;]*;\n", ""),
-        "a word on the position is not heard": Harm("nmpc.c", r"which = 1;", "which = 0;"),
+        "a word on the position is not heard": Harm("nmpc.c", r"\(self->is_coarse != 0U\) \? 1 : 0", "0"),
         "what reverses is believed": Harm(
             "nmpc.c", r"\(product < \(nmpc_real_t\)0\) \? -product", "(0) ? -product"
         ),
@@ -76,9 +76,7 @@ FAULTS = {
         ),
     },
     "thrust vector": {
-        "pitch counts without the roll": Harm(
-            "nmpc.c", r"forward = sine\[1\] \* cosine\[0\];", "forward = sine[1];"
-        ),
+        "pitch counts without the roll": Harm("nmpc.c", r"\(sine\[1\] \* cosine\[0\]\)", "sine[1]"),
         "roll knows no pitch": Harm("nmpc.c", r"arc_tangent\(right \* cosine\)", "arc_tangent(right)"),
         "a steep slope has no arc of its own": Harm(
             "nmpc.c", r"angle_rad = NMPC_QUARTER_TURN - angle_rad;", "angle_rad = angle_rad + angle_rad;"
@@ -88,8 +86,8 @@ FAULTS = {
         "no word of the thrust": Harm("nmpc.c", r"step->by_thrust = NMPC_LIMIT_THRUST;", ""),
         "a bounded command is told as it was": Harm(
             "nmpc.c",
-            r"attitude_change_command\(&self->attitude, asked_rad",
-            "attitude_change_command(&self->attitude, self->command_rad",
+            r"replace_command\(self, asked_rad",
+            "replace_command(self, self->command_rad",
         ),
     },
     "learnt gain": {
@@ -108,7 +106,7 @@ FAULTS = {
             "moved_m_step2, NMPC_ATTITUDE_LIMIT_M_STEP2)",
         ),
         "hover is learnt from": Harm("nmpc.c", r"if \(is_moved && ", "if ("),
-        "a command at the limit is learnt from": Harm("nmpc.c", r" - NMPC_TILT_GAIN_FREE;", ";"),
+        "a command at the limit is learnt from": Harm("nmpc.c", r" - NMPC_TILT_GAIN_FREE\)", ")"),
         "the gain has no limits": Harm("nmpc.c", r"(#define NMPC_TILT_GAIN_MIN) [^ \n]*", r"\1 0.1f"),
         "the means start at rest": Harm(
             "nmpc.c",
@@ -118,7 +116,9 @@ FAULTS = {
         "the floor is learnt from": Harm("nmpc.c", r"        restarts = \(restarts != 0\)[^;]*;\n", ""),
         "a reset keeps the gain": Harm("nmpc.c", r"    tilt_gain_clear\(&self->tilt_gain\);\n", ""),
         "a bounded command is the model's": Harm(
-            "nmpc.c", r"tilt_gain_meant\(&self->tilt_gain, 0, roll_change_rad\)", "roll_change_rad"
+            "nmpc.c",
+            r"tilt_gain_meant\(&self->tilt_gain, 0, after_rad\[0\] - before_rad\[0\]\)",
+            "after_rad[0] - before_rad[0]",
         ),
         "the largest move is that of the settings": Harm(
             "nmpc.c",

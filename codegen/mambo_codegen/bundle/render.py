@@ -183,8 +183,9 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
     scalar = settings.code.scalar
     return (
         products(fixed=numbers.formats is not None)
-        | {"height": None, "guard": None, "doubts": False, "vector": None, "tilt_gain": None}
+        | {"height": None, "guard": None, "doubts": False, "vector": None}
         | method.context
+        | {f"WITH_{name.upper()}": is_there for name, is_there in method.presence.items()}
         | {
             "settings": settings,
             "method_folder": method.folder,

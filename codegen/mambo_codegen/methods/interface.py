@@ -137,15 +137,8 @@ class Method(Constants):
     @property
     def chapters(self) -> tuple[tuple[str, str], ...]:
         """The chapters of nmpc.c with these settings, and a word on each."""
-        needs = (
-            *(("tracker", self.tracker), ("guard", self.guard), ("height", self.has_height)),
-            *((name, self.limiting) for name in ("limits_arithmetic", "limits", "set_limits")),
-            ("thrust_vector", self.has_thrust_vector),
-            ("tilt_gain", self.learns_tilt_gain),
-            ("float", self.numbers.formats),
-        )
-        absent = {name for name, needed in needs if not needed}
-        return tuple(item for item in self.sub_blocks.items() if item[0] not in absent)
+        presence = self.presence
+        return tuple(item for item in self.sub_blocks.items() if presence.get(item[0], True))
 
     @abstractmethod
     def refusals(self) -> list[Refusal]:

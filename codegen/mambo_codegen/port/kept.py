@@ -73,8 +73,8 @@ TRACKER: Final = (
 HEIGHT: Final = (
     PortRow("height_m", "position", "p"),
     PortRow("velocity_m_step", "speed", "v"),
-    PortRow("gain", "factor", "kg: delivered over {expected} thrust", when=("learns_gain",)),
-    PortRow("disturbance_m_step2", "acceleration", "d", when=("learns_acceleration",)),
+    PortRow("gain", "factor", "kg: delivered over {expected} thrust", when=("thrust_gain",)),
+    PortRow("disturbance_m_step2", "acceleration", "d", when=("lift",)),
     PortRow("thrust_m_step2", "acceleration", "sa: vertical share of the thrust"),
     PortRow("lagged_m_step2", "acceleration", "sc: that of the command behind dead time and quick lags"),
     PortRow("command_m_step2", "acceleration", "su: that of the last command"),
@@ -94,13 +94,13 @@ QUADRATIC: Final = (
     PortRow("tilt_gain", when=("tilt_gain",), kind="tilt_gain"),
     PortRow("tracker", when=("tracker",), kind="tracker"),
     PortRow("height", when=("height",), kind="height"),
-    PortRow("bounds", when=("limits",), kind="bounds"),
+    PortRow("bounds", kind="bounds"),
     PortRow("tilt_rad", "angle", "roll and pitch of the last good state", "NMPC_ANGLES", ("feedback",)),
     PortRow("budget_rad", "angle", "b of roll and pitch", "NMPC_ANGLES", ("guard",)),
     PortRow("command_rad", "angle", "the last command", "NMPC_ANGLES"),
     PortRow("missed", words="control steps since the last good state", kind=BYTE),
     PortRow("has_target", words="1 once the tracker has seen a target", when=("tracker",), kind=BYTE),
-    PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", when=("limits",), kind=BYTE),
+    PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
     PortRow("is_coarse", words="1 while no position is measured", when=("guard",), kind=BYTE),
 )
 

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Final
 
 from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, PortRow
-from mambo_codegen.port.tables import KEPT, TAKEN, Table
+from mambo_codegen.port.tables import KEPT, MACROS, TAKEN, WORDS, Table
 
 _CHECKED: Final = ("state", "target")
 """The records whose comments tell the ranges."""
@@ -133,15 +133,27 @@ class ControllerPort:
         state = self.quantities("state")
         return tuple(one for one in ("position", "velocity", "yaw") for each in state if each == one)
 
+    @property
+    def records(self) -> list[tuple[str, str]]:
+        """The name of each record inside nmpc_t, the innermost first, and what nmpc.h says of it."""
+        inside, found = [*self.rows("controller")], set()
+        while inside:
+            row = inside.pop()
+            if row.kind in self._table:
+                found.add(row.kind)
+                inside += self.rows(row.kind)
+        return [(name, WORDS.get(name, "")) for name in KEPT[self.norm] if name in found]
+
+    @property
+    def macros(self) -> list[tuple[str, str]]:
+        """The macros by which nmpc.h says which parts are there, and what each means."""
+        return [macro for part, macro in MACROS.items() if part in self.parts]
+
     def members(self, record: str, number: str = NUMBER) -> list[Member]:
         """Return the members of a record's struct, whose numbers have the type `number`."""
         return [
             Member(
-                number
-                if row.kind == NUMBER
-                else f"nmpc_{row.kind}_t"
-                if row.kind in self._table
-                else row.kind,
+                self._type(row, number),
                 row.member if row.count == 1 else f"{row.member}[{row.count}]",
                 self._comment(record, row) if number == NUMBER else row.unit,
             )

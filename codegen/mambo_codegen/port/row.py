@@ -9,13 +9,6 @@ BYTE: Final = "unsigned char"
 WHOLE: Final = "int"
 """The types of members in C; any other is a record of the table."""
 
-
-MACROS: Final = {
-    "height": "NMPC_HAS_HEIGHT",
-    "given": "NMPC_HAS_TARGET_ACCELERATION",
-}
-"""How nmpc.h says that a part is there on which what a controller takes depends."""
-
 RANGES: Final = {
     "position": "NMPC_POSITION_RANGE_M",
     "velocity": "NMPC_VELOCITY_RANGE_M_S",

@@ -38,3 +38,25 @@ KEPT: Final[dict[str, Table]] = {
     },
 }
 """What it keeps, by `cost.norm`."""
+
+WORDS: Final = {
+    "observer": "Estimates along x and y, by the observer of nmpc.c.",
+    "attitude": "The attitude model of nmpc.c along right and forward, the axes of the heading.",
+    "tilt_gain": "The gain of the tilt, of roll and pitch, by the chapter of nmpc.c.",
+    "noise": "Noise of the target's motion along an axis, by the tracker of nmpc.c.",
+    "tracker": "The target's motion along x and y, by the tracker of nmpc.c.",
+    "height": "The height, by the chapter of nmpc.c.",
+    "bounds": "What follows from the limits, for the law in nmpc.c.",
+}
+"""What nmpc.h says of each record that a controller with a quadratic cost keeps."""
+
+MACROS: Final = {
+    "given": ("NMPC_HAS_TARGET_ACCELERATION", "nmpc_target_t has the member acceleration_m_s2"),
+    "guard": ("NMPC_HAS_GUARD", "there is nmpc_set_position_measured()"),
+    "tilt_gain": ("NMPC_HAS_TILT_GAIN", "nmpc_estimate_t has the members roll_gain and pitch_gain"),
+    "height": (
+        "NMPC_HAS_HEIGHT",
+        "states and targets have a height, commands a thrust, which nmpc_step() does not take",
+    ),
+}
+"""How nmpc.h says that a part is there on which its functions and structs depend, and what that means."""

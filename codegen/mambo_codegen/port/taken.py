@@ -139,12 +139,12 @@ ESTIMATE: Final = (
     PortRow("disturbance_m_s2", "disturbance", "acceleration that tilt and drag do not explain", 2),
     PortRow("height_m", "position", when=_HEIGHT),
     PortRow("climb_m_s", "velocity", when=_HEIGHT),
-    PortRow("thrust_gain", "factor", "delivered over {expected} thrust, as learnt", when=("learns_gain",)),
+    PortRow("thrust_gain", "factor", "delivered over {expected} thrust, as learnt", when=("thrust_gain",)),
     PortRow(
         "lift_m_s2",
         "disturbance",
         "vertical acceleration that the thrust does not explain, up",
-        when=("learns_acceleration",),
+        when=("lift",),
     ),
     PortRow(
         "roll_gain",

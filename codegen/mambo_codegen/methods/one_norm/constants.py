@@ -9,7 +9,7 @@ from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import (
     ONE_NORM_OUTAGE_S,
     LimitsConstants,
-    limits_constants,
+    one_norm_limits,
 )
 from mambo_codegen.numbers.representation import COMMAND, WEIGHT_LIMIT
 
@@ -33,9 +33,22 @@ class OneNormConstants(Constants):
         return one_norm_limits(self.settings)
 
     @property
-    def parts(self) -> frozenset[str]:
-        """The parts that the controller has, by the names in the rows of the port."""
-        return super().parts | ({"lag"} if self.tables.has_lag else set())
+    def presence(self) -> dict[str, bool]:
+        """Whether each part is there."""
+        settings, tables = self.settings, self.tables
+        return super().presence | {
+            "backtracking": settings.optimizer.variant == "rprop+",
+            "halves": self.numbers.formats is not None and tables.halves,
+            "hover": settings.model.thrust == "hover",
+            "lag": tables.has_lag,
+            "later_moves": settings.horizon.control > 1,
+            "later_steps": settings.horizon.prediction > 1,
+            "long_horizon": settings.horizon.prediction > 32,
+            "printed_yaw": settings.model.yaw_convention == "printed",
+            "quadratic": False,
+            "shift": self.tracker is not None or self.has_limits,
+            "warm_plan": settings.optimizer.warm_start == "plan",
+        }
 
     @property
     def sizes(self) -> dict[str, int]:

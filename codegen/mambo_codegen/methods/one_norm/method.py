@@ -11,7 +11,6 @@ from mambo_codegen.methods.one_norm.controller import OneNormController, OneNorm
 from mambo_codegen.methods.one_norm.formats import refusals
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, ONE_NORM_TILT, has_limits
 from mambo_codegen.methods.shared.limits_constants import refusals as limits_refusals
-from mambo_codegen.methods.shared.parts import common_parts
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS
 from mambo_codegen.methods.shared.rate_feedback import lag_refusals
 from mambo_codegen.numbers.representation import WEIGHTS
@@ -111,24 +110,4 @@ class OneNorm(OneNormConstants, Method):
             "hover": settings.model.thrust == "hover",
             "tracking_limit": tracking_limit,
             "effort_limit": effort_limit,
-            **_parts(self),
         }
-
-
-def _parts(constants: OneNormConstants) -> dict[str, bool]:
-    """Return which parts the chapters of the kernel have, by the names of their conditions."""
-    settings, tables = constants.settings, constants.tables
-    horizon, model = settings.horizon, settings.model
-    return common_parts(constants) | {
-        "WITH_BACKTRACKING": settings.optimizer.variant == "rprop+",
-        "WITH_HALVES": constants.numbers.formats is not None and tables.halves,
-        "WITH_HOVER": model.thrust == "hover",
-        "WITH_LAG": tables.has_lag,
-        "WITH_LATER_MOVES": horizon.control > 1,
-        "WITH_LATER_STEPS": horizon.prediction > 1,
-        "WITH_LONG_HORIZON": horizon.prediction > 32,
-        "WITH_PRINTED_YAW": model.yaw_convention == "printed",
-        "WITH_QUADRATIC": False,
-        "WITH_SHIFT": constants.tracker is not None or constants.has_limits,
-        "WITH_WARM_PLAN": settings.optimizer.warm_start == "plan",
-    }

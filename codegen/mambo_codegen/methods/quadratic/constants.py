@@ -77,11 +77,24 @@ class QuadraticConstants(Constants):
         return formats(self.settings)
 
     @property
-    def parts(self) -> frozenset[str]:
-        """The parts that the controller has, by the names in the rows of the port."""
-        tells_noise = self.tracker is not None and self.tracker.noise is not None
-        learnt = {f"learns_{self.height.learn}"} if self.height else set()
-        return super().parts | {"quadratic"} | learnt | ({"doubts"} if tells_noise else set())
+    def presence(self) -> dict[str, bool]:
+        """Whether each part is there."""
+        model, feedback = self.settings.model, self.feedback_steps or (0.0, 0.0)
+        return super().presence | {
+            "age": bool(self.observer.age_steps),
+            "confine": self.has_height or self.learns_tilt_gain,
+            "drag": bool(self.observer.drag_1_step),
+            "lift": self.height is not None and self.height.learns_acceleration,
+            "pitch_feedback": feedback[1] != 0,
+            "pitch_trim": model.pitch_trim_rad != 0,
+            "predicted": model.attitude == "predicted",
+            "quadratic": True,
+            "roll_feedback": feedback[0] != 0,
+            "roll_trim": model.roll_trim_rad != 0,
+            "shift": True,
+            "thrust_gain": self.height is not None and self.height.learns_gain,
+            "two_moves": self.law.moves == 2,
+        }
 
     @property
     def names(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
+from mambo_codegen.methods.quadratic.axis import Axis, gains_of, row_product
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.guard import VariationBudget
 from mambo_codegen.methods.quadratic.height_constants import (
@@ -90,15 +91,9 @@ class HeightAxis:
         self, constants: QuadraticConstants, found: HeightConstants, products: QuadraticArithmetic
     ) -> None:
         constant, settings = products.numbers.constant, constants.settings
-        self._products, self._found = products, found
-        rows, last = found.gain, "gain" if found.learns_gain else "disturbance"
-        self._gain = [
-            [
-                constant(value, f"{name}_by_{by}")
-                for value, by in zip(row, ("position", "velocity"), strict=True)
-            ]
-            for row, name in zip(rows, ("position", "velocity", last), strict=True)
-        ]
+        self._products, self._found, self._axis = products, found, Axis(constants, products)
+        last = "gain" if found.learns_gain else "disturbance"
+        self._gains = gains_of(constant, found.gain, ("position", "velocity", last))
         self._thrust_row = [constant(value, "attitude") for value in found.thrust_row]
         self._lagged_row = [constant(value, "attitude") for value in found.lagged_row]
         self._rows = [
@@ -125,10 +120,7 @@ class HeightAxis:
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
             self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
-        age_steps = constants.observer.age_steps
-        self._age = constant(age_steps, "age") if age_steps else None
         self._height_limit = constant(settings.ranges.position_m, "position")
-        self._velocity_limit = constant(constants.observer.velocity_limit_m_step, "speed")
         self._step2 = constant(found.step2_s2, "step2")
         self._steps2 = constant(found.steps2_per_s2, "thrust_per_step2")
         self._lines = {
@@ -279,29 +271,19 @@ class HeightAxis:
 
     def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
-        products = self._products
         acceleration = np.where(on_ground, 0, self._acceleration(state))
-        mean = state.velocity_m_step + products.half_change(acceleration)
-        velocity = state.velocity_m_step + products.velocity_change(acceleration)
-        return replace(
-            state,
-            height_m=clamp(state.height_m + products.position_change(mean), self._height_limit),
-            velocity_m_step=clamp(velocity, self._velocity_limit),
-        )
+        height_m, velocity = self._axis.predict((state.height_m, state.velocity_m_step), acceleration)
+        return replace(state, height_m=height_m, velocity_m_step=velocity)
 
     def shift(self, state: HeightState, jump: FrameShift) -> HeightState:
         """Move the estimate with the frame."""
-        change_m, change = jump.position_m[:, 2], self._products.speed_product(jump.velocity_m_s[:, 2])
-        if self._age is not None:
-            change_m = change_m + self._products.aged_position(self._age, change)
-        return replace(
-            state,
-            height_m=clamp(state.height_m + change_m, self._height_limit),
-            velocity_m_step=clamp(state.velocity_m_step + change, self._velocity_limit),
-            target=self._tracker.shift(state.target, jump.velocity_m_s[:, 2:])
-            if self._tracker
-            else state.target,
-        )
+        change = self._products.speed_product(jump.velocity_m_s[:, 2])
+        motion = state.height_m, state.velocity_m_step
+        height_m, velocity = self._axis.shift(motion, jump.position_m[:, 2], change)
+        moved = replace(state, height_m=height_m, velocity_m_step=velocity)
+        if self._tracker is None:
+            return moved
+        return replace(moved, target=self._tracker.shift(state.target, jump.velocity_m_s[:, 2:]))
 
     def turn(self, state: HeightState) -> HeightState:
         """Return the heights after turns of the frame, of which the target's next velocity is the first."""
@@ -368,26 +350,19 @@ class HeightAxis:
         return lift + state.disturbance_m_step2 if self._found.learns_acceleration else lift
 
     def _correct(self, state: HeightState, measured: Real, step: Real) -> HeightState:
-        products, position, velocity = self._products, state.height_m, state.velocity_m_step
-        height = measured[:, 0]
-        if self._age is not None:
-            height = height + products.aged_position(self._age, velocity)
-            step = step + products.aged_velocity(self._age, self._acceleration(state))
-        by = height - position, step - velocity
-        gain = self._gain
-        corrected = replace(
-            state,
-            height_m=position + products.position_correction(gain[0][0], by[0], gain[0][1], by[1]),
-            velocity_m_step=velocity + products.velocity_correction(gain[1][0], by[0], gain[1][1], by[1]),
-        )
+        products, gains = self._products, self._gains
+        motion = state.height_m, state.velocity_m_step
+        by = self._axis.innovate(motion, (measured[:, 0], step), self._acceleration(state))
+        height_m, velocity = self._axis.correct(motion, gains, by)
+        corrected = replace(state, height_m=height_m, velocity_m_step=velocity)
         grounded = measured[:, 2] != 0
         if self._found.learns_gain:
-            change = products.gain_correction(gain[2][0], by[0], gain[2][1], by[1])
+            change = products.gain_correction(gains[2][0], by[0], gains[2][1], by[1])
             learnt = state.gain + np.where(grounded & (change > 0), 0, change)
             least, most = self._one - self._learn_limit, self._one + self._learn_limit
             return replace(corrected, gain=confine(learnt, least, most))
         if self._found.learns_acceleration:
-            change = products.disturbance_correction(gain[2][0], by[0], gain[2][1], by[1])
+            change = products.disturbance_correction(gains[2][0], by[0], gains[2][1], by[1])
             change = np.where(grounded & (change > 0), 0, change)
             learnt = clamp(state.disturbance_m_step2 + change, self._learn_limit)
             return replace(corrected, disturbance_m_step2=learnt)
@@ -397,12 +372,7 @@ class HeightAxis:
         """Return the first free move (n,) between limits that are not symmetric."""
         products = self._products
         least, most = products.to_move(least), products.to_move(most)
-        moves = []
-        for row in self._rows:
-            total = row[0] * state[0]
-            for gain, value in zip(row[1:], state[1:], strict=True):
-                total = total + (gain * value)
-            moves.append(products.row_sum(total))
+        moves = [row_product(products, row, state) for row in self._rows]
         best, beyond = moves[0], np.zeros_like(moves[0])
         if len(moves) > 1:
             beyond = confine(moves[1], least, most) - moves[1]

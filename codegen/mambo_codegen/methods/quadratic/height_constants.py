@@ -121,7 +121,6 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         gain = gain / np.array([[1.0], [1.0], [gravity]])
     least, most = (step_s * step_s * thrust for thrust in (height.thrust_min_m_s2, height.thrust_max_m_s2))
     reach_steps = float(law[0, 1] / law[0, 0])
-    climb, descent = _most_m_s(height, reach_steps * step_s)
     least_share = LEAST_SHARE if has_thrust_vector(settings) else LEAST_COSINE
     return HeightConstants(
         thrust_row=rows[0, [0, 2, 3]],
@@ -143,7 +142,7 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         step2_s2=delivered_s2,
         steps2_per_s2=1 / delivered_s2,
         command_m_s2=(*height.command_m_s2, GRAVITY_M_S2 / height.thrust_gain),
-        most_m_s=(climb, descent),
+        most_m_s=_most_m_s(settings, height, reach_steps * step_s),
         least_share=least_share,
         thrust_inverse=reciprocal(least_share * (1 - deviation), 1 + deviation),
         weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
@@ -171,13 +170,12 @@ def refusals(settings: Sections) -> list[Refusal]:
         return [*refused, Refusal("height", "response_time_s", rule)]
     law = _law(settings, height)
     approach_s = float(law[0, 1] / law[0, 0]) * step_s
-    for name, braked_m_s, rest in zip(
+    for name, most_m_s, rest in zip(
         ("climb_m_s", "descent_m_s"),
-        _most_m_s(height, approach_s),
+        _most_m_s(settings, height, approach_s),
         ("height.thrust_min_m_s2", "height.thrust_max_m_s2"),
         strict=True,
     ):
-        most_m_s = min(braked_m_s, settings.ranges.velocity_m_s)
         if getattr(height, name) > most_m_s:
             floor = np.floor(most_m_s * 1000) / 1000
             rule = f"must be at most {floor:g}, which the drone can brake in time with {rest} and this law"
@@ -198,11 +196,12 @@ def height_context(height: HeightConstants | None) -> dict[str, object]:
     }
 
 
-def _most_m_s(height: Height, approach_s: float) -> tuple[float, float]:
+def _most_m_s(settings: Sections, height: Height, approach_s: float) -> tuple[float, float]:
     """Return the largest climb and descent whose braking, speed / approach_s, the thrust can give."""
+    most_m_s = settings.ranges.velocity_m_s
     return (
-        approach_s * (GRAVITY_M_S2 - height.thrust_min_m_s2),
-        approach_s * DESCENT_SHARE * (height.thrust_max_m_s2 - GRAVITY_M_S2),
+        min(most_m_s, approach_s * (GRAVITY_M_S2 - height.thrust_min_m_s2)),
+        min(most_m_s, approach_s * DESCENT_SHARE * (height.thrust_max_m_s2 - GRAVITY_M_S2)),
     )
 
 

@@ -21,7 +21,6 @@ from mambo_codegen.methods.quadratic.step import REST_M_S
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
-from mambo_codegen.methods.shared.parts import common_parts
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.numbers.representation import THRUST
@@ -43,6 +42,7 @@ class Quadratic(QuadraticConstants, Method):
         "thrust_vector": "the direction of the thrust",
         "attitude": "how the drone answers the commands",
         "tilt_gain": "how much it tilts, over what the model says",
+        "axis": "what x, y and the height have in common",
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
         "optimizer": "the minimum of the cost",
@@ -153,7 +153,6 @@ class Quadratic(QuadraticConstants, Method):
             "least_change": LEAST_CHANGE,
             "most_counted": MOST_COUNTED,
             "most_noise": MOST_NOISE,
-            "observer_gain_names": _observer_gain_names(self),
             "stored_numbers": len(self.stored),
             "row_quantities": ROW_QUANTITIES,
             "height_quantities": [name for name in ROW_QUANTITIES if name != "row_i"],
@@ -169,35 +168,8 @@ class Quadratic(QuadraticConstants, Method):
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
-            **_parts(self),
-            "per_step2": _per_step2(self),
             "rest_m_step": REST_M_S * period_s,
         }
-
-
-def _parts(constants: QuadraticConstants) -> dict[str, bool]:
-    """Return which parts the chapters of the kernel have, by the names of their conditions."""
-    settings, feedback = constants.settings, constants.feedback_steps or (0.0, 0.0)
-    return common_parts(constants) | {
-        "WITH_GUARD": constants.guard is not None,
-        "WITH_LIFT": constants.height is not None and constants.height.learns_acceleration,
-        "WITH_PITCH_FEEDBACK": feedback[1] != 0,
-        "WITH_PITCH_TRIM": settings.model.pitch_trim_rad != 0,
-        "WITH_PREDICTED": settings.model.attitude == "predicted",
-        "WITH_QUADRATIC": True,
-        "WITH_ROLL_FEEDBACK": feedback[0] != 0,
-        "WITH_ROLL_TRIM": settings.model.roll_trim_rad != 0,
-        "WITH_SHIFT": True,
-        "WITH_THRUST_GAIN": constants.height is not None and constants.height.learns_gain,
-        "WITH_TILT_GAIN": constants.learns_tilt_gain,
-        "WITH_VECTOR": constants.has_thrust_vector,
-    }
-
-
-def _per_step2(constants: QuadraticConstants) -> str:
-    """Return the constant that makes a command of a thrust over mass per squared step."""
-    of_its_own = constants.height is not None and constants.height.thrust_gain != 1.0
-    return "NMPC_THRUST_PER_STEP2_S2" if of_its_own else "NMPC_STEPS2_PER_S2"
 
 
 def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: float) -> NDArray[np.float64]:
@@ -205,14 +177,6 @@ def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: flo
     unread = {name for name, value in (("i", integral_1_s), ("c", delay_s)) if value == 0}
     kept = [k for k, state in enumerate(law.MOVED) if state not in unread]
     return loop[np.ix_(kept, kept)]
-
-
-def _observer_gain_names(constants: QuadraticConstants) -> list[str]:
-    """Return the names that the gains of the observer have in the C, row by row."""
-    rows = ("POSITION", "VELOCITY", "DISTURBANCE")
-    if constants.guard is None:
-        return [f"NMPC_{row}_BY_{by}" for row in rows for by in rows[:2]]
-    return [f"observer_gains[which][{row}][{column}]" for row in range(3) for column in range(2)]
 
 
 def _number_macro(shift: int) -> str:

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
+from mambo_codegen.methods.quadratic.axis import row_product
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.law import STATES
 from mambo_codegen.methods.shared.inputs import Rows
@@ -41,7 +42,10 @@ class QuadraticOptimizer:
         limit, (2,) or (n, 2), is that of the moves; None for that of the settings.
         """
         limit = self._limit if limit is None else limit
-        moves = [self._row_product(self._rows[:, move], state) for move in range(self._rows.shape[1])]
+        moves = [
+            row_product(self._products, list(self._rows[:, move].T), list(np.moveaxis(state, 2, 0)))
+            for move in range(self._rows.shape[1])
+        ]
         first, limited = moves[0], moves[-1]
         best = first
         if len(moves) > 1:
@@ -53,9 +57,3 @@ class QuadraticOptimizer:
         used = np.concatenate([decided, decided & (limited != moves[-1])], axis=1)
         self.deciding = np.concatenate([used, used & np.tile(whole, 2)], axis=1)
         return move
-
-    def _row_product(self, rows: Real, state: Real) -> Real:
-        total = rows[:, 0] * state[:, :, 0]
-        for k in range(1, rows.shape[1]):
-            total = total + (rows[:, k] * state[:, :, k])
-        return self._products.row_sum(total)

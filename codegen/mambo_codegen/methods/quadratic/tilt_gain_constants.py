@@ -6,7 +6,6 @@ still, as trims and steady wind.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -75,8 +74,6 @@ def tilt_gain_context(found: TiltGainConstants | None) -> dict[str, object]:
     """Return what the templates of the tilt gain insert."""
     return {
         "tilt_gain": found,
-        "sent": partial(_gained, "sent", found),
-        "meant": partial(_gained, "meant", found),
         "gain_quick_rad_s": QUICK_RAD_S,
         "gain_slow_rad_s": SLOW_RAD_S,
         "gain_least_m_s2": LEAST_LEARNT_M_S2,
@@ -85,11 +82,6 @@ def tilt_gain_context(found: TiltGainConstants | None) -> dict[str, object]:
         "gain_range": (LEAST_GAIN, MOST_GAIN),
         "gain_free": FREE_SHARE,
     }
-
-
-def _gained(what: str, found: TiltGainConstants | None, angle: int, command: str) -> str:
-    """Return a command of roll or pitch by the function tilt_gain_sent or tilt_gain_meant of the C."""
-    return command if found is None else f"tilt_gain_{what}(&self->tilt_gain, {angle}, {command})"
 
 
 def _row(steps: float) -> NDArray[np.float64]:

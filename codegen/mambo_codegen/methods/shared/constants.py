@@ -90,22 +90,38 @@ class Constants(ABC):
         return self.settings.observer is not None and self.settings.observer.tilt_gain == "learnt"
 
     @property
-    def parts(self) -> frozenset[str]:
-        """The parts that the controller has, by the names in the rows of the port."""
-        limiting, tracker = self.limiting, self.tracker
-        parts = {
+    def presence(self) -> dict[str, bool]:
+        """Whether each part of a controller is there, by its name.
+
+        Rows of the port, chapters of nmpc.c, and their lines `#if WITH_NAME` ask for parts by these names.
+        """
+        limiting, tracker, settings = self.limiting, self.tracker, self.settings
+        is_fixed = settings.code.scalar == "fixed"
+        return {
+            "braking_trim": limiting is not None and limiting.tilted.trim_m_s2 != 0,
+            "confine": False,
+            "double": settings.code.scalar == "float64",
+            "doubts": tracker is not None and tracker.noise is not None,
             "feedback": self.feedback_steps is not None,
-            "fixed": self.settings.code.scalar == "fixed",
-            "given": self.settings.target.gives_acceleration,
+            "fixed": is_fixed,
+            "float": is_fixed,
+            "given": settings.target.gives_acceleration,
             "guard": self.guard is not None,
             "height": self.has_height,
             "limits": limiting is not None,
+            "limits_arithmetic": limiting is not None,
             "measured": tracker is not None and not tracker.is_given,
+            "set_limits": limiting is not None,
+            "thrust_vector": self.has_thrust_vector,
             "tilt_gain": self.learns_tilt_gain,
             "tracker": tracker is not None,
             "turning": limiting is not None and limiting.turn_m_s_rad is not None,
         }
-        return frozenset(name for name, is_there in parts.items() if is_there)
+
+    @property
+    def parts(self) -> frozenset[str]:
+        """The parts that are there."""
+        return frozenset(name for name, is_there in self.presence.items() if is_there)
 
     @property
     def sizes(self) -> dict[str, int]:

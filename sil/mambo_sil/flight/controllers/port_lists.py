@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from mambo_codegen.port.row import MACROS, WHOLE, PortRow
-from mambo_codegen.port.tables import TAKEN
+from mambo_codegen.port.row import WHOLE, PortRow
+from mambo_codegen.port.tables import MACROS, TAKEN
 from mambo_sil.flight.columns import COMMAND, STATE, TARGET
 
 _PLACES: Final = {"state": STATE, "target": TARGET, "command": COMMAND}
@@ -31,7 +31,7 @@ def port_lists() -> str:
 
 def _listed(name: str, row: PortRow, record: str) -> Iterator[str]:
     """Yield the lines of the list of one row, which is empty where the controller has not got it."""
-    conditions = [f"defined({MACROS[part]})" for part in row.when]
+    conditions = [f"defined({MACROS[part][0]})" for part in row.when]
     entries = " ".join(_entries(row, record))
     if conditions:
         yield f"#if {' && '.join(conditions)}"

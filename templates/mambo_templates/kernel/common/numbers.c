@@ -124,9 +124,19 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
     return clamped;
 #endif
 }
+#if WITH_CONFINE
+
+/* Clamp `value` at `low` and `high`. */
+NMPC_COMPARISON nmpc_real_t confine(nmpc_real_t value, nmpc_real_t low, nmpc_real_t high)
+{
+    const nmpc_real_t limited = (value > high) ? high : value;
+
+    return (limited < low) ? low : limited;
+}
+#endif
 #if WITH_HEIGHT
 
-/* The same in one copy. */
+/* clamp() in one copy. */
 NMPC_SHARED nmpc_real_t shared_clamp(nmpc_real_t value, nmpc_real_t limit)
 {
     return clamp(value, limit);

@@ -96,7 +96,7 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
 #else
         const nmpc_real_t pitch_rad = limits->tilt_rad;
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
         nmpc_real_t slope[2];
 
         vector_largest(roll_rad, pitch_rad, slope);

@@ -14,7 +14,7 @@ NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
 #if WITH_HEIGHT
     step->on_ground = 0;
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     step->by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST;
 #endif
     /* One by one: for an initialiser some compilers call memset. */

@@ -45,7 +45,7 @@ NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 #if WITH_TRACKER and WITH_HEIGHT
     height_clear_target(&self->height);
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     step->by_thrust = 0U;
 #endif
     if ((within(step->observer.velocity_m_step[0], NMPC_REST_M_STEP) != 0)

@@ -29,7 +29,7 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
 #if WITH_HEIGHT
     most_m_step2 = factor_product(most_m_step2, step->weight);
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     most_m_step2 = (step->left_m_step2 < most_m_step2) ? step->left_m_step2 : most_m_step2;
 #endif
     return most_m_step2;
@@ -43,10 +43,10 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
     int axis;
 
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     step->left_m_step2 = to_move(height_spare(&self->height));
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     step->by_thrust = 0U;
 #endif
     NMPC_UNROLL
@@ -83,7 +83,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
         const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
 
         attitude->command_m_step2[axis] = move_acceleration(move_m_step2);
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
         if ((most_m_step2 >= step->left_m_step2)
             && ((move_m_step2 >= step->left_m_step2) || (move_m_step2 <= -step->left_m_step2))) {
             step->by_thrust = NMPC_LIMIT_THRUST;
@@ -102,11 +102,11 @@ NMPC_INLINE void find_angles(const nmpc_t *self, nmpc_step_t *step)
     const nmpc_real_t right_m_step2 = self->attitude.command_m_step2[NMPC_RIGHT];
     const nmpc_real_t forward_m_step2 = self->attitude.command_m_step2[NMPC_FORWARD];
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     nmpc_real_t command_rad[2];
 #endif
 
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     vector_command(right_m_step2, forward_m_step2, command_rad);
     step->command_rad[0] = command_rad[0];
     step->command_rad[1] = command_rad[1];
@@ -145,6 +145,36 @@ NMPC_INLINE void limit_angles(nmpc_t *self, nmpc_step_t *step)
     step->command_rad[1] = limited_angle(self, step->command_rad[1]);
 }
 
+/* Tell the attitude model that `after_rad` is sent in place of `before_rad`. */
+static void replace_command(nmpc_t *self, const nmpc_real_t before_rad[2], const nmpc_real_t after_rad[2])
+{
+#if WITH_HEIGHT
+    const nmpc_real_t weight = height_weight(height_lift(&self->height, self->height.command_m_step2));
+#endif
+#if WITH_TILT_GAIN and WITH_THRUST_VECTOR
+    const nmpc_real_t meant_before_rad[2] = { tilt_gain_meant(&self->tilt_gain, 0, before_rad[0]),
+                                              tilt_gain_meant(&self->tilt_gain, 1, before_rad[1]) };
+    const nmpc_real_t meant_after_rad[2] = { tilt_gain_meant(&self->tilt_gain, 0, after_rad[0]),
+                                             tilt_gain_meant(&self->tilt_gain, 1, after_rad[1]) };
+#elif WITH_TILT_GAIN
+    const nmpc_real_t roll_change_rad = tilt_gain_meant(&self->tilt_gain, 0, after_rad[0] - before_rad[0]);
+    const nmpc_real_t pitch_change_rad = tilt_gain_meant(&self->tilt_gain, 1, after_rad[1] - before_rad[1]);
+#elif not WITH_THRUST_VECTOR
+    const nmpc_real_t roll_change_rad = after_rad[0] - before_rad[0];
+    const nmpc_real_t pitch_change_rad = after_rad[1] - before_rad[1];
+#endif
+
+#if WITH_TILT_GAIN and WITH_THRUST_VECTOR
+    attitude_change_command(&self->attitude, meant_before_rad, meant_after_rad, weight);
+#elif WITH_THRUST_VECTOR
+    attitude_change_command(&self->attitude, before_rad, after_rad, weight);
+#elif WITH_HEIGHT
+    attitude_change_command(&self->attitude, roll_change_rad, pitch_change_rad, weight);
+#else
+    attitude_change_command(&self->attitude, roll_change_rad, pitch_change_rad);
+#endif
+}
+
 #if WITH_GUARD
 /* Command the angles, but bound their change from the last commands, and tell the model what is commanded. */
 NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
@@ -162,29 +192,7 @@ NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
                      || (self->command_rad[angle] > asked_rad[angle]);
     }
     if (is_bounded != 0) {
-#if WITH_VECTOR and WITH_TILT_GAIN
-        const nmpc_real_t asked_of_model_rad[2] = { tilt_gain_meant(&self->tilt_gain, 0, asked_rad[0]),
-                                                    tilt_gain_meant(&self->tilt_gain, 1, asked_rad[1]) };
-        const nmpc_real_t command_of_model_rad[2] = { tilt_gain_meant(&self->tilt_gain, 0, self->command_rad[0]),
-                                                      tilt_gain_meant(&self->tilt_gain, 1, self->command_rad[1]) };
-
-        attitude_change_command(&self->attitude, asked_of_model_rad, command_of_model_rad, step->weight);
-#elif WITH_VECTOR
-        attitude_change_command(&self->attitude, asked_rad, self->command_rad, step->weight);
-#else
-        nmpc_real_t roll_change_rad = self->command_rad[0] - asked_rad[0];
-        nmpc_real_t pitch_change_rad = self->command_rad[1] - asked_rad[1];
-
-#if WITH_TILT_GAIN
-        roll_change_rad = tilt_gain_meant(&self->tilt_gain, 0, roll_change_rad);
-        pitch_change_rad = tilt_gain_meant(&self->tilt_gain, 1, pitch_change_rad);
-#endif
-#if WITH_HEIGHT
-        attitude_change_command(&self->attitude, roll_change_rad, pitch_change_rad, step->weight);
-#else
-        attitude_change_command(&self->attitude, roll_change_rad, pitch_change_rad);
-#endif
-#endif
+        replace_command(self, asked_rad, self->command_rad);
     }
 }
 
@@ -215,7 +223,7 @@ NMPC_INLINE void report_limits(nmpc_t *self, nmpc_step_t *step)
     unsigned int active = (unsigned int)self->limited % NMPC_LIMIT_HEIGHT;
 
     active = active + ((step->limit_active != 0) ? NMPC_LIMIT_HEIGHT : 0U);
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     active = active + step->by_thrust;
 #endif
     self->limited = (unsigned char)active;

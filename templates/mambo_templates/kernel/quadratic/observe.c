@@ -9,7 +9,7 @@
 /* Measure the vertical share of the thrust; without a good state it is that of the last command. */
 NMPC_INLINE void measure_direction(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     nmpc_real_t slope[2];
 
     self->height.share = (step->state != NULL)
@@ -55,7 +55,7 @@ NMPC_INLINE void measure_height(nmpc_t *self, nmpc_step_t *step)
 NMPC_INLINE void measure_tilt(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
         const nmpc_real_t slope[2] = { step->slope[0], step->slope[1] };
         nmpc_real_t tilt_m_step2[2];
 
@@ -114,9 +114,9 @@ NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
             observer_start(&step->observer, step->state);
         } else {
 #if WITH_GUARD
-            observer_correct(&step->observer, step->state, self->is_coarse, step->world_m_step2);
+            observer_correct(&step->observer, step->state, (self->is_coarse != 0U) ? 1 : 0, step->world_m_step2);
 #else
-            observer_correct(&step->observer, step->state, step->world_m_step2);
+            observer_correct(&step->observer, step->state, 0, step->world_m_step2);
 #endif
         }
     }

@@ -36,12 +36,12 @@ typedef struct {
     /* 1 if a limit of the height acts, else 0. */
     int limit_active;
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     /* The slopes of the thrust, right and forward; the largest move that it leaves. */
     nmpc_real_t slope[2];
     nmpc_real_t left_m_step2;
 #endif
-#if WITH_VECTOR
+#if WITH_THRUST_VECTOR
     /* NMPC_LIMIT_THRUST if that limits a move, else 0. */
     unsigned int by_thrust;
 #endif

@@ -2,7 +2,7 @@
  *
  * Budgets that bound how much the commands vary (not in the paper). Where target or estimate are noisy the commands
  * rattle, and a mixer that serves attitude first then takes the thrust. Let u* be the command that the cost asks for, of
- * roll, of pitch{{ " or of the thrust" if height }}, and b its budget. In every control step with a new command
+ * roll, of pitch or of the thrust, and b its budget. In every control step with a new command
  *
  *     b = min(b + rho, full),   u(k) = u(k-1) + clamp(u* - u(k-1), b),   b = b - |u(k) - u(k-1)|.
  *
@@ -11,12 +11,7 @@
  * that is held, that levels after an outage, or that the caller sets, takes nothing from a budget.
  */
 
-#define NMPC_TILT_BUDGET_RAD {{ guard.tilt_rad | real("angle") }} /* full, and rho, of roll and of pitch */
-#define NMPC_TILT_GROWTH_RAD {{ guard.tilt_growth_rad | real("angle") }}
-{% if height %}
-#define NMPC_THRUST_BUDGET_M_S2 {{ guard.thrust_m_s2 | real("thrust") }} /* of the thrust over mass */
-#define NMPC_THRUST_GROWTH_M_S2 {{ guard.thrust_growth_m_s2 | real("thrust") }}
-{% endif %}
+#include "guard.h"
 
 /* Return the command nearest to `wanted` that a budget allows, and take its distance from `before` from the budget. */
 NMPC_SHARED nmpc_real_t guard_spend(nmpc_real_t *budget, nmpc_real_t full, nmpc_real_t growth, nmpc_real_t before,

@@ -1,0 +1,413 @@
+/* ---- Height ---------------------------------------------------------------------------------------------------------
+ *
+ * The third axis, whose command is the thrust (not in the paper). Up is positive. With the measured roll and pitch, let
+ *
+ *     t = (g + u) / (kg c),   c = cos roll cos pitch, but at least a bound,
+ *
+ * be the thrust over mass, so that u is the vertical acceleration that it stands for. kg is a factor of the thrust that
+ * the observer learns, or 1: weight, battery and propellers change it. Its vertical share su = c t is delayed by rotors
+ * and dead time:
+ *
+ *     lag sa' = sc - sa,   delay sc' = su - sc,
+ *
+ * and a = kg sa - g is the acceleration that the thrust gives. The rows below are the exact solution: weighted means.
+ *
+ * Model, observer, tracker and cost are those of the other axes, without the integral part. The observer knows a from
+ * the model alone: a measured acceleration would contain what it is to learn, kg or a disturbance d.
+ *
+ * The limits of u are those of t, and not symmetric:
+ *
+ *     lo = kg c t_min - g,   hi = kg c t_max - g.
+ *
+ * Speed and fence: the law flies at the climb v_T + k (p_T - p). The error p - p_T is limited such that it is at most
+ * the largest climb and the largest descent, and k times the distance to floor and ceiling; outside, it leads back in.
+ * No square root is needed: at these speeds the thrust can always brake at the rate k.
+ *
+ * Floor: while the drone touches it, the floor can only push up. So where a + d is not more than 0 the drone lies on
+ * it, at rest, and nothing is learnt; else only what makes the drone heavier is. A target on the floor then gets the
+ * least thrust.
+ *
+ * Without a good target, and after an outage, the target is the estimated height itself, at rest: the drone brakes and
+ * hovers. While the state is missing, the last command stands for roll and pitch.
+ *
+ * Coupling: the tilt of a climbing drone counts for more. Measured tilts count (g + a)/g times as much, commands for an
+ * acceleration are divided by f = (g + u)/g, and the largest acceleration of the tilt limit is multiplied by f; both
+ * factors are limited.
+ */
+
+#if WITH_TWO_MOVES
+/* The minimum is U1 = between(U1 - H12/H11 (between(U2, lo, hi) - U2), lo, hi): that is exact in any box, by the
+ * argument of the chapter optimizer for each end of it. */
+
+#endif
+#if WITH_THRUST_VECTOR
+/* Right and forward get what the thrust leaves beside the height. With r a share of kg t_max and z = g + u each is at
+ * most a share of sqrt(r^2 - z^2), for which chords of the quarter circle stand, 2 % of r inside at most, and at least
+ * NMPC_LEAST_SPARE_M_STEP2. */
+
+#endif
+/* 1/x takes products alone: y = A - B x, then Newton's y (2 - x y), whose error is the square of that before. In fixed
+ * point y is limited, which changes nothing: it tells a proof by intervals how large it is. */
+#include "height.h"
+
+/* (g + acceleration)/g, by which a tilt counts for more than in hover. */
+NMPC_SHARED nmpc_real_t height_weight(nmpc_real_t acceleration_m_step2)
+{
+    const nmpc_real_t limited_m_step2 =
+        confine(acceleration_m_step2, NMPC_LEAST_WEIGHT_M_STEP2, NMPC_MOST_WEIGHT_M_STEP2);
+
+    return NMPC_ONE_FACTOR + gravity_product(NMPC_PER_GRAVITY, limited_m_step2);
+}
+
+#if WITH_THRUST_VECTOR
+/* c at the attitude of a command. */
+NMPC_INLINE nmpc_real_t height_tilt(nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    nmpc_real_t slope[2];
+
+    return vector_point_command(roll_rad, pitch_rad, slope);
+}
+#else
+/* cos x, less than NMPC_LEAST_COSINE for steep angles. */
+NMPC_INLINE nmpc_real_t height_cosine(nmpc_real_t angle_rad)
+{
+    const nmpc_real_t square = angle_square(angle_rad);
+    const nmpc_real_t cosine =
+        NMPC_ONE - sine_product(square, NMPC_COSINE_SECOND - sine_product(square, NMPC_COSINE_FOURTH));
+
+#if WITH_FIXED
+    /* The clamp changes nothing: it tells a proof by intervals how large the cosine is. */
+    return clamp(cosine, NMPC_ONE);
+#else
+    return cosine;
+#endif
+}
+
+/* c */
+NMPC_SHARED nmpc_real_t height_tilt(nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    const nmpc_real_t cosine = sine_product(height_cosine(roll_rad), height_cosine(pitch_rad));
+
+    return to_factor((cosine < NMPC_LEAST_COSINE) ? NMPC_LEAST_COSINE : cosine);
+}
+#endif
+
+/* Let the model of the thrust answer the last command over one control step. */
+NMPC_INLINE void height_advance(nmpc_height_t *height)
+{
+    const nmpc_real_t thrust = height->thrust_m_step2;
+    const nmpc_real_t lagged = height->lagged_m_step2;
+    const nmpc_real_t command = height->command_m_step2;
+
+    height->thrust_m_step2 = attitude_sum((wide_product(thrust_row[0], thrust) + wide_product(thrust_row[1], lagged))
+                                          + wide_product(thrust_row[2], command));
+    height->lagged_m_step2 =
+        attitude_sum(wide_product(thrust_lagged_row[0], lagged) + wide_product(thrust_lagged_row[1], command));
+}
+
+/* The vertical share of a thrust, s. */
+NMPC_SHARED nmpc_real_t height_vertical(nmpc_real_t share, nmpc_real_t thrust_m_s2)
+{
+    return factor_product(step2_product(NMPC_STEP2_S2, thrust_m_s2), share);
+}
+
+/* The acceleration that such a share gives. */
+NMPC_INLINE nmpc_real_t height_lift(const nmpc_height_t *height, nmpc_real_t vertical_m_step2)
+{
+#if WITH_THRUST_GAIN
+    return factor_product(vertical_m_step2, height->gain) - NMPC_GRAVITY_M_STEP2;
+#else
+    (void)height;
+    return vertical_m_step2 - NMPC_GRAVITY_M_STEP2;
+#endif
+}
+
+/* The acceleration of the height: a + d. */
+NMPC_INLINE nmpc_real_t height_acceleration(const nmpc_height_t *height)
+{
+#if WITH_LIFT
+    return height_lift(height, height->thrust_m_step2) + height->disturbance_m_step2;
+#else
+    return height_lift(height, height->thrust_m_step2);
+#endif
+}
+
+/* Correct the estimates by a measured state, whose climb is `climb_m_step`; `acceleration_m_step2` is a + d. */
+NMPC_INLINE void height_correct(nmpc_height_t *height, const nmpc_state_t *state, nmpc_real_t climb_m_step,
+                                nmpc_real_t acceleration_m_step2, int on_ground)
+{
+    nmpc_real_t n[2];
+#if WITH_THRUST_GAIN or WITH_LIFT
+    nmpc_real_t change;
+#endif
+
+    axis_innovate(height->height_m, height->velocity_m_step, acceleration_m_step2, state->height_m, climb_m_step, n);
+    axis_correct(&height->height_m, &height->velocity_m_step, height_gains, n);
+#if WITH_THRUST_GAIN
+    change = gain_correction(height_gains[2][0], n[0], height_gains[2][1], n[1]);
+#elif WITH_LIFT
+    change = disturbance_correction(height_gains[2][0], n[0], height_gains[2][1], n[1]);
+#endif
+#if WITH_THRUST_GAIN or WITH_LIFT
+    if ((state->grounded != 0) && ((on_ground != 0) || (change > (nmpc_real_t)0))) {
+        change = (nmpc_real_t)0;
+    }
+#else
+    (void)on_ground;
+#endif
+#if WITH_THRUST_GAIN
+    height->gain = confine(height->gain + change, NMPC_GAIN_MIN, NMPC_GAIN_MAX);
+#elif WITH_LIFT
+    height->disturbance_m_step2 = clamp(height->disturbance_m_step2 + change, NMPC_LIFT_LIMIT_M_STEP2);
+#endif
+}
+
+/* Take a measured state into the estimates. The first one also says at which tilt the last command was flown. Returns 1
+ * if the drone lies on the floor. */
+NMPC_INLINE int height_measure(nmpc_height_t *height, const nmpc_state_t *state, int is_first)
+{
+    const nmpc_real_t climb_m_step = speed_product(NMPC_UPDATE_STEP_S, state->climb_m_s);
+    const nmpc_real_t acceleration_m_step2 = height_acceleration(height);
+    const int on_ground = (state->grounded != 0) && (acceleration_m_step2 <= (nmpc_real_t)0);
+
+    if (is_first != 0) {
+        height->height_m = state->height_m;
+        height->velocity_m_step = climb_m_step;
+        height->command_m_step2 = height_vertical(height->share, height->thrust_m_s2);
+        height->thrust_m_step2 = height->command_m_step2;
+        height->lagged_m_step2 = height->command_m_step2;
+    } else {
+        height_correct(height, state, climb_m_step, acceleration_m_step2, on_ground);
+    }
+    if (on_ground != 0) {
+        height->height_m = state->height_m;
+        height->velocity_m_step = (nmpc_real_t)0;
+    }
+    return on_ground;
+}
+
+#if WITH_TRACKER
+/* Take an acceleration of the target into the estimate of its motion. */
+NMPC_INLINE void height_track_acceleration(nmpc_height_t *height, nmpc_real_t measured_m_step2)
+{
+#if WITH_DOUBTS
+    tracker_believe(&height->target_acceleration_m_step2, &height->target_jerk_m_step2_update, &height->target_noise,
+                    measured_m_step2, NMPC_CLIMB_BOUND_M_STEP2, NMPC_CLIMB_JERK_LIMIT_M_STEP2_UPDATE);
+#else
+    const nmpc_real_t predicted_m_step2 = height->target_acceleration_m_step2 + height->target_jerk_m_step2_update;
+    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
+
+    height->target_acceleration_m_step2 =
+        tracker_product(NMPC_TRACKER_REST, predicted_m_step2) + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
+    height->target_jerk_m_step2_update =
+        shared_clamp(height->target_jerk_m_step2_update + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
+                     NMPC_CLIMB_JERK_LIMIT_M_STEP2_UPDATE);
+#endif
+}
+
+/* Take the target of this control step into the estimate of its motion. */
+NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target, int is_known)
+{
+#if WITH_GIVEN
+    const nmpc_real_t given_m_s2 = clamp(target->climb_acceleration_m_s2, NMPC_CLIMB_ACCELERATION_LIMIT_M_S2);
+    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_S2, given_m_s2);
+
+    if (is_known != 0) {
+        height_track_acceleration(height, measured_m_step2);
+    } else {
+        height->target_acceleration_m_step2 = measured_m_step2;
+        height->target_jerk_m_step2_update = (nmpc_real_t)0;
+    }
+#else
+    const nmpc_real_t change_m_s = target->climb_m_s - height->target_velocity_m_s;
+#if WITH_FIXED
+    /* The clamp changes nothing where it counts: it tells a proof by intervals how large the change is. */
+    const nmpc_real_t steady_m_s = clamp(change_m_s, NMPC_CLIMB_CHANGE_LIMIT_M_S);
+    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, steady_m_s);
+#else
+    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, change_m_s);
+#endif
+
+    if ((is_known != 0) && (within(change_m_s, NMPC_CLIMB_CHANGE_LIMIT_M_S) != 0)) {
+        height_track_acceleration(height, measured_m_step2);
+    } else {
+        height->target_jerk_m_step2_update = (nmpc_real_t)0;
+    }
+    height->target_velocity_m_s = target->climb_m_s;
+#endif
+}
+
+/* Forget the target. */
+NMPC_INLINE void height_clear_target(nmpc_height_t *height)
+{
+#if not WITH_GIVEN
+    height->target_velocity_m_s = (nmpc_real_t)0;
+#endif
+    height->target_acceleration_m_step2 = (nmpc_real_t)0;
+    height->target_jerk_m_step2_update = (nmpc_real_t)0;
+#if WITH_DOUBTS
+    height->target_noise.deviation = (nmpc_real_t)0;
+    height->target_noise.reversal = (nmpc_real_t)0;
+    height->target_noise.doubt = (nmpc_real_t)0;
+#endif
+}
+
+#endif
+/* Return u that minimises the cost from `state`, of the members that the rows name, in m, m/step and m/step^2, between
+ * the limits. */
+NMPC_INLINE nmpc_real_t height_minimize(const nmpc_real_t state[NMPC_HEIGHT_STATES], nmpc_real_t least_m_step2,
+                                        nmpc_real_t most_m_step2)
+{
+    const nmpc_real_t low_m_step2 = to_move(least_m_step2);
+    const nmpc_real_t high_m_step2 = to_move(most_m_step2);
+    nmpc_real_t move_m_step2 = axis_row(height_rows[0], state, NMPC_HEIGHT_STATES);
+#if WITH_TWO_MOVES
+    const nmpc_real_t second_m_step2 = axis_row(height_rows[1], state, NMPC_HEIGHT_STATES);
+    const nmpc_real_t change_m_step2 = confine(second_m_step2, low_m_step2, high_m_step2) - second_m_step2;
+
+    move_m_step2 = move_m_step2 - ratio_product(NMPC_HEIGHT_RATIO, change_m_step2);
+#endif
+
+    return move_acceleration(confine(move_m_step2, low_m_step2, high_m_step2));
+}
+
+/* Set the state of the cost, for `target` at the height `goal_m`; without one the drone rests. Returns 1 if speed or
+ * fence changed what is aimed at. */
+NMPC_INLINE int height_errors(nmpc_t *self, const nmpc_target_t *target, nmpc_real_t goal_m,
+                              nmpc_real_t state[NMPC_HEIGHT_STATES])
+{
+    nmpc_height_t *const height = &self->height;
+    const nmpc_bounds_t *const bounds = &self->bounds;
+    const nmpc_real_t error_m = height->height_m - goal_m;
+    const nmpc_real_t up_m = confine(bounds->ceiling_m - height->height_m, -bounds->down_m, bounds->up_m);
+    const nmpc_real_t down_m = confine(height->height_m - bounds->floor_m, -bounds->up_m, bounds->down_m);
+    nmpc_real_t climb_m_step = (nmpc_real_t)0;
+    nmpc_real_t lead_m;
+
+#if WITH_LIFT
+    state[2] = height->disturbance_m_step2;
+#else
+    state[2] = (nmpc_real_t)0;
+#endif
+    state[3] = (nmpc_real_t)0;
+    if (target != NULL) {
+        climb_m_step = speed_product(NMPC_UPDATE_STEP_S, target->climb_m_s);
+#if WITH_TRACKER
+        height_track(height, target, (int)self->has_target);
+        state[2] = state[2] - height->target_acceleration_m_step2;
+        state[3] = height->target_jerk_m_step2_update;
+#endif
+    }
+    lead_m = reach_product(NMPC_REACH_STEPS, climb_m_step);
+    state[0] = confine(error_m, lead_m - up_m, lead_m + down_m);
+    state[1] = height->velocity_m_step - climb_m_step;
+    state[4] = height_lift(height, height->thrust_m_step2);
+    state[5] = height_lift(height, height->lagged_m_step2);
+    state[6] = height_lift(height, height->command_m_step2);
+    return (state[0] < error_m) || (state[0] > error_m);
+}
+
+/* Set the next thrust for `target`, or, if it is null, for rest at the estimated height. A null `state` stands for one
+ * that is not good. Returns 1 if speed or fence changed what was aimed at. */
+NMPC_INLINE int height_aim(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
+{
+    nmpc_height_t *const height = &self->height;
+    const nmpc_real_t goal_m = (target != NULL) ? target->height_m : height->height_m;
+    nmpc_real_t errors[NMPC_HEIGHT_STATES];
+    const int is_limited = height_errors(self, target, goal_m, errors);
+#if WITH_THRUST_GAIN
+    const nmpc_real_t share = factor_product(height->share, height->gain);
+#else
+    const nmpc_real_t share = height->share;
+#endif
+    const nmpc_real_t least_m_step2 = factor_product(NMPC_THRUST_MIN_M_STEP2, share) - NMPC_GRAVITY_M_STEP2;
+    const nmpc_real_t most_m_step2 = factor_product(NMPC_THRUST_MAX_M_STEP2, share) - NMPC_GRAVITY_M_STEP2;
+    nmpc_real_t command_m_step2 = height_minimize(errors, least_m_step2, most_m_step2);
+    nmpc_real_t thrust_m_step2;
+
+    if ((state != NULL) && (state->grounded != 0) && ((goal_m - state->height_m) <= NMPC_FLOOR_MARGIN_M)) {
+        command_m_step2 = least_m_step2;
+    }
+    thrust_m_step2 = factor_product(NMPC_GRAVITY_M_STEP2 + command_m_step2, thrust_inverse(share));
+    height->thrust_m_s2 =
+        confine(thrust_product(NMPC_THRUST_PER_STEP2_S2, thrust_m_step2), NMPC_THRUST_MIN_M_S2, NMPC_THRUST_MAX_M_S2);
+#if WITH_GUARD
+    height->thrust_m_s2 = confine(guard_spend(&height->budget_m_s2, NMPC_THRUST_BUDGET_M_S2, NMPC_THRUST_GROWTH_M_S2,
+                                              height->commanded_m_s2, height->thrust_m_s2),
+                                  NMPC_THRUST_MIN_M_S2, NMPC_THRUST_MAX_M_S2);
+    height->commanded_m_s2 = height->thrust_m_s2;
+#endif
+    height->command_m_step2 = height_vertical(height->share, height->thrust_m_s2);
+    return is_limited;
+}
+
+#if WITH_THRUST_VECTOR
+/* The horizontal acceleration that the thrust leaves to each of right and forward, beside the command of the height. */
+NMPC_INLINE nmpc_real_t height_spare(const nmpc_height_t *height)
+{
+#if WITH_THRUST_GAIN
+    const nmpc_real_t most_m_step2 = factor_product(NMPC_SPARE_THRUST_M_STEP2, height->gain);
+#else
+    const nmpc_real_t most_m_step2 = NMPC_SPARE_THRUST_M_STEP2;
+#endif
+    const nmpc_real_t vertical_m_step2 = height_lift(height, height->command_m_step2) + NMPC_GRAVITY_M_STEP2;
+    nmpc_real_t spare_m_step2 =
+        factor_product(most_m_step2, spare_chords[0][0]) - factor_product(vertical_m_step2, spare_chords[0][1]);
+    int k;
+
+    NMPC_UNROLL
+    for (k = 1; k < NMPC_SPARE_CHORDS; k++) {
+        const nmpc_real_t chord_m_step2 =
+            factor_product(most_m_step2, spare_chords[k][0]) - factor_product(vertical_m_step2, spare_chords[k][1]);
+
+        spare_m_step2 = (chord_m_step2 < spare_m_step2) ? chord_m_step2 : spare_m_step2;
+    }
+    return (spare_m_step2 < NMPC_LEAST_SPARE_M_STEP2) ? NMPC_LEAST_SPARE_M_STEP2 : spare_m_step2;
+}
+
+#endif
+/* Predict the estimates at the next control step; a drone that lies on the floor stays there. */
+NMPC_INLINE void height_predict(nmpc_height_t *height, int on_ground)
+{
+    axis_predict(&height->height_m, &height->velocity_m_step,
+                 (on_ground != 0) ? (nmpc_real_t)0 : height_acceleration(height));
+}
+
+/* The thrust was `thrust_m_s2` in place of the last command. */
+static void height_set_thrust(nmpc_height_t *height, nmpc_real_t thrust_m_s2)
+{
+    height->thrust_m_s2 = confine(thrust_m_s2, NMPC_THRUST_MIN_M_S2, NMPC_THRUST_MAX_M_S2);
+    height->command_m_step2 = height_vertical(height->share, height->thrust_m_s2);
+}
+
+/* The frame has jumped, and the measured height and climb with it. */
+static void height_shift(nmpc_height_t *height, nmpc_real_t change_m, nmpc_real_t change_m_s)
+{
+    axis_shift(&height->height_m, &height->velocity_m_step, change_m, speed_product(NMPC_UPDATE_STEP_S, change_m_s));
+#if WITH_TRACKER and not WITH_GIVEN
+    height->target_velocity_m_s = clamp(height->target_velocity_m_s + change_m_s, NMPC_VELOCITY_RANGE_M_S);
+#endif
+}
+
+/* Forget everything; the drone holds a thrust with the attitude of a command. */
+static void height_reset(nmpc_height_t *height, nmpc_real_t thrust_m_s2, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    height->height_m = (nmpc_real_t)0;
+    height->velocity_m_step = (nmpc_real_t)0;
+#if WITH_THRUST_GAIN
+    height->gain = NMPC_ONE_FACTOR;
+#elif WITH_LIFT
+    height->disturbance_m_step2 = (nmpc_real_t)0;
+#endif
+    height->share = height_tilt(roll_rad, pitch_rad);
+    height_set_thrust(height, thrust_m_s2);
+    height->thrust_m_step2 = height->command_m_step2;
+    height->lagged_m_step2 = height->command_m_step2;
+#if WITH_GUARD
+    height->commanded_m_s2 = height->thrust_m_s2;
+    height->budget_m_s2 = NMPC_THRUST_BUDGET_M_S2;
+#endif
+#if WITH_TRACKER
+    height_clear_target(height);
+#endif
+}
