@@ -23,6 +23,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight import columns
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import adapted
@@ -36,7 +37,7 @@ from mambo_sil.flight.height_profiles import (
     TakeOffAndLanding,
     UpAndDown,
 )
-from mambo_sil.flight.loop import HEIGHT, Flight, Outcome, PositionController
+from mambo_sil.flight.loop import Flight, Outcome, PositionController
 from mambo_sil.flight.metrics import height_error_m, horizontal_error_m
 from mambo_sil.flight.names import AltitudeName
 from mambo_sil.flight.scenario import choose_sensors
@@ -47,7 +48,6 @@ from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
 
 HEADINGS: Final = 8
-SEEN_HEIGHT, GROUNDED = 7, 9
 """Columns of the states of controllers of the height."""
 RANDOM: Final = 60
 CAMPAIGN: Final = 1000
@@ -92,11 +92,14 @@ class AppTakeOff:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
         """Step with contact with the floor, and targets, as the app gives them."""
-        self._is_up |= state[:, SEEN_HEIGHT] > APP_GROUND_M
-        height_m, climb_m_s, _ = target[:, HEIGHT].T
+        self._is_up |= state[:, columns.STATE["height_m"]][:, 0] > APP_GROUND_M
+        height_m, climb_m_s = (target[:, columns.TARGET[name]][:, 0] for name in ("height_m", "climb_m_s"))
         given_m = np.where(self._is_up | (climb_m_s <= 0.0), height_m, np.maximum(height_m, APP_LIFT_M))
         state, target = state.copy(), target.copy()
-        state[:, GROUNDED], target[:, HEIGHT.start] = ~self._is_up, given_m
+        state[:, columns.STATE["grounded"].start], target[:, columns.TARGET["height_m"].start] = (
+            ~self._is_up,
+            given_m,
+        )
         outcome: Outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
         return outcome
 
