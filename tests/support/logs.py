@@ -66,6 +66,8 @@ class Flown:
     slow_rad: float = 0.007
     """Noise of the measured tilt with a correlation time of 0.3 s."""
     gusts_m_s2: float = 0.08
+    push_m_s2: tuple[float, float] = (0.0, 0.0)
+    """Steady push of a wind, north and east."""
     estimate_noise: float = 1.0
     """Factor on the noise of estimated position and velocity."""
 
@@ -96,6 +98,7 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
     table[:, 4] = yaw[:, np.newaxis]
     command, push = np.empty((2, n)), np.empty((2, n))
     pull_m_s2 = truth.acceleration_per_tilt * G
+    wind = np.array(flown.push_m_s2)[:, np.newaxis]
     for row, (sine, cosine) in enumerate(zip(sines.tolist(), cosines.tolist(), strict=True)):
         target, speed, pull = eight[row]
         seen_p, seen_v = position + seen_errors[row, :2], velocity + seen_errors[row, 2:]
@@ -111,7 +114,7 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
             gust = gust + gusts[row, 2 * tick : 2 * tick + 2] - 0.5 * TICK_S * gust
             right, back = pull_m_s2 * (tilt - trim)
             push[0], push[1] = -cosine * back - sine * right, cosine * right - sine * back
-            velocity = velocity + TICK_S * (push - truth.drag_1_s * velocity + gust)
+            velocity = velocity + TICK_S * (push - truth.drag_1_s * velocity + gust + wind)
             position = position + TICK_S * velocity
     return [
         {"time_s": times_s} | {name: table[:, place, flight] for place, name in enumerate(NAMES)}

@@ -11,7 +11,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.experiment.margins.corners import at_ends, corners
 from mambo_sil.model.identify.identify import identify
-from mambo_sil.model.identify.identify_record import IdentifySummary
+from mambo_sil.model.identify.identify_record import IdentifySummary, motion_rows
 from mambo_sil.model.identify.identify_report import model_text, vehicle_text
 from mambo_sil.model.identify.motion import Motion, fit_motion
 from mambo_sil.model.identify.response import AxisParameters, Interval, filter_command
@@ -237,12 +237,34 @@ def test_several_logs_are_pooled() -> None:
 
 def test_the_model_section_has_what_was_found() -> None:
     """Four digits of each, without a key for the integrator that was not worth it."""
-    summary = found(fly(TRUTH, Flown(), 1)[0])
+    summary = found(fly(TRUTH, Flown(yaw_rate_rad_s=0.3), 1)[0])
     roll = fits(summary)[0]
     assert summary.model["roll_gain"] == float(f"{roll.gain.value:.4g}")
     assert summary.model["roll_delay_s"] == float(f"{roll.delay_s.value:.4g}")
     assert "roll_integral_1_s" not in summary.model
     assert {"pitch_lag_s", "pitch_trim_rad", "acceleration_per_tilt", "drag_1_s"} < summary.model.keys()
+
+
+@pytest.mark.parametrize("turn_rad_s", [0.12, -0.12])
+def test_a_trim_is_told_from_the_wind_where_the_heading_turns(turn_rad_s: float) -> None:
+    """A wind as strong as a tilt of 3 degrees moves the trims by less than half a degree."""
+    flown = Flown(yaw_rate_rad_s=turn_rad_s, push_m_s2=(0.5, -0.3))
+    summary = found(fly(TRUTH, flown, 1)[0])
+    assert summary.motion is not None
+    for trim, truth in zip(summary.motion.trim_rad, TRUTH.trim_rad, strict=True):
+        assert abs(trim.value - truth) < min(trim.within, 0.008)
+    assert "roll_trim_rad = " in vehicle_text(summary, 1.0)
+
+
+@pytest.mark.parametrize("turn_rad_s", [0.0, 0.05])
+def test_a_trim_is_not_known_where_the_heading_hardly_turns(turn_rad_s: float) -> None:
+    """No file has one, and the table says why: the controller learns it, or the wind, in flight."""
+    summary = found(fly(TRUTH, Flown(yaw_rate_rad_s=turn_rad_s, push_m_s2=(0.5, -0.3)), 1)[0])
+    vehicle, rows = vehicle_text(summary, 1.0), dict(motion_rows(summary))
+    assert "trim_rad = " not in vehicle + model_text(summary)
+    assert "trim_rad are not known" in vehicle
+    assert rows["trim of roll, pitch"] == "not known: turn the heading, both ways"
+    assert vehicle_toml.parse(vehicle, "drone", "drone").attitude is not None
 
 
 @pytest.mark.long

@@ -207,11 +207,11 @@ def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
     motion = summary.motion
     if motion is None:
         return []
-    trim = ", ".join(_plus_minus(each, 1.0 / DEGREE, 2) for each in motion.trim_rad)
+    trim = ", ".join(_plus_minus(each, 1.0 / DEGREE, 2) for each in motion.trim_rad) + " degrees"
     return [
         ("acceleration per tilt", f"{_plus_minus(motion.acceleration_per_tilt, 1.0, 3)} g per radian"),
         ("drag", f"{_plus_minus(motion.drag_1_s, 1.0, 3)} 1/s"),
-        ("trim of roll, pitch", f"{trim} degrees"),
+        ("trim of roll, pitch", trim if motion.trim_is_known else "not known: turn the heading, both ways"),
         ("lag of the velocity", f"{_plus_minus(motion.velocity_lag_s, 1e3, 0)} ms"),
         ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
     ]

@@ -9,6 +9,9 @@ from mambo_sil.results.number_format import three_digits
 UNKNOWN_MASS: Final = (
     "# mass_kg =  # with battery: no log shows it; write it here, or identify with --mass-kg"
 )
+UNKNOWN_TRIM: Final = (
+    "# roll_trim_rad, pitch_trim_rad are not known: the heading did not turn enough to tell them from wind"
+)
 
 
 def model_text(summary: IdentifySummary) -> str:
@@ -40,9 +43,12 @@ def vehicle_text(summary: IdentifySummary, mass_kg: float | None) -> str:
         share = _round(motion.acceleration_per_tilt.value)
         drag = _round(max(motion.drag_1_s.value, 0.0))
         within = {"drag_1_s": motion.drag_1_s, "acceleration_per_tilt_g": motion.acceleration_per_tilt}
-        for name, trim in zip(summary.axes, motion.trim_rad, strict=True):
-            trims.append(f"{name}_trim_rad = {_round(trim.value)}")
-            within[f"{name}_trim_rad"] = trim
+        if motion.trim_is_known:
+            known = dict(zip((f"{name}_trim_rad" for name in summary.axes), motion.trim_rad, strict=True))
+            trims = [f"{key} = {_round(trim.value)}" for key, trim in known.items()]
+            within |= known
+        else:
+            trims = [UNKNOWN_TRIM]
     responses = []
     for name, axis in summary.axes.items():
         if (fit := axis.first_order) is None:

@@ -8,9 +8,12 @@ T tilt is the horizontal part of the thrust over mass T; where T is not logged, 
 g. F is a first-order lag and a delay, which may be negative: together they have the delay and the spread of
 any low-pass, also of a central difference. Without F, and with its delay alone, the drag would be too small.
 
+Where the heading turned, a constant push in x and y stands beside them: a steady wind, which a trim that turns
+with the drone can be told from.
+
 Both sides are integrated over half a second and then averaged over another, which removes most of the noise
-of velocities that are differentiated positions: it has hardly any low frequencies. Share, drag and trim are
-solved linearly inside the search for lag and delay of F.
+of velocities that are differentiated positions: it has hardly any low frequencies. Share, drag, trim and push
+are solved linearly inside the search for lag and delay of F.
 """
 
 import math
@@ -38,9 +41,14 @@ SPAN_S: Final = 0.5
 EDGE_S: Final = 0.5
 """Beginning and end of a stretch that the fit leaves out: the filter does not know what is beyond."""
 TURNED_RAD: Final = math.radians(20.0)
-"""Range of the heading below which neither its sense nor a steady wind shows."""
+"""Range of the heading below which its sense does not show."""
+STANDING: Final = 0.7
+"""Length of the mean unit vector of the heading, 1 of one that stands, beyond which wind looks like a trim.
+
+Of a heading that swings evenly by 90 degrees to both sides it is 0.64, of whole turns 0.
+"""
 DRAUGHT_M_S: Final = 0.5
-"""Steady wind that the interval of a trim allows for at a constant heading."""
+"""Steady wind that the interval of a trim allows for where the heading did not turn."""
 ATTITUDE_RAD: Final = 0.005
 """Constant error of the measured attitude that it always allows for."""
 _LEAST_POWER: Final = 1e-6
@@ -81,6 +89,8 @@ class Motion:
     drag_1_s: Interval
     trim_rad: tuple[Interval, Interval]
     """Measured tilt at which the drone does not accelerate."""
+    trim_is_known: bool
+    """Whether the heading turned enough to tell a trim from a steady wind."""
     velocity_lag_s: Interval
     """Lag and delay together of the logged velocity behind the measured tilt."""
     r2: float
@@ -113,7 +123,8 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     velocity follows the tilt, and the two hardly differ. Their intervals are widened by that. At a constant
     heading a steady wind looks like a trim, and an attitude that is measured wrong always does.
     """
-    moved = [(each, _rates(each, AS_LOGGED)) for each in _moved(segments)]
+    turned = has_turned(_moved(segments))
+    moved = [(each, _rates(each, AS_LOGGED, push=turned)) for each in _moved(segments)]
 
     def regression(late: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         lag_s = float(np.exp(late[1]))
@@ -137,12 +148,12 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     every = [np.column_stack([slope, *columns]) for (slope, _), *columns in zip(parts, *by_late, strict=True)]
     covariance = newey_west(every, errors, _CORRELATION)
     within = (NORMAL_95 * WIDENING * np.sqrt(np.maximum(np.diag(covariance), 0.0))).tolist()
-    share, drag, *trims = found.tolist()
+    share, drag, *trims = found[:4].tolist()
     error = np.concatenate(errors)
     left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
     biased = left * _inflation(slopes)
     surplus_rad = ATTITUDE_RAD
-    if heading_range_rad([each for each, _ in moved]) < TURNED_RAD:
+    if not turned:
         surplus_rad += abs(drag) * DRAUGHT_M_S / (abs(share) * GRAVITY_M_S2)
     return Motion(
         Interval(share, within[0] + biased * abs(share)),
@@ -151,14 +162,15 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
             Interval(trims[0] / share, abs(within[2] / share) + surplus_rad),
             Interval(trims[1] / share, abs(within[3] / share) + surplus_rad),
         ),
-        Interval(float(late[0]), within[4] + SURPLUS_S),
+        turned,
+        Interval(float(late[0]), within[slopes.shape[1]] + SURPLUS_S),
         1.0 - left,
         float(np.sqrt(np.mean(error**2))) / SPAN_S,
     )
 
 
 def _inflation(slopes: FloatArray) -> float:
-    """Return 1 / (1 - rho^2), rho the correlation of what tilt and drag do (k, 4) beside the trims."""
+    """Return 1 / (1 - rho^2), rho the correlation of what tilt and drag do beside the others (k, 4 or 6)."""
     tilt, drag = (
         slopes[:, :2] - slopes[:, 2:] @ np.linalg.lstsq(slopes[:, 2:], slopes[:, :2], rcond=None)[0]
     ).T
@@ -170,6 +182,12 @@ def heading_range_rad(segments: Sequence[Segment]) -> float:
     """Return the range of yaw over all stretches."""
     yaw = np.concatenate([segment.yaw_rad for segment in segments])
     return float(np.ptp(yaw))
+
+
+def has_turned(segments: Sequence[Segment]) -> bool:
+    """Return whether the heading turned enough in all stretches to tell a trim from a steady wind."""
+    yaw_rad = np.concatenate([segment.yaw_rad for segment in segments])
+    return bool(np.hypot(np.cos(yaw_rad).mean(), np.sin(yaw_rad).mean()) <= STANDING)
 
 
 def _moved(segments: Sequence[Segment]) -> list[Segment]:
@@ -186,8 +204,11 @@ def _stack(parts: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, 
     return slopes, changes
 
 
-def _rates(segment: Segment, hypothesis: Hypothesis) -> FloatArray:
-    """Return the acceleration (4, 2, m), x and y, by tilt, by drag of 1 1/s, and by trims of 1 rad."""
+def _rates(segment: Segment, hypothesis: Hypothesis, *, push: bool = False) -> FloatArray:
+    """Return the acceleration (4, 2, m), x and y, by tilt, by drag of 1 1/s, and by trims of 1 rad.
+
+    With a push (6, 2, m), also by a push of g in x and in y.
+    """
     roll, pitch = (
         np.interp(segment.time_s + hypothesis.late_s, segment.time_s, tilt) for tilt in segment.tilt_rad
     )
@@ -202,7 +223,8 @@ def _rates(segment: Segment, hypothesis: Hypothesis) -> FloatArray:
     right = thrust * np.stack([sines[0], -cosines[0], np.zeros_like(roll)])
     cosine, sine = np.cos(hypothesis.yaw * segment.yaw_rad), np.sin(hypothesis.yaw * segment.yaw_rad)
     pull, by_roll, by_pitch = np.stack([cosine * ahead - sine * right, sine * ahead + cosine * right], axis=1)
-    return np.stack([pull, -_velocity(segment), by_roll, by_pitch])
+    pushes = [GRAVITY_M_S2 * np.outer(axis, np.ones_like(roll)) for axis in np.eye(2)] if push else []
+    return np.stack([pull, -_velocity(segment), by_roll, by_pitch, *pushes])
 
 
 def _velocity(segment: Segment) -> FloatArray:
@@ -212,7 +234,7 @@ def _velocity(segment: Segment) -> FloatArray:
 
 
 def _increments(segment: Segment, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return slopes (2 m, 4) and changes of velocity (2 m,) of one stretch over `SPAN_S`: x, then y."""
+    """Return slopes (2 m, n) and changes of velocity (2 m,) of one stretch over `SPAN_S`: x, then y."""
     return _spans(np.concatenate([_integral(rates), _velocity(segment)[np.newaxis]]))
 
 
@@ -232,7 +254,7 @@ def _means(
 
 
 def _spans(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the changes over `SPAN_S` of what is integrated (4, 2, m), as slopes, and of the velocity."""
+    """Return the changes over `SPAN_S` of what is integrated (n, 2, m), as slopes, and of the velocity."""
     span = round(SPAN_S / PERIOD_S)
     *slopes, changes = (values[..., span:] - values[..., :-span])[..., ::_STRIDE].reshape(len(values), -1)
     return np.stack(slopes, axis=1), changes
