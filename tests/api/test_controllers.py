@@ -53,6 +53,25 @@ def stock(height: AltitudeName, n: int = 1) -> Controller:
     return Controller.from_preset("crazyflie", n, vehicle="crazyflie", height=height)
 
 
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_a_push_is_learnt_up_to_its_limit(scalar: str) -> None:
+    """In m/s^2, along x and y, of each of n; a 1-norm learns none."""
+    controller = Controller(with_option(presets.preset("mambo"), "code.scalar", scalar), 2)
+    limit_m_s2 = controller.settings.observer.disturbance_limit_m_s2
+    np.testing.assert_array_equal(controller.disturbance_m_s2, np.zeros((2, 2)))
+    period_s = controller.update_period_s
+    for number in range(300):
+        speed_m_s = 8.0 * period_s * number
+        north_m = np.array([0.5 * speed_m_s * period_s * number, 0.0])
+        position_m, velocity_m_s = np.zeros((2, 3)), np.zeros((2, 3))
+        position_m[:, 0], velocity_m_s[:, 0] = north_m, [speed_m_s, 0.0]
+        here = DroneState(position_m, velocity_m_s, np.zeros((2, 3)))
+        controller.step(here, TargetState(position_m, velocity_m_s))
+    np.testing.assert_allclose(controller.disturbance_m_s2, [[limit_m_s2, 0.0], [0.0, 0.0]], atol=0.01)
+    with pytest.raises(ArgumentError, match="disturbance_m_s2 needs cost"):
+        _ = Controller(ONE_NORM).disturbance_m_s2
+
+
 @pytest.mark.long
 def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     """By name or as a file."""

@@ -240,6 +240,21 @@ def test_ardupilot_is_flown_on_after_a_link_lost_for_a_second() -> None:
     assert max(flight.away_m) < 0.5
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("stack", BOTH)
+def test_more_wind_than_the_controller_learns_lands_the_drone(stack: str) -> None:
+    """After two seconds at its limit, with the words; a wind that it learns is flown, on target again."""
+    calm = Hovering(stack)
+    calm.fly(8.0, (0.0, lambda: calm.autopilot.blow((4.0, 0.0))))
+    assert max(calm.away_m[-100:]) < 0.1
+    stormy = Hovering(stack)
+    most_m_s2 = stormy.pilot.steering.most_disturbance_m_s2
+    why = rf"landed: pushed away: wind, .* with {most_m_s2:.1f} m/s\^2, all that the controller learns"
+    with pytest.raises(PilotError, match=why):
+        stormy.fly(8.0, (0.0, lambda: stormy.autopilot.blow((0.0, -1.5 * most_m_s2))))
+    assert not stormy.autopilot.armed
+
+
 def test_the_pilots_switch_takes_the_drone() -> None:
     """After the next heartbeat nothing is sent; the drone stays armed in its mode."""
     flight = Hovering("px4")

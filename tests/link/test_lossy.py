@@ -1,5 +1,6 @@
 """Every way in which a flight ends, over wires that lose, delay and reorder all: no drone stays armed."""
 
+import math
 import re
 from collections.abc import Callable
 from typing import Final
@@ -114,6 +115,15 @@ def target_is_far(one: LossyFlight) -> None:
     one.life.fly(Place(np.array([25.0, 0.0, -1.0])))
 
 
+def wind_rises(one: LossyFlight) -> None:
+    """Be pushed away by more than the controller learns, however far."""
+    flying(one)
+    one.life.farthest_m = math.inf
+    one.autopilot.push_m_s2 = 8.0
+    one.pass_until(lambda: one.life.phase is not Phase.FLYING)
+    one.autopilot.push_m_s2 = 0.0
+
+
 def another_pilot_comes(one: LossyFlight) -> None:
     """Hear another pilot in flight."""
     flying(one)
@@ -163,6 +173,7 @@ ENDS: Final[dict[Callable[[LossyFlight], None], str]] = {
     state_is_refused: r"landed: (the controller refuses the state|the estimate has jumped)",
     estimate_jumps: "landed: the estimate has jumped by 10.0 m",
     target_is_far: "landed: the target is 25 m away",
+    wind_rises: "landed: pushed away: wind, or a drone that the settings do not describe",
     another_pilot_comes: "landed: another pilot is on the link",
     is_interrupted: "landed: Ctrl-C",
     is_interrupted_while_arming: "(landed|no flight): Ctrl-C",

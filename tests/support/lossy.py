@@ -70,7 +70,7 @@ class LossyWire(Generic[Carried]):
 
 @dataclass
 class TinyAutopilot:
-    """Modes, arming and time-outs of PX4 or ArduCopter, and a drone that only moves up and down."""
+    """Modes, arming and time-outs of PX4 or ArduCopter, and a drone that moves up, down and with the wind."""
 
     stack: Stack
     arms: bool = True
@@ -78,7 +78,9 @@ class TinyAutopilot:
     armed: bool = False
     height_m: float = 0.0
     shift_m: float = 0.0
-    """What the estimator adds to the position."""
+    """What the estimator adds to the position, and how far the wind has moved the drone."""
+    push_m_s2: float = 0.0
+    """Acceleration by the wind, against which it does not tilt."""
     resets: int = 0
     mode: int = -1
     sent: list[Record] = field(default_factory=list)
@@ -86,6 +88,7 @@ class TinyAutopilot:
     def __post_init__(self) -> None:
         self.mode = self.stack.hold if self.stack.climbs_by_set_points else 0
         self._aim_m, self._set_point_s, self._grounded_s, self._due_s = 0.0, -9.0, 0.0, 0.0
+        self._speed_m_s = 0.0
 
     def obey(self, order: Order, now_s: float) -> None:
         """Obey an order."""
@@ -124,6 +127,8 @@ class TinyAutopilot:
             up_m_s, down_m_s = CLIMB_M_S, DESCENT_M_S
         step_m = min(max(aim_m - self.height_m, -down_m_s * TICK_S), up_m_s * TICK_S)
         self.height_m = max(self.height_m + step_m, 0.0)
+        self._speed_m_s += self.push_m_s2 * TICK_S
+        self.shift_m += self._speed_m_s * TICK_S
         if self.height_m > 0.0 or self.mode != self.stack.land:
             self._grounded_s = now_s
         elif now_s - self._grounded_s > DISARMS_S:
@@ -134,7 +139,7 @@ class TinyAutopilot:
         resets = self.resets if self.stack.climbs_by_set_points else None
         position_m, velocity_m_s = (
             np.array([self.shift_m, 0.0, -self.height_m]),
-            np.array([0.0, 0.0, -climb_m_s]),
+            np.array([self._speed_m_s, 0.0, -climb_m_s]),
         )
         self.sent.append(EstimatedState(now_s, position_m, velocity_m_s, np.zeros(3), resets))
         if now_s >= self._due_s:

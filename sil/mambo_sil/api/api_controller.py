@@ -265,6 +265,17 @@ class Controller:
         self._heading.shift(np.where(status == 0, heading, 0.0))
         return status
 
+    @property
+    def disturbance_m_s2(self) -> FloatArray:
+        """The learnt acceleration (n, 2), x and y, that tilt and drag do not explain, such as that of wind.
+
+        It ends at `observer.disturbance_limit_m_s2` on each axis: a stronger push moves the drone away.
+        Raises ArgumentError for a 1-norm, which learns none.
+        """
+        if self._method.setter != "set_command":
+            raise ArgumentError('disturbance_m_s2 needs cost.norm = "quadratic"')
+        return self._compiled.last_disturbance_m_s2
+
     def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:
         """Tell whether a position is measured, as by cameras: one truth value for all or (...).
 

@@ -41,6 +41,8 @@ LOST_S: Final = 2.0
 """Time without an estimate after which the pilot lands, and without any message after which it ends."""
 REFUSED_S: Final = 0.5
 """How long the controller may refuse the state before the pilot lands."""
+PUSHED_S: Final = 2.0
+"""How long the drone may be pushed with all that the controller learns before the pilot lands."""
 ASK_S, BEAT_S, PING_S = 0.5, 1.0, 0.1
 """Periods of repeated requests, of heartbeats, and of what measures the delay of the link."""
 FARTHEST_M: Final = 20.0
@@ -398,7 +400,12 @@ class LifeCycle:
                 self.land("the controller refuses the state, which is out of its [ranges]", good=False)
             return [] if set_point is None else [set_point]
         self._accepted_s = now_s
-        if self.phase is Phase.FLYING and away_m > self.farthest_m:
+        if self.phase is Phase.FLYING and self.steering.pushed_s > PUSHED_S:
+            most_m_s2 = self.steering.most_disturbance_m_s2
+            why = f"wind, or a drone that the settings do not describe, pushes it with {most_m_s2:.1f} m/s^2"
+            all_of_it = "all that the controller learns (observer.disturbance_limit_m_s2)"
+            self.land(f"pushed away: {why}, {all_of_it}", good=False)
+        elif self.phase is Phase.FLYING and away_m > self.farthest_m:
             self.hold()
             self.land(f"the target is {away_m:.0f} m away; farthest_m = {self.farthest_m:g}", good=False)
         return [] if set_point is None else [set_point]

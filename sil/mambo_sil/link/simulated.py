@@ -96,7 +96,6 @@ class SimulatedAutopilot:
         seeds = (self.condition.seed,)
         vehicle = Vehicle.of(drone)
         sensors = choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone)
-        wind = Disturbances()
         flight = Flight(Hover(), vehicle=vehicle, update_period_s=drone.step_s, seeds=seeds, sensors=sensors)
         self._vehicle, self._there = vehicle, np.ones(1, np.bool_)
         self._state = vehicle.at_rest(np.array(STARTS_M)[:, np.newaxis], self.condition.yaw_rad, 0.0)
@@ -106,7 +105,8 @@ class SimulatedAutopilot:
             else None
         )
         self._suite = suite_of(flight, seeds, truth(self._state))
-        self._world = World(wind, vehicle, seeds, 1.0)
+        self._seeds = seeds
+        self.blow((0.0, 0.0))
         self._rates: dict[Stream, float] = dict(ALWAYS)
         self._due: dict[object, float] = {}
         self._set_point: SetAttitude | SetPosition | None = None
@@ -123,6 +123,10 @@ class SimulatedAutopilot:
     def is_on_ground(self) -> bool:
         """Whether the feet touch the ground."""
         return bool(self._state.body[2, 0] >= 0.0)
+
+    def blow(self, push_m_s2: tuple[float, float]) -> None:
+        """Push the drone with a steady wind from now on, along x and y."""
+        self._world = World(Disturbances(push_m_s2=push_m_s2), self._vehicle, self._seeds, 1.0)
 
     def reset_estimator(self, by_m: FloatArray, by_rad: float = 0.0) -> None:
         """Move the estimate by a jump; the velocity is right from now on."""

@@ -22,6 +22,8 @@ Targets = Callable[[float], TargetState]
 """The target of a course a time ago, in s."""
 LEAST_THRUST, MOST_THRUST = 0.05, 1.0
 """Bounds on the share of the largest thrust: with less an autopilot takes itself for landed."""
+AT_LIMIT: Final = 0.99
+"""Share of the largest disturbance that the controller learns, from which on it is at that limit."""
 LEARNS_S: Final = 3.0
 """Time constant of the mean thrust that the flight needs."""
 
@@ -70,6 +72,8 @@ class Steering:
         """Whether the controller has accepted the last state."""
         self.away_m = 0.0
         """How far the drone is from the last target that the controller got."""
+        self.pushed_s = 0.0
+        """For how long the disturbance has been at the limit of what the controller learns."""
         self.frame = SteadyFrame()
         self.take_overs = 0
         self._steps = 0
@@ -88,6 +92,7 @@ class Steering:
         self._sent_m_s2 = self.hover_m_s2
         self.controller.reset(self._sent_rad, thrust_m_s2=self._sent_m_s2)
         self.frame.begin(estimate)
+        self.pushed_s = 0.0
         self._last = self._jump = None
         self._clock_s = estimate.time_s - self.controller.update_period_s
         self._yaw_rad = yaw_rad - self.frame.heading_change_rad
@@ -128,7 +133,16 @@ class Steering:
 
     def _step(self, estimate: EstimatedState, target: TargetState) -> StepOutcome:
         state = DroneState(estimate.position_m, estimate.velocity_m_s, estimate.attitude_rad)
-        return self.controller.step(state, target)
+        outcome = self.controller.step(state, target)
+        learnt_m_s2 = float(np.abs(self.controller.disturbance_m_s2).max())
+        is_pushed = learnt_m_s2 >= AT_LIMIT * self.most_disturbance_m_s2
+        self.pushed_s = self.pushed_s + self.controller.update_period_s if is_pushed else 0.0
+        return outcome
+
+    @property
+    def most_disturbance_m_s2(self) -> float:
+        """The largest disturbance that the controller learns along x or y."""
+        return self.controller.settings.observer.disturbance_limit_m_s2
 
     def _goal(self, target: TargetState) -> TargetState:
         """Return the target that the controller gets for one of the course.

@@ -79,6 +79,7 @@ def setter_quantities(method: Method, setter: Setter) -> Sequence[str]:
 
 
 _YAW: Final = ("yaw",)
+_DISTURBANCE: Final = ("disturbance",)
 
 DIRT = b"\xa5"
 """Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
@@ -157,6 +158,13 @@ class CompiledController:
         thrusts = np.empty(self.n, self._numbers.type_of(*THRUST))
         self._library.nmpc_host_last_thrust(self._controllers, self.n, _address(thrusts))
         return self._numbers.to_si(thrusts, *THRUST).astype(np.float64)
+
+    @property
+    def last_disturbance_m_s2(self) -> NDArray[np.float64]:
+        """The learnt accelerations (n, 2), x and y, that tilt and drag do not explain: of a quadratic cost."""
+        found = np.empty((self.n, 2), self._numbers.type_of(*_DISTURBANCE))
+        self._library.nmpc_host_last_disturbance(self._controllers, self.n, _address(found))
+        return self._numbers.to_si(found, *_DISTURBANCE).astype(np.float64)
 
     def slew_heading(
         self, previous_rad: ArrayLike, wanted_rad: ArrayLike, most_change_rad: float

@@ -118,6 +118,22 @@ void nmpc_host_set_position_measured(nmpc_t *controllers, int n, const unsigned 
 }
 #endif
 
+#ifdef NMPC_STORED_NUMBERS
+/* The accelerations that tilt and drag do not explain, as learnt, along x and y. */
+void nmpc_host_last_disturbance(const nmpc_t *controllers, int n, nmpc_real_t *disturbance_m_s2)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        nmpc_estimate_t estimate;
+
+        (void)nmpc_last_estimate(&controllers[i], &estimate);
+        disturbance_m_s2[2 * i] = estimate.disturbance_m_s2[0];
+        disturbance_m_s2[(2 * i) + 1] = estimate.disturbance_m_s2[1];
+    }
+}
+#endif
+
 void nmpc_host_slew_heading(int n, const nmpc_real_t *previous_rad, const nmpc_real_t *wanted_rad,
                             const nmpc_real_t *most_change_rad, nmpc_real_t *next_rad)
 {

@@ -116,7 +116,8 @@ def model_keys(axes: Sequence[AxisResult], motion: Motion | None) -> dict[str, f
         keys |= {f"{name}_integral_1_s": fit.integral_1_s.value} if fit.integral_1_s else {}
     if motion is not None:
         if motion.trim_is_known:
-            keys |= {f"{name}_trim_rad": each.value for name, each in zip(NAMES, motion.trim_rad, strict=True)}
+            trims = zip(NAMES, motion.trim_rad, strict=True)
+            keys |= {f"{name}_trim_rad": trim.value for name, trim in trims}
         keys |= {"acceleration_per_tilt": motion.acceleration_per_tilt.value}
         keys |= {"drag_1_s": max(motion.drag_1_s.value, 0.0)}
     return {key: float(f"{value:.4g}") for key, value in keys.items()}

@@ -8,8 +8,8 @@ T tilt is the horizontal part of the thrust over mass T; where T is not logged, 
 g. F is a first-order lag and a delay, which may be negative: together they have the delay and the spread of
 any low-pass, also of a central difference. Without F, and with its delay alone, the drag would be too small.
 
-Where the heading turned, a constant push in x and y stands beside them: a steady wind, which a trim that turns
-with the drone can be told from.
+Where the heading turned, a constant push in x and y stands beside them, that of a steady wind: a trim, which
+turns with the drone, can be told from it.
 
 Both sides are integrated over half a second and then averaged over another, which removes most of the noise
 of velocities that are differentiated positions: it has hardly any low frequencies. Share, drag, trim and push
