@@ -161,7 +161,7 @@ class CompiledController:
 
     @property
     def last_disturbance_m_s2(self) -> NDArray[np.float64]:
-        """The learnt accelerations (n, 2), x and y, that tilt and drag do not explain: of a quadratic cost."""
+        """The learnt accelerations (n, 2), x and y, that tilt and drag do not explain; none of a 1-norm."""
         found = np.empty((self.n, 2), self._numbers.type_of(*_DISTURBANCE))
         self._library.nmpc_host_last_disturbance(self._controllers, self.n, _address(found))
         return self._numbers.to_si(found, *_DISTURBANCE).astype(np.float64)
