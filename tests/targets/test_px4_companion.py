@@ -175,7 +175,7 @@ def test_a_heading_that_turns_costs_little_unless_the_settings_have_a_trim_of_th
     assert all(wrong[rate] > right[rate] + 0.2 for rate in TURNS[1:])
 
 
-LATE = {500: (9.0, 0.45), 200: (7.5, 0.15), 50: (1.5, 0.04)}
+LATE = {500: (9.0, 0.45), 200: (7.5, 0.15), 50: (1.5, 0.045)}
 """Largest change in degrees, largest distance in m, by the period of the set-points in ms."""
 
 
