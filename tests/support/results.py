@@ -271,7 +271,7 @@ def identify_folder(folder: Path) -> None:
     fit = AxisParameters(known(0.83), known(0.14), known(0.05), known(0.09), None)
     roll = AxisResult("good", [], 0.1, 0.99, 0.002, 0.002, fit, fit, 0.001, 0.0005)
     pitch = AxisResult("refused", ["too calm"], 0.01, np.nan, np.nan, np.nan, None, None, np.nan, 0.0005)
-    motion = Motion(known(0.87), known(0.15), (known(0.01), known(0.0)), known(0.03), 0.95, 0.06)
+    motion = Motion(known(0.87), known(0.15), (known(0.01), known(0.0)), True, known(0.03), 0.95, 0.06)
     wave = np.sin(np.arange(500.0) / 20.0)
     tilt = np.stack([wave, wave])
     curves = Curves(0.01 * np.arange(500.0), tilt, 0.8 * tilt, np.stack([0.8 * wave, np.full(500, np.nan)]))
