@@ -238,11 +238,11 @@ def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
     """It is a broken installation, not a file that the user could provide."""
     templates = tmp_path / "mambo_templates"
     shutil.copytree(ROOT / "templates" / "mambo_templates", templates)
-    (templates / "quadratic" / "observer.c.j2").unlink()
+    (templates / "quadratic" / "observer.h.j2").unlink()
     command = [sys.executable, "-m", "mambo_nmpc", "generate", "-o", "c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("Traceback")
-    assert "TemplatesNotFound: " in done.stderr.splitlines()[-1]
-    assert "observer.c.j2" in done.stderr.splitlines()[-1]
+    assert "TemplateNotFound: " in done.stderr.splitlines()[-1]
+    assert "observer.h.j2" in done.stderr.splitlines()[-1]
     assert not (tmp_path / "c").exists()

@@ -435,10 +435,10 @@ NMPC_INLINE void turn_vector(nmpc_real_t vector[2], nmpc_real_t sine, nmpc_real_
 #define NMPC_ROLL_PER_ACCELERATION 1068884811
 #define NMPC_PITCH_PER_ACCELERATION 1068884811
 
-/* The largest |u| of a move: that of the tilt limit. And the largest |a| and |i|, and |u| when it turns. */
+/* The largest |u| of a move: that of the tilt limit. */
 #define NMPC_RIGHT_LIMIT_M_STEP2 23041
 #define NMPC_FORWARD_LIMIT_M_STEP2 23041
-#define NMPC_ATTITUDE_LIMIT_M_STEP2 62212207
+#define NMPC_ATTITUDE_LIMIT_M_STEP2 62212207 /* of |a|, |i|, and |u| when it turns */
 
 /* The next a and i of each axis from a, i, c, u; and the next c from c, u. */
 static const nmpc_real_t tilt_rows[2][NMPC_ATTITUDE_STATES] = {
@@ -629,19 +629,6 @@ static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nm
 
     *position_m = clamp(*position_m + moved_m, NMPC_ESTIMATED_POSITION_LIMIT_M);
     *velocity_m_step = clamp(*velocity_m_step + change_m_step, NMPC_VELOCITY_LIMIT_M_STEP);
-}
-
-/* A row of the law times the first `count` numbers of a state. */
-NMPC_INLINE nmpc_real_t axis_row(const nmpc_real_t row[], const nmpc_real_t state[], int count)
-{
-    nmpc_sum_t sum = wide_product(row[0], state[0]);
-    int k;
-
-    NMPC_UNROLL
-    for (k = 1; k < count; k++) {
-        sum = sum + wide_product(row[k], state[k]);
-    }
-    return row_sum(sum);
 }
 
 /* ---- Observer -------------------------------------------------------------------------------------------------------
@@ -915,12 +902,25 @@ static const nmpc_real_t move_rows[2][2][NMPC_STATES] = {
 /* H12/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
 static const nmpc_real_t move_ratios[2] = { 1359810574, 1363286600 };
 
+/* A row times the state. */
+NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
+{
+    nmpc_sum_t sum = wide_product(row[0], state[0]);
+    int k;
+
+    NMPC_UNROLL
+    for (k = 1; k < NMPC_STATES; k++) {
+        sum = sum + wide_product(row[k], state[k]);
+    }
+    return row_sum(sum);
+}
+
 /* Return the first free move along `axis` that minimises the cost from `state`, of the members that the rows name, in
  * m, m/step and m/step^2. The moves lie within +/- `limit_m_step2`. */
 NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
-    nmpc_real_t move_m_step2 = axis_row(move_rows[axis][0], state, NMPC_STATES);
-    const nmpc_real_t second_m_step2 = axis_row(move_rows[axis][1], state, NMPC_STATES);
+    nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
+    const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
 
     if (within(second_m_step2, limit_m_step2) == 0) {
         const nmpc_real_t change_m_step2 =

@@ -182,7 +182,7 @@ def test_values_at_odds_are_refused_with_both_keys(values: Values, fault: str) -
     [
         {"model.roll_lag_s": 0.051, "damping.roll_rate_feedback_s": 0.05},
         {"model.pitch_lag_s": 0.071, "damping.pitch_rate_feedback_s": 0.07},
-        {"limits.tilt_rad": 0.1, "model.roll_trim_rad": -0.0999},
+        {"limits.tilt_rad": 0.1, "model.roll_trim_rad": -0.0872},
         {"horizon.update_period_s": 0.002},
         {"horizon.update_period_s": 0.1, "horizon.ramp_s": 0.2},
         {"horizon.update_period_s": 0.0011, "observer.outage_s": 0.275},

@@ -200,4 +200,4 @@ def test_without_it_the_c_is_that_of_before() -> None:
     """No word of it."""
     files = render(with_option(HIGH, "observer.tilt_gain", "given"), with_digest=False)
     assert "tilt_gain" not in files["nmpc.c"] + files["nmpc.h"]
-    assert "tilt_gain_sent(&self->tilt_gain, 0, attitude_roll(" in render(HIGH, with_digest=False)["nmpc.c"]
+    assert "tilt_gain_sent(&self->tilt_gain, " in render(HIGH, with_digest=False)["nmpc.c"]

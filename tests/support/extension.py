@@ -90,7 +90,7 @@ int nmpc_is_saturated(const nmpc_t *);
 nmpc_status_t nmpc_last_estimate(const nmpc_t *, nmpc_estimate_t *);
 void observer_clear(nmpc_observer_t *);
 void observer_start(nmpc_observer_t *, const nmpc_state_t *);
-void observer_correct(nmpc_observer_t *, const nmpc_state_t * GUARD_ARGUMENT, const nmpc_real_t *);
+void observer_correct(nmpc_observer_t *, const nmpc_state_t *, int, const nmpc_real_t *);
 void observer_predict(nmpc_observer_t *, const nmpc_real_t *);
 nmpc_real_t observer_disturbance(const nmpc_observer_t *, int);
 void attitude_set_command(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
@@ -126,8 +126,6 @@ def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     includes = '#include "nmpc.c"\n#include "nmpc_self_test.c"\n'
     declarations = _TYPES + {"1-norm": _ONE_NORM, "quadratic": _QUADRATIC}[norm] + _FUNCTIONS
     declarations = declarations.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
-    guarded = "NMPC_HAS_GUARD" in files["nmpc.h"]
-    declarations = declarations.replace("GUARD_ARGUMENT", ", unsigned int" if guarded else "")
     for place_holder, text in _TRACKER.items():
         declarations = declarations.replace(place_holder, text if tracked else "")
     given = "NMPC_HAS_TARGET_ACCELERATION" in files["nmpc.h"]

@@ -54,7 +54,7 @@ COMMANDS: Final = (
 REFUSALS: Final = {
     "H": r"be left out: the settings have \[height\]",
     "N": r"the settings have no \[height\].* derive settings",
-    "L": r"wants settings with \[height\] and \[limits\].* derive them",
+    "L": r"wants settings with \[height\],.* derive them",
 }
 """The sentence with which a consumer refuses an option, and says what to do."""
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import limits_of
 from tests.support.strategies import Values, nested
@@ -286,11 +285,6 @@ def quadratic_settings(scalar: str = "float32", **horizon: Any) -> Settings:
     document = presets.preset("mambo").model_dump()
     changed = {"code": document["code"] | {"scalar": scalar}, "horizon": document["horizon"] | horizon}
     return Settings.model_validate(document | changed)
-
-
-def without_limits(settings: Settings) -> Settings:
-    """Return `settings` without limits of speed and braking."""
-    return with_option(with_option(settings, "limits.speed_m_s", 0.0), "limits.braking_m_s2", 0.0)
 
 
 EVERYTHING = settings_of(

@@ -141,7 +141,7 @@ def test_cmakelists_names_every_source_and_parameter() -> None:
 
 def test_settings_that_do_not_fly_the_height_are_refused(tmp_path: Path) -> None:
     """PX4 wants the thrust with the attitude; there is no preset, since no two drones are alike."""
-    message = r"--for px4 wants settings with \[height\] and \[limits\]"
+    message = r"--for px4 wants settings with \[height\]"
     with pytest.raises(InvalidSettingsError, match=message):
         render_target(presets.preset("mambo"), TARGETS["px4"])
     assert "--for px4 has no preset" in run("generate", "--for", "px4", "-o", str(tmp_path), code=2)[1]

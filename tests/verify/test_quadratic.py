@@ -20,7 +20,7 @@ from tests.support.alarms import (
     harmed,
     runs,
 )
-from tests.support.quadratic import quadratic_settings, without_limits
+from tests.support.quadratic import quadratic_settings
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
@@ -69,8 +69,8 @@ UNPROVEN = {
         "take_numbers",
         Harm(
             CONTROLLER,
-            r"    pitch_rad = clamp\(command->pitch_rad, self->bounds\.tilt_rad\)",
-            "    pitch_rad = command->pitch_rad",
+            r"    given_rad\[1\] = clamp\(command->pitch_rad, self->bounds\.tilt_rad\)",
+            "    given_rad[1] = command->pitch_rad",
         ),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
     ),
@@ -104,34 +104,27 @@ AT_ONCE = (
 
 
 class Options(NamedTuple):
-    """What changes the C of a quadratic cost; without a limit of speed there is none at all."""
+    """What changes the C of a quadratic cost."""
 
     scalar: str
     ramp_s: float
     attitude: str
     acceleration: str
-    speed_m_s: float
 
 
 OTHERS = [
-    Options("float32", 0.0, "measured", "given", 2.0),
-    Options("float64", 0.0, "predicted", "none", 5.0),
-    Options("float64", 0.0, "measured", "tracked", 0.0),
-    Options("float64", 0.4, "measured", "none", 0.0),
-    Options("float32", 0.4, "predicted", "given", 0.0),
+    Options("float32", 0.0, "measured", "given"),
+    Options("float64", 0.0, "predicted", "none"),
+    Options("float64", 0.0, "measured", "tracked"),
+    Options("float64", 0.4, "measured", "none"),
+    Options("float32", 0.4, "predicted", "given"),
 ]
-WITH_LIMITS = {
-    "a refused target is used",
-    "the command leaves the tilt limit",
-    "a set command is not clamped",
-}
-"""Faults of lines that a controller without limits lacks or has otherwise."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("chosen", OTHERS, ids=lambda chosen: " ".join(map(str, chosen)))
 def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
-    """One or two moves, a measured attitude of old measurements, each acceleration, with and without limits.
+    """One or two moves, a measured attitude of old measurements, each acceleration.
 
     With the presets, any two of these options occur together.
     """
@@ -143,21 +136,14 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     document["target"]["acceleration"] = chosen.acceleration
     if chosen.acceleration != "tracked":
         document["damping"]["roll_rate_feedback_s"] = 0.0
-    document["limits"]["speed_m_s"] = chosen.speed_m_s
-    settings = Settings.model_validate(document)
-    result = proven.check(subject(settings if chosen.speed_m_s else without_limits(settings), tmp_path))
+    result = proven.check(subject(Settings.model_validate(document), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("names", runs(UNPROVEN, AT_ONCE), ids=", ".join)
 def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None:
-    """Each is what a slip of the hand would make, and none goes through.
-
-    A fault that needs no limits is made without them, which Frama-C interprets in a third of the time.
-    """
+    """Each is what a slip of the hand would make, and none goes through."""
     require("frama-c", "frama-c-base")
-    settings, faults = quadratic_settings(), {name: UNPROVEN[name] for name in names}
-    if WITH_LIMITS.isdisjoint(names):
-        settings = without_limits(settings)
-    assert proven.unnoticed(harmed(settings, tmp_path, faults), faults) == []
+    faults = {name: UNPROVEN[name] for name in names}
+    assert proven.unnoticed(harmed(quadratic_settings(), tmp_path, faults), faults) == []

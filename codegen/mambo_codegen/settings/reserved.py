@@ -59,7 +59,7 @@ STANDARD_NAMES = frozenset(
 """Prefixes that would hide a C library header (stdio.h) or redefine one of its or POSIX's types (pid_t)."""
 
 _OWN = """
-    attitude call change_m climb_m displacement_m fold height innovation_m limits mean_m measured_m n_m
+    attitude axis call change_m climb_m displacement_m fold height innovation_m limits mean_m measured_m
     observer predictor run tiny tracker velocity_m
 """
 OWN_NAMES = frozenset(_OWN.split())

@@ -46,8 +46,8 @@ At the optimisation that is shipped `test_emulated` compares every scalar type o
 FAULTS = {
     "another order": (
         "nmpc.c",
-        "rollout->acceleration_m_step2 + (roll_m_step2 + pitch_m_step2)",
-        "(rollout->acceleration_m_step2 + roll_m_step2) + pitch_m_step2",
+        "rollout->acceleration_m_step2 + (rollout->roll_deficit_m_step2 + rollout->pitch_deficit_m_step2)",
+        "(rollout->acceleration_m_step2 + rollout->roll_deficit_m_step2) + rollout->pitch_deficit_m_step2",
     ),
     "another sign": ("nmpc.c", "effort_slope = -weight", "effort_slope = weight"),
 }

@@ -324,6 +324,16 @@ def test_numbers_of_fixed_point_stand_for_the_limits() -> None:
         ({"limits.tilt_rad": 0.3}, False),
     ],
 )
-def test_speed_braking_or_a_fence_alone_give_a_controller_limits(limits: Values, has: bool) -> None:
+def test_speed_braking_or_a_fence_alone_give_a_1_norm_limits(limits: Values, has: bool) -> None:
     """A tilt limit, which every controller has, does not."""
-    assert (method_of(settings_of(TWO_MOVES | limits)).limiting is not None) is has
+    assert (method_of(settings_of(limits)).limiting is not None) is has
+
+
+def test_a_quadratic_controller_brakes_without_a_key() -> None:
+    """By 0.8 of what the tilt limit gives; its speed ends at the range of velocities, and nothing is a wall."""
+    settings = settings_of(TWO_MOVES)
+    limiting, ranges = method_of(settings).limiting, settings.ranges
+    assert limiting is not None
+    speed_m_s, braking_m_s2, *walls_m, _ = limiting.limits
+    assert (speed_m_s, braking_m_s2) == (ranges.velocity_m_s, pytest.approx(0.8 * 9.81 * 0.5))
+    assert walls_m == [-ranges.position_m, -ranges.position_m, ranges.position_m, ranges.position_m]

@@ -105,7 +105,7 @@ def test_a_jump_of_the_frame_is_taken_up_to_the_ranges(scalar: str, height: bool
 LIMITED = {"limits.speed_m_s": 1.5, "limits.fence.x_min_m": -1.0, "limits.fence.x_max_m": 2.0}
 ONE_NORM = with_option(presets.preset("mambo-1norm"), "limits.speed_m_s", 1.5)
 CASES = {
-    "feedback, tracked": EVERYTHING,
+    "feedback, tracked": with_option(EVERYTHING, "limits.speed_m_s", 5.0),
     "given": settings_of(TWO_MOVES | LIMITED | {"target.acceleration": "given"}),
     "limits": settings_of(TWO_MOVES | LIMITED),
     "height, tracked": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "tracked"}),

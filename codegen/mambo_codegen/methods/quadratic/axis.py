@@ -14,7 +14,7 @@ Motion = tuple[Real, Real]
 """Positions, m, and velocities, m/step, along one axis or two, of one shape; or their innovations."""
 
 
-class Axis:
+class AxisMotion:
     """How positions and velocities are corrected and predicted, in the scalar type of the controller."""
 
     def __init__(self, constants: QuadraticConstants, products: QuadraticArithmetic) -> None:

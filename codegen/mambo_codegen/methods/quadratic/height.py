@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.attitude_constants import MOST_WEIGHT
-from mambo_codegen.methods.quadratic.axis import Axis, gains_of, row_product
+from mambo_codegen.methods.quadratic.axis import AxisMotion, gains_of, row_product
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.guard import VariationBudget
 from mambo_codegen.methods.quadratic.height_constants import (
@@ -91,7 +91,7 @@ class HeightAxis:
         self, constants: QuadraticConstants, found: HeightConstants, products: QuadraticArithmetic
     ) -> None:
         constant, settings = products.numbers.constant, constants.settings
-        self._products, self._found, self._axis = products, found, Axis(constants, products)
+        self._products, self._found, self._axis = products, found, AxisMotion(constants, products)
         last = "gain" if found.learns_gain else "disturbance"
         self._gains = gains_of(constant, found.gain, ("position", "velocity", last))
         self._thrust_row = [constant(value, "attitude") for value in found.thrust_row]

@@ -48,6 +48,7 @@ class Quadratic(QuadraticConstants, Method):
         "optimizer": "the minimum of the cost",
         "guard": "how much the commands may vary",
         "height": "the third axis, whose command is the thrust",
+        "height_command": "that thrust",
         "limits_arithmetic": "roots and products of the limits",
         "limits": "speed, braking and place",
         "set_limits": "what the limits need, and their functions of nmpc.h",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
-from mambo_codegen.methods.quadratic.axis import Axis, gains_of
+from mambo_codegen.methods.quadratic.axis import AxisMotion, gains_of
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows
 from mambo_codegen.methods.shared.math import Real, clamp
@@ -25,7 +25,7 @@ class KalmanObserver:
 
     def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic) -> None:
         constant, observer = arithmetic.numbers.constant, constants.observer
-        self._products, self._axis = arithmetic, Axis(constants, arithmetic)
+        self._products, self._axis = arithmetic, AxisMotion(constants, arithmetic)
         names = ("position", "velocity", "disturbance")
         self._gains = gains_of(constant, observer.gain, names)
         coarse = observer.coarse_gain

@@ -108,6 +108,7 @@ class Constants(ABC):
             "given": settings.target.gives_acceleration,
             "guard": self.guard is not None,
             "height": self.has_height,
+            "height_command": self.has_height,
             "limits": limiting is not None,
             "limits_arithmetic": limiting is not None,
             "measured": tracker is not None and not tracker.is_given,

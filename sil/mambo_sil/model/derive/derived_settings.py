@@ -38,6 +38,8 @@ MOST_DISTURBANCE_M_S2: Final = 20.0
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
+LEAST_TILT_RAD = 0.02
+"""With less a controller can hardly brake: settings want 0.125 m/s^2."""
 TILT_SHARE, TOLD_TILT_SHARE = 0.5, 0.7
 """Tilt limit over the tilt at which the largest thrust still carries the weight: for a target that is
 tracked, and with the exact tilt for one that says its acceleration."""
@@ -319,7 +321,7 @@ def _tilt_limit(drone: VehicleFile, share: float, *, exact: bool) -> Derived:
         most_rad, why = MOST_TILT_BY_FLOW_RAD, "the optical flow drifts in larger tilts"
     if tilt_rad > most_rad and not exact:
         tilt_rad, words = most_rad, f"{words}; at most {most_rad:g}, since {why}"
-    return Derived("limits", "tilt_rad", _round(max(tilt_rad, 0.01)), words)
+    return Derived("limits", "tilt_rad", _round(max(tilt_rad, LEAST_TILT_RAD)), words)
 
 
 def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:

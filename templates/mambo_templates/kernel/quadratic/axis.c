@@ -59,16 +59,3 @@ static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nm
     *position_m = clamp(*position_m + moved_m, NMPC_ESTIMATED_POSITION_LIMIT_M);
     *velocity_m_step = clamp(*velocity_m_step + change_m_step, NMPC_VELOCITY_LIMIT_M_STEP);
 }
-
-/* A row of the law times the first `count` numbers of a state. */
-NMPC_INLINE nmpc_real_t axis_row(const nmpc_real_t row[], const nmpc_real_t state[], int count)
-{
-    nmpc_sum_t sum = wide_product(row[0], state[0]);
-    int k;
-
-    NMPC_UNROLL
-    for (k = 1; k < count; k++) {
-        sum = sum + wide_product(row[k], state[k]);
-    }
-    return row_sum(sum);
-}

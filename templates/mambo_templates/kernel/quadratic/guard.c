@@ -1,8 +1,8 @@
 /* ---- Guard ----------------------------------------------------------------------------------------------------------
  *
  * Budgets that bound how much the commands vary (not in the paper). Where target or estimate are noisy the commands
- * rattle, and a mixer that serves attitude first then takes the thrust. Let u* be the command that the cost asks for, of
- * roll, of pitch or of the thrust, and b its budget. In every control step with a new command
+ * rattle, and a mixer that serves attitude first then takes the thrust. Let u* be the command that the cost asks for,
+ * of roll, of pitch or of the thrust, and b its budget. In every control step with a new command
  *
  *     b = min(b + rho, full),   u(k) = u(k-1) + clamp(u* - u(k-1), b),   b = b - |u(k) - u(k-1)|.
  *

@@ -31,13 +31,26 @@
 #endif
 #include "optimizer.h"
 
+/* A row times the state. */
+NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
+{
+    nmpc_sum_t sum = wide_product(row[0], state[0]);
+    int k;
+
+    NMPC_UNROLL
+    for (k = 1; k < NMPC_STATES; k++) {
+        sum = sum + wide_product(row[k], state[k]);
+    }
+    return row_sum(sum);
+}
+
 /* Return the first free move along `axis` that minimises the cost from `state`, of the members that the rows name, in
  * m, m/step and m/step^2. The moves lie within +/- `limit_m_step2`. */
 NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
-    nmpc_real_t move_m_step2 = axis_row(move_rows[axis][0], state, NMPC_STATES);
+    nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
 #if WITH_TWO_MOVES
-    const nmpc_real_t second_m_step2 = axis_row(move_rows[axis][1], state, NMPC_STATES);
+    const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
 
     if (within(second_m_step2, limit_m_step2) == 0) {
 #if WITH_HEIGHT

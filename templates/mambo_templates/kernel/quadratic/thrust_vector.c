@@ -9,8 +9,8 @@
  *
  *     theta = -arctan forward,   phi = arctan(right cos theta).
  *
- * The arc tangent is a polynomial up to 1, x (c0 + c1 x^2 + ...), whose largest error is the smallest that so many terms
- * allow; beyond 1 it is pi/2 less that of 1/x. 1/x takes products alone, a line and Newton's steps.
+ * The arc tangent is a polynomial up to 1, x (c0 + c1 x^2 + ...), whose largest error is the smallest that so many
+ * terms allow; beyond 1 it is pi/2 less that of 1/x. 1/x takes products alone, a line and Newton's steps.
  */
 
 #include "thrust_vector.h"
