@@ -153,10 +153,10 @@ def test_the_limit_bounds_the_model_under_any_commands(settings: Settings) -> No
 
 def test_the_limit_holds_commands_on_either_side_of_the_trim() -> None:
     """A command at the tilt limit against the trim asks for more acceleration than a move may have."""
-    trimmed = settings_of({**ONE_MOVE, "limits.tilt_rad": 0.4, "model.roll_trim_rad": 0.38})
+    trimmed = settings_of({**ONE_MOVE, "limits.tilt_rad": 0.215, "model.roll_trim_rad": 0.2})
     attitude = Quadratic(trimmed).attitude
-    assert attitude.limit_m_step2 > 2 * attitude.gain_m_step2_rad * (0.4 + 0.38)
-    assert attitude.command_limit_m_step2[0] == pytest.approx(attitude.gain_m_step2_rad * 0.02)
+    assert attitude.limit_m_step2 > 2 * attitude.gain_m_step2_rad * (0.215 + 0.2)
+    assert attitude.command_limit_m_step2[0] == pytest.approx(attitude.gain_m_step2_rad * 0.015)
 
 
 def test_the_spectral_radius_is_that_of_the_loop(settings: Settings) -> None:

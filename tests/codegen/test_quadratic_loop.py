@@ -166,12 +166,12 @@ def test_in_a_short_outage_the_controller_flies_on() -> None:
 
 
 def test_after_a_long_outage_the_estimate_starts_anew() -> None:
-    """When the outage is over its time it brakes, and is level; position and velocity are then those measured."""
+    """When it is over its time the drone brakes to a stop; position and velocity are then those measured."""
     settings = settings_of(EXACT | {"observer.outage_s": 0.1, "target.acceleration": "tracked"})
     controller, period_s = QuadraticController(Quadratic(settings)), settings.horizon.update_period_s
     drone = LinearDrone(settings)
     drone.put((0.5, -0.3))
-    outcomes = fly(controller, drone, 60, lambda step, state: state * np.nan if step >= 30 else state)
+    outcomes = fly(controller, drone, 400, lambda step, state: state * np.nan if step >= 30 else state)
     commands = np.array([outcome.command_rad[0] for outcome in outcomes])
     assert np.all(np.any(np.diff(commands[29:40], axis=0) != 0, axis=1))
     assert np.all(commands[-1] == 0)

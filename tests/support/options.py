@@ -115,8 +115,7 @@ class Option:
 _BY_COMMAND: Final = " =+====+++++++=+="
 _PAPER: Final = "=======+=N +++++++L" + _BY_COMMAND
 _LEVEL: Final = "=======+=N +++++++L" + _BY_COMMAND
-_SPACE: Final = "=====H=+=+ +++++++L" + _BY_COMMAND
-_LIMITED: Final = "=====H=+=+ ++++++++" + _BY_COMMAND
+_SPACE: Final = "=====H=+=+ ++++++++" + _BY_COMMAND
 """Those of a controller of the height with limits, which PX4 wants."""
 
 _LIMITS: Final[Values] = {
@@ -194,11 +193,11 @@ OPTIONS: Final[dict[str, Option]] = {
     "height, limits": Option(
         SPACE,
         {"limits.speed_m_s": 1.5, "limits.fence.floor_m": 0.8, "limits.fence.ceiling_m": 1.1},
-        _LIMITED,
+        _SPACE,
     ),
     "height, guard": Option(SPACE, {"guard.thrust_m_s2": 1.0, "guard.thrust_m_s3": 10.0}, _SPACE),
-    "all, float32": Option(ALL, {"code.scalar": "float32"}, _LIMITED),
-    "all, float64": Option(ALL, {"code.scalar": "float64"}, _LIMITED),
-    "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _LIMITED),
+    "all, float32": Option(ALL, {"code.scalar": "float32"}, _SPACE),
+    "all, float64": Option(ALL, {"code.scalar": "float64"}, _SPACE),
+    "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _SPACE),
 }
 """The table, a row an option; what a row sets that its base has too is what the option is about."""

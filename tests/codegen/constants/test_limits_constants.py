@@ -330,7 +330,7 @@ def test_speed_braking_or_a_fence_alone_give_a_1_norm_limits(limits: Values, has
 
 
 def test_a_quadratic_controller_brakes_without_a_key() -> None:
-    """By 0.8 of what the tilt limit gives; its speed ends at the range of velocities, and nothing is a wall."""
+    """By 0.8 of what the tilt limit gives; its speed ends at the range of velocities, and no wall stands."""
     settings = settings_of(TWO_MOVES)
     limiting, ranges = method_of(settings).limiting, settings.ranges
     assert limiting is not None
