@@ -35,8 +35,8 @@ class OneNormConstants(Constants):
     @property
     def presence(self) -> dict[str, bool]:
         """Whether each part is there."""
-        settings, tables = self.settings, self.tables
-        return super().presence | {
+        settings, tables, common = self.settings, self.tables, super().presence
+        return common | {
             "backtracking": settings.optimizer.variant == "rprop+",
             "halves": self.numbers.formats is not None and tables.halves,
             "hover": settings.model.thrust == "hover",
