@@ -589,7 +589,7 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
  *
  *     p(k+1) = p + v + A/2,   v(k+1) = v + A.
  *
- * Without age its terms are 0. Both are limited where they are predicted, so that they stay finite for any input.
+ * Without age its terms are 0. p and v are limited where they are predicted, so that they stay finite for any input.
  */
 
 #define NMPC_VELOCITY_LIMIT_M_STEP 134217728 /* of v */
@@ -620,7 +620,7 @@ NMPC_INLINE void axis_predict(nmpc_real_t *position_m, nmpc_real_t *velocity_m_s
     *velocity_m_step = clamp(*velocity_m_step + velocity_change(acceleration_m_step2), NMPC_VELOCITY_LIMIT_M_STEP);
 }
 
-/* The frame has jumped, and the measured position and velocity with it. Measurements are old by `age` steps, so a jump
+/* The frame has jumped, and the measured position and velocity with it. Measurements are `age` steps old, so a jump
  * of v also moves p by age * change. */
 static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nmpc_real_t change_m,
                        nmpc_real_t change_m_step)
@@ -637,9 +637,9 @@ static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nm
  * steps, which are the unit of time here: m_step is m/T_s and m_step2 is m/T_s^2. Along x and y, let p, v and d be the
  * estimates of position, velocity and disturbance: the acceleration that tilt and drag do not explain, as wind and
  * model errors make it. p and v are corrected and predicted as in the chapter axis, with A = a + d - drag v, where a is
- * the acceleration of the tilt; without drag its term is 0. And
+ * the acceleration of the tilt; without drag its term is 0. The disturbance is corrected too, and lasts:
  *
- *     d += L31 n_p + L32 n_v.
+ *     d += L31 n_p + L32 n_v,   d(k+1) = d.
  *
  * The gains L are those of the stationary Kalman filter for the noise densities of the settings. d is limited.
  */
@@ -654,7 +654,7 @@ static const nmpc_real_t observer_gains[1][3][2] = {
 #define NMPC_DISTURBANCE_LIMIT_M_STEP2 20615843 /* of d */
 #define NMPC_DRAG_1_STEP 1473345581 /* deceleration per velocity */
 
-/* The acceleration along `axis` that the tilt does not explain. */
+/* The acceleration along `axis` that the tilt does not explain: d - drag v. */
 NMPC_INLINE nmpc_real_t observer_disturbance(const nmpc_observer_t *observer, int axis)
 {
     return observer->disturbance_m_step2[axis] - drag_product(NMPC_DRAG_1_STEP, observer->velocity_m_step[axis]);
@@ -671,8 +671,8 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
     }
 }
 
-/* Correct the estimates by a measured state, with the gains number `which`; `tilt_m_step2` is the acceleration of the
- * tilt along x and y. */
+/* Correct the estimates by a measured state, with the gains number `which`: 1 while no position is measured, else 0.
+ * `tilt_m_step2` is the acceleration of the tilt along x and y. */
 NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state, int which,
                                   const nmpc_real_t tilt_m_step2[2])
 {
@@ -1456,7 +1456,7 @@ unsigned int nmpc_limits_active(const nmpc_t *self)
  * chapters that follow.
  */
 
-/* `missed` after an outage; without limits also before the first good state. */
+/* `missed` when an outage begins: the drone brakes. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
 /* `missed` before the first good state, and when the model has come to rest after an outage. */
@@ -1543,7 +1543,7 @@ NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
 
 /* Set what rate feedback adds to the commands: the change of the measured angle since the last step, times a constant.
  * Its sign is positive: it takes damping off an attitude loop that has more than it needs, and so shortens its lag. It
- * is added behind the minimum, and a command that is held has none. */
+ * is added after the minimisation, and a command that is held has none. */
 NMPC_INLINE void measure_rates(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {

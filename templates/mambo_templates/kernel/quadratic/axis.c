@@ -9,7 +9,7 @@
  *
  *     p(k+1) = p + v + A/2,   v(k+1) = v + A.
  *
- * Without age its terms are 0. Both are limited where they are predicted, so that they stay finite for any input.
+ * Without age its terms are 0. p and v are limited where they are predicted, so that they stay finite for any input.
  */
 
 #include "axis.h"
@@ -45,7 +45,7 @@ NMPC_INLINE void axis_predict(nmpc_real_t *position_m, nmpc_real_t *velocity_m_s
     *velocity_m_step = clamp(*velocity_m_step + velocity_change(acceleration_m_step2), NMPC_VELOCITY_LIMIT_M_STEP);
 }
 
-/* The frame has jumped, and the measured position and velocity with it. Measurements are old by `age` steps, so a jump
+/* The frame has jumped, and the measured position and velocity with it. Measurements are `age` steps old, so a jump
  * of v also moves p by age * change. */
 static void axis_shift(nmpc_real_t *position_m, nmpc_real_t *velocity_m_step, nmpc_real_t change_m,
                        nmpc_real_t change_m_step)

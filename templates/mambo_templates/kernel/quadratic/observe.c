@@ -125,7 +125,7 @@ NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
 #if WITH_FEEDBACK
 /* Set what rate feedback adds to the commands: the change of the measured angle since the last step, times a constant.
  * Its sign is positive: it takes damping off an attitude loop that has more than it needs, and so shortens its lag. It
- * is added behind the minimum, and a command that is held has none. */
+ * is added after the minimisation, and a command that is held has none. */
 NMPC_INLINE void measure_rates(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {

@@ -4,16 +4,16 @@
  * steps, which are the unit of time here: m_step is m/T_s and m_step2 is m/T_s^2. Along x and y, let p, v and d be the
  * estimates of position, velocity and disturbance: the acceleration that tilt and drag do not explain, as wind and
  * model errors make it. p and v are corrected and predicted as in the chapter axis, with A = a + d - drag v, where a is
- * the acceleration of the tilt; without drag its term is 0. And
+ * the acceleration of the tilt; without drag its term is 0. The disturbance is corrected too, and lasts:
  *
- *     d += L31 n_p + L32 n_v.
+ *     d += L31 n_p + L32 n_v,   d(k+1) = d.
  *
  * The gains L are those of the stationary Kalman filter for the noise densities of the settings. d is limited.
  */
 
 #include "observer.h"
 
-/* The acceleration along `axis` that the tilt does not explain. */
+/* The acceleration along `axis` that the tilt does not explain: d - drag v. */
 NMPC_INLINE nmpc_real_t observer_disturbance(const nmpc_observer_t *observer, int axis)
 {
 #if WITH_DRAG
@@ -34,8 +34,8 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
     }
 }
 
-/* Correct the estimates by a measured state, with the gains number `which`; `tilt_m_step2` is the acceleration of the
- * tilt along x and y. */
+/* Correct the estimates by a measured state, with the gains number `which`: 1 while no position is measured, else 0.
+ * `tilt_m_step2` is the acceleration of the tilt along x and y. */
 NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state, int which,
                                   const nmpc_real_t tilt_m_step2[2])
 {

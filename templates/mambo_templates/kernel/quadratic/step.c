@@ -4,7 +4,7 @@
  * chapters that follow.
  */
 
-/* `missed` after an outage; without limits also before the first good state. */
+/* `missed` when an outage begins: the drone brakes. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
 /* `missed` before the first good state, and when the model has come to rest after an outage. */
@@ -27,7 +27,7 @@ typedef struct {
     nmpc_real_t feedback_rad[2];
 #endif
 #if WITH_HEIGHT
-    /* By how much a tilt counts for more than in hover, with the next thrust; 1 over it; 1 on the floor, else 0. */
+    /* The acceleration of a tilt over that in hover, with the next thrust; 1 over it; 1 on the floor, else 0. */
     nmpc_real_t weight;
     nmpc_real_t inverse;
     int on_ground;
