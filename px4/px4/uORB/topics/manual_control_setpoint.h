@@ -1,1 +1,0 @@
-#include <px4.hpp>
