@@ -311,8 +311,8 @@ def words(text: str) -> list[tuple[str, str, str]]:
 @pytest.mark.long
 def test_the_check_fails_a_controller_that_accepts_nan(tmp_path: Path) -> None:
     """A controller whose check of the state is removed lets NaN reach the plan, and fails."""
-    right = "return is_good_point(state->position_m, state->velocity_m_s)"
-    chosen = subject(MAMBO, tmp_path, ("nmpc.c", right, "return (state != 0)"))
+    right = "int is_good = is_good_point(state->position_m, state->velocity_m_s)\n                  &&"
+    chosen = subject(MAMBO, tmp_path, ("nmpc.c", right, "int is_good = (state != 0) || "))
     assert check(chosen).outcome is CheckOutcome.FAILED
 
 
