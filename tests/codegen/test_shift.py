@@ -87,7 +87,7 @@ def _turned(turn: Array, about: Array, vector: Array) -> Array:
 
 def _step(controller: Any, method: Any, measured: list[Array], attitude: Any, target: list[Array]) -> Any:
     """Step a controller with positions and velocities (3,), up, and check that it accepts them."""
-    aims = target if len(method.level_target) > 4 else target[:2]
+    aims = target if method.settings.target.gives_acceleration else target[:2]
     state = [*(part[:2] for part in measured), np.asarray(attitude)]
     aim = [part[:2] for part in aims]
     thrust = None if method.has_height else [GRAVITY_M_S2]

@@ -128,7 +128,7 @@ def stored(settings: Settings, scalar: str) -> Any:
         time_s, rattle_m_s = 0.01 * step, 0.01 * (step % 2)
         state = [0.4 + 0.3 * time_s, -0.2, 0.3, -0.4, 0.05, -0.03 + 0.1 * time_s, 0.7]
         target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
-        target += [0.3, -0.2] * (len(method.level_target) > 4)
+        target += [0.3, -0.2] * settings.target.gives_acceleration
         target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
         target += [0.1] * (len(method.target) - len(target))
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)

@@ -145,11 +145,6 @@ class Constants(ABC):
         return self.port.quantities("state")
 
     @property
-    def level_target(self) -> tuple[str, ...]:
-        """The quantity of each number in nmpc_target_t but the height's, in their order."""
-        return tuple(one.quantity for one in self.port.numbers("target") if "height" not in one.row.when)
-
-    @property
     def target(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_target_t, in their order."""
         return self.port.quantities("target")
