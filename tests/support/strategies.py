@@ -23,6 +23,9 @@ LAGS: Values = {"model.roll_lag_s": 0.3, "model.pitch_lag_s": 0.3}
 QUADRATIC: Values = LAGS | {"cost.norm": "quadratic"}
 """The fewest values that make a controller with a quadratic cost."""
 
+LEAST_BRAKING_M_S2 = 0.126
+"""What the tilt limit of a quadratic cost must give at least, and a little more."""
+
 RESERVED = KEYWORDS | STANDARD_NAMES | OWN_NAMES
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
@@ -91,10 +94,15 @@ def quadratic_values(draw: st.DrawFn) -> Values:
     """
     values: Values = {"cost.norm": "quadratic"}
     period_s = draw(numbers("horizon.update_period_s"))
-    tilt_rad = draw(numbers("limits.tilt_rad"))
+    gains = {angle: draw(numbers(f"model.{angle}_gain")) for angle in ("roll", "pitch")}
+    per_tilt, gain = draw(numbers("model.acceleration_per_tilt")), min(gains.values())
+    braking_rad = LEAST_BRAKING_M_S2 / (9.81 * per_tilt)
+    tilt_rad = draw(numbers("limits.tilt_rad", low=1.001 * braking_rad / gain))
+    largest_trim_rad = min(0.2, (gain * tilt_rad) - braking_rad)
     thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
     none = st.just(0.0)
     values |= {
+        "model.acceleration_per_tilt": per_tilt,
         "horizon.update_period_s": period_s,
         "horizon.ramp_s": draw(none | numbers("horizon.ramp_s", low=max(0.02, 2 * period_s))),
         "limits.tilt_rad": tilt_rad,
@@ -106,21 +114,17 @@ def quadratic_values(draw: st.DrawFn) -> Values:
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(prefixes()),
     }
-    for angle in ("roll", "pitch"):
+    for angle in gains:
         feedback_s = draw(none | numbers(f"damping.{angle}_rate_feedback_s"))
-        gain = draw(numbers(f"model.{angle}_gain"))
-        largest = min(0.2, 0.999 * gain * tilt_rad)
         values |= {
             f"damping.{angle}_rate_feedback_s": feedback_s,
             f"model.{angle}_lag_s": draw(numbers(f"model.{angle}_lag_s", low=feedback_s + 0.001001)),
             f"model.{angle}_delay_s": draw(none | numbers(f"model.{angle}_delay_s", low=0.001)),
-            f"model.{angle}_gain": gain,
-            f"model.{angle}_trim_rad": draw(none | st.floats(-largest, largest)),
+            f"model.{angle}_gain": gains[angle],
+            f"model.{angle}_trim_rad": draw(none | st.floats(-largest_trim_rad, largest_trim_rad)),
         }
     trim_rad = max(abs(values["model.roll_trim_rad"]), abs(values["model.pitch_trim_rad"]))
-    per_tilt = values["model.acceleration_per_tilt"] = draw(numbers("model.acceleration_per_tilt"))
-    tilted_rad = min(values["model.roll_gain"], values["model.pitch_gain"]) * tilt_rad
-    values |= draw(limits(tilt_rad, 9.81 * per_tilt * (tilted_rad - trim_rad)))
+    values |= draw(limits(tilt_rad, 9.81 * per_tilt * ((gain * tilt_rad) - trim_rad)))
     for name in ("model.drag_1_s", "observer.age_s", "cost.velocity_weight_s"):
         values[name] = draw(none | numbers(name))
     settings = Settings.model_validate(nested(QUADRATIC))

@@ -44,7 +44,10 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     ffi = cffi.FFI()
     ffi.cdef(with_prefix(_DECLARATIONS, prefix))
     opened = ffi.dlopen(str(folder / "bundle.so"))
-    absent = {"_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"}
+    if settings.cost.norm == "quadratic":
+        absent = {"_host_set_weights"}
+    else:
+        absent = {"_host_set_command", "_host_last_disturbance"}
     if method_of(settings).limiting is None:
         absent |= {"_host_set_limits"}
     if settings.guard is None:

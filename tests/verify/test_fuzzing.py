@@ -24,7 +24,7 @@ WHOLE = ("mambo", "table1")
 FAULTS = {
     "a clamp removed": (
         "nmpc.c",
-        "clamp(command->roll_rad, NMPC_TILT_LIMIT_RAD)",
+        "clamp(command->roll_rad, tilt_limit(self))",
         "command->roll_rad",
     ),
     "NaN passes": (

@@ -30,7 +30,7 @@ UNPROVEN = {
     "NaN passes a range check": Fault(
         "refuse_nan",
         NAN_PASSES,
-        Alarm(CONTROLLER, "self->command_rad[0] = roll_rad;", "mem_access"),
+        Alarm(DRIVER, "step_refuses_nan", "user assertion"),
     ),
     "the heading goes unchecked": Fault(
         "refuse_nan",
