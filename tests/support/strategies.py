@@ -114,13 +114,13 @@ def quadratic_values(draw: st.DrawFn) -> Values:
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(prefixes()),
     }
-    for angle in gains:
+    for angle, its_gain in gains.items():
         feedback_s = draw(none | numbers(f"damping.{angle}_rate_feedback_s"))
         values |= {
             f"damping.{angle}_rate_feedback_s": feedback_s,
             f"model.{angle}_lag_s": draw(numbers(f"model.{angle}_lag_s", low=feedback_s + 0.001001)),
             f"model.{angle}_delay_s": draw(none | numbers(f"model.{angle}_delay_s", low=0.001)),
-            f"model.{angle}_gain": gains[angle],
+            f"model.{angle}_gain": its_gain,
             f"model.{angle}_trim_rad": draw(none | st.floats(-largest_trim_rad, largest_trim_rad)),
         }
     trim_rad = max(abs(values["model.roll_trim_rad"]), abs(values["model.pitch_trim_rad"]))
