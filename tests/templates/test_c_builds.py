@@ -223,7 +223,8 @@ def variants_differ(folder: Path, right: str = "", wrong: str = "") -> str:
     functions = re.findall(r"^NMPC_INLINE \w+(?: \w+)* (\w+)\(", text, re.MULTILINE)
     assert {"within", "reaches", "absolute", "lowest_set_bit"} <= {*functions}
     plain = re.sub(rf"\b({'|'.join(functions)})\(", r"plain_\1(", text)
-    (folder / "plain.h").write_text(plain.replace("__GNUC__", "OTHER_COMPILER"), "utf-8")
+    plain = plain.replace("__GNUC__", "OTHER_COMPILER").replace("NMPC_TRAILING", "PLAIN_TRAILING")
+    (folder / "plain.h").write_text(plain, "utf-8")
     assert right in text
     (folder / "functions.h").write_text(text.replace(right, wrong), "utf-8")
     flags = ["-std=c11", "-O3", "-Wall", "-Werror", "-I."]
