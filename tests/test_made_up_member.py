@@ -13,9 +13,9 @@ import pytest
 from tests.support.tools import toolchain
 
 ROWS = """
-from mambo_codegen.port import tables
+from mambo_codegen.port import taken
 from mambo_codegen.port.row import WHOLE, CHANCE, Draw, PortRow
-tables.TAKEN["target"] += (
+taken.TAKEN["target"] += (
     PortRow("swirl_1_s", "factor", "made up", 2, draw=Draw("SWIRL_1_S", 0.5),
         told=(("swirl_x", "x"), ("swirl_y", "y"))),
     PortRow("known", "whole", "made up", kind=WHOLE, draw=CHANCE),

@@ -2041,14 +2041,14 @@ nmpc_real_t nmpc_slew_heading(nmpc_real_t previous_rad, nmpc_real_t wanted_rad, 
 #define NMPC_VELOCITY_SCALE 8.388608e+06f
 #define NMPC_ANGLE_SCALE 3.3554432e+07f
 #define NMPC_YAW_SCALE 1.048576e+06f
+#define NMPC_BRAKING_SCALE 3.3554432e+07f
 #define NMPC_THRUST_SCALE 3.3554432e+07f
 #define NMPC_ANGLE_UNIT 2.9802322e-08f
-#define NMPC_YAW_UNIT 9.536743e-07f
-#define NMPC_POSITION_UNIT 3.8146973e-06f
 #define NMPC_VELOCITY_UNIT 1.1920929e-07f
-#define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
-#define NMPC_BRAKING_SCALE 3.3554432e+07f
 #define NMPC_BRAKING_UNIT 2.9802322e-08f
+#define NMPC_POSITION_UNIT 3.8146973e-06f
+#define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
+#define NMPC_YAW_UNIT 9.536743e-07f
 
 /* Axes along which a frame jumps. */
 #define NMPC_AXES 2
@@ -2078,6 +2078,82 @@ static nmpc_real_t quantize(float value, float scale)
     return number;
 }
 
+/* All numbers of a record from floats, and below to floats. */
+static void quantize_state(const nmpc_float_state_t *given, nmpc_state_t *fixed)
+{
+    fixed->position_m[0] = quantize(given->position_m[0], NMPC_POSITION_SCALE);
+    fixed->position_m[1] = quantize(given->position_m[1], NMPC_POSITION_SCALE);
+    fixed->velocity_m_s[0] = quantize(given->velocity_m_s[0], NMPC_VELOCITY_SCALE);
+    fixed->velocity_m_s[1] = quantize(given->velocity_m_s[1], NMPC_VELOCITY_SCALE);
+    fixed->roll_rad = quantize(given->roll_rad, NMPC_ANGLE_SCALE);
+    fixed->pitch_rad = quantize(given->pitch_rad, NMPC_ANGLE_SCALE);
+    fixed->yaw_rad = quantize(given->yaw_rad, NMPC_YAW_SCALE);
+}
+
+static void quantize_target(const nmpc_float_target_t *given, nmpc_target_t *fixed)
+{
+    fixed->position_m[0] = quantize(given->position_m[0], NMPC_POSITION_SCALE);
+    fixed->position_m[1] = quantize(given->position_m[1], NMPC_POSITION_SCALE);
+    fixed->velocity_m_s[0] = quantize(given->velocity_m_s[0], NMPC_VELOCITY_SCALE);
+    fixed->velocity_m_s[1] = quantize(given->velocity_m_s[1], NMPC_VELOCITY_SCALE);
+}
+
+static void quantize_command(const nmpc_float_command_t *given, nmpc_command_t *fixed)
+{
+    fixed->roll_rad = quantize(given->roll_rad, NMPC_ANGLE_SCALE);
+    fixed->pitch_rad = quantize(given->pitch_rad, NMPC_ANGLE_SCALE);
+}
+
+static void quantize_limits(const nmpc_float_limits_t *given, nmpc_limits_t *fixed)
+{
+    fixed->speed_m_s = quantize(given->speed_m_s, NMPC_VELOCITY_SCALE);
+    fixed->braking_m_s2 = quantize(given->braking_m_s2, NMPC_BRAKING_SCALE);
+    fixed->fence_min_m[0] = quantize(given->fence_min_m[0], NMPC_POSITION_SCALE);
+    fixed->fence_min_m[1] = quantize(given->fence_min_m[1], NMPC_POSITION_SCALE);
+    fixed->fence_max_m[0] = quantize(given->fence_max_m[0], NMPC_POSITION_SCALE);
+    fixed->fence_max_m[1] = quantize(given->fence_max_m[1], NMPC_POSITION_SCALE);
+    fixed->tilt_rad = quantize(given->tilt_rad, NMPC_ANGLE_SCALE);
+}
+
+static void in_si_command(const nmpc_command_t *fixed, nmpc_float_command_t *given)
+{
+    given->roll_rad = (float)fixed->roll_rad * NMPC_ANGLE_UNIT;
+    given->pitch_rad = (float)fixed->pitch_rad * NMPC_ANGLE_UNIT;
+}
+
+static void in_si_estimate(const nmpc_estimate_t *fixed, nmpc_float_estimate_t *given)
+{
+    given->position_m[0] = (float)fixed->position_m[0] * NMPC_POSITION_UNIT;
+    given->position_m[1] = (float)fixed->position_m[1] * NMPC_POSITION_UNIT;
+    given->velocity_m_s[0] = (float)fixed->velocity_m_s[0] * NMPC_VELOCITY_UNIT;
+    given->velocity_m_s[1] = (float)fixed->velocity_m_s[1] * NMPC_VELOCITY_UNIT;
+    given->disturbance_m_s2[0] = (float)fixed->disturbance_m_s2[0] * NMPC_DISTURBANCE_UNIT;
+    given->disturbance_m_s2[1] = (float)fixed->disturbance_m_s2[1] * NMPC_DISTURBANCE_UNIT;
+    given->is_valid = fixed->is_valid;
+}
+
+/* The nearest float that is not larger in magnitude, so that nmpc_float_set_limits() accepts what it is a limit of. */
+static float shrink(nmpc_real_t number, float unit)
+{
+    float value = (float)number;
+
+    if ((number > 0) ? ((nmpc_real_t)value > number) : ((nmpc_real_t)value < number)) {
+        value = value * 0.9999999f;
+    }
+    return value * unit;
+}
+
+static void shrink_limits(const nmpc_limits_t *fixed, nmpc_float_limits_t *given)
+{
+    given->speed_m_s = shrink(fixed->speed_m_s, NMPC_VELOCITY_UNIT);
+    given->braking_m_s2 = shrink(fixed->braking_m_s2, NMPC_BRAKING_UNIT);
+    given->fence_min_m[0] = shrink(fixed->fence_min_m[0], NMPC_POSITION_UNIT);
+    given->fence_min_m[1] = shrink(fixed->fence_min_m[1], NMPC_POSITION_UNIT);
+    given->fence_max_m[0] = shrink(fixed->fence_max_m[0], NMPC_POSITION_UNIT);
+    given->fence_max_m[1] = shrink(fixed->fence_max_m[1], NMPC_POSITION_UNIT);
+    given->tilt_rad = shrink(fixed->tilt_rad, NMPC_ANGLE_UNIT);
+}
+
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command)
 {
@@ -2093,22 +2169,12 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
     if ((state == NULL) || (target == NULL)) {
         status = nmpc_step(self, NULL, NULL, 0, &fixed_command);
     } else {
-        int axis;
-
-        for (axis = 0; axis < 2; axis++) {
-            fixed_state.position_m[axis] = quantize(state->position_m[axis], NMPC_POSITION_SCALE);
-            fixed_state.velocity_m_s[axis] = quantize(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-            fixed_target.position_m[axis] = quantize(target->position_m[axis], NMPC_POSITION_SCALE);
-            fixed_target.velocity_m_s[axis] = quantize(target->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-        }
-        fixed_state.roll_rad = quantize(state->roll_rad, NMPC_ANGLE_SCALE);
-        fixed_state.pitch_rad = quantize(state->pitch_rad, NMPC_ANGLE_SCALE);
-        fixed_state.yaw_rad = quantize(state->yaw_rad, NMPC_YAW_SCALE);
+        quantize_state(state, &fixed_state);
+        quantize_target(target, &fixed_target);
         status = nmpc_step(self, &fixed_state, &fixed_target, quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE),
                            &fixed_command);
     }
-    command->roll_rad = (float)fixed_command.roll_rad * NMPC_ANGLE_UNIT;
-    command->pitch_rad = (float)fixed_command.pitch_rad * NMPC_ANGLE_UNIT;
+    in_si_command(&fixed_command, command);
     return status;
 }
 
@@ -2120,8 +2186,7 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
         return NMPC_NULL_POINTER;
     }
 
-    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
-    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
+    quantize_command(command, &fixed_command);
     return nmpc_reset(self, &fixed_command);
 }
 
@@ -2133,75 +2198,43 @@ nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *c
         return NMPC_NULL_POINTER;
     }
 
-    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
-    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
+    quantize_command(command, &fixed_command);
     return nmpc_set_command(self, &fixed_command);
 }
 
 nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate)
 {
     nmpc_estimate_t fixed_estimate;
-    int axis;
 
     if ((estimate == NULL) || (nmpc_last_estimate(self, &fixed_estimate) != NMPC_OK)) {
         return NMPC_NULL_POINTER;
     }
 
-    for (axis = 0; axis < 2; axis++) {
-        estimate->position_m[axis] = (float)fixed_estimate.position_m[axis] * NMPC_POSITION_UNIT;
-        estimate->velocity_m_s[axis] = (float)fixed_estimate.velocity_m_s[axis] * NMPC_VELOCITY_UNIT;
-        estimate->disturbance_m_s2[axis] = (float)fixed_estimate.disturbance_m_s2[axis] * NMPC_DISTURBANCE_UNIT;
-    }
-    estimate->is_valid = fixed_estimate.is_valid;
+    in_si_estimate(&fixed_estimate, estimate);
     return NMPC_OK;
-}
-
-/* The nearest float that is not larger in magnitude, so that nmpc_float_set_limits() accepts what it is a limit of. */
-static float shrink(nmpc_real_t number, float unit)
-{
-    float value = (float)number;
-
-    if ((number > 0) ? ((nmpc_real_t)value > number) : ((nmpc_real_t)value < number)) {
-        value = value * 0.9999999f;
-    }
-    return value * unit;
 }
 
 void nmpc_float_default_limits(nmpc_float_limits_t *limits)
 {
     nmpc_limits_t fixed_limits;
-    int axis;
 
     if (limits == NULL) {
         return;
     }
 
     nmpc_default_limits(&fixed_limits);
-    limits->speed_m_s = shrink(fixed_limits.speed_m_s, NMPC_VELOCITY_UNIT);
-    limits->braking_m_s2 = (float)fixed_limits.braking_m_s2 * NMPC_BRAKING_UNIT;
-    for (axis = 0; axis < 2; axis++) {
-        limits->fence_min_m[axis] = shrink(fixed_limits.fence_min_m[axis], NMPC_POSITION_UNIT);
-        limits->fence_max_m[axis] = shrink(fixed_limits.fence_max_m[axis], NMPC_POSITION_UNIT);
-    }
-    limits->tilt_rad = shrink(fixed_limits.tilt_rad, NMPC_ANGLE_UNIT);
+    shrink_limits(&fixed_limits, limits);
 }
 
 nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *limits)
 {
     nmpc_limits_t fixed_limits;
-    int axis;
 
     if (limits == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    fixed_limits.speed_m_s = quantize(limits->speed_m_s, NMPC_VELOCITY_SCALE);
-    fixed_limits.braking_m_s2 = quantize(limits->braking_m_s2, NMPC_BRAKING_SCALE);
-    for (axis = 0; axis < 2; axis++) {
-        fixed_limits.fence_min_m[axis] = quantize(limits->fence_min_m[axis], NMPC_POSITION_SCALE);
-        fixed_limits.fence_max_m[axis] = quantize(limits->fence_max_m[axis], NMPC_POSITION_SCALE);
-    }
-    fixed_limits.tilt_rad = quantize(limits->tilt_rad, NMPC_ANGLE_SCALE);
+    quantize_limits(limits, &fixed_limits);
     return nmpc_set_limits(self, &fixed_limits);
 }
 

@@ -47,7 +47,11 @@ def part(settings: Settings) -> TiltGain:
 
 def state(**tilts_m_step2: float) -> TiltGainState:
     """Return means, 0 but for those that are given, and a gain of 1."""
-    values = dict.fromkeys(("quick", "slow", "seen_quick", "seen_slow"), 0.0) | {"gain": 1.0} | tilts_m_step2
+    values = (
+        dict.fromkeys(("quick_m_step2", "slow_m_step2", "seen_quick_m_step2", "seen_slow_m_step2"), 0.0)
+        | {"gain": 1.0}
+        | tilts_m_step2
+    )
     return TiltGainState(**{name: np.full((1, 2), value) for name, value in values.items()})
 
 
@@ -67,14 +71,14 @@ def test_the_means_are_low_passes_of_4_and_half_a_rad_per_second() -> None:
     step_s, found = LEVEL.horizon.update_period_s, state()
     for _ in range(round(2.0 / step_s)):
         found = learnt(found, 1e-6, 2e-6)
-    assert found.slow[0] == pytest.approx(1e-6 * (1 - math.exp(-1.0)))
-    assert found.quick[0] == pytest.approx(1e-6 * (1 - math.exp(-8.0)))
-    assert found.seen_slow[0] == pytest.approx(2 * found.slow[0])
-    assert found.seen_quick[0] == pytest.approx(2 * found.quick[0])
+    assert found.slow_m_step2[0] == pytest.approx(1e-6 * (1 - math.exp(-1.0)))
+    assert found.quick_m_step2[0] == pytest.approx(1e-6 * (1 - math.exp(-8.0)))
+    assert found.seen_slow_m_step2[0] == pytest.approx(2 * found.slow_m_step2[0])
+    assert found.seen_quick_m_step2[0] == pytest.approx(2 * found.quick_m_step2[0])
     swings = []
     for k in range(3000):
         found = learnt(found, 1e-6 * math.sin(4.0 * k * step_s), 0.0)
-        swings.append(found.quick[0, 0])
+        swings.append(found.quick_m_step2[0, 0])
     assert max(swings[-500:]) == pytest.approx(1e-6 / math.sqrt(2), rel=0.03)
 
 
@@ -85,7 +89,7 @@ def test_an_error_changes_the_gain_by_its_size(seen_m_s2: float, rate_1_s: float
     learnt = learning()
     step_s = LEVEL.horizon.update_period_s
     unit = sign * step_s**2
-    steady = {"quick": 2.0 * unit, "seen_quick": seen_m_s2 * unit}
+    steady = {"quick_m_step2": 2.0 * unit, "seen_quick_m_step2": seen_m_s2 * unit}
     found = learnt(state(**steady), 2.0 * unit, seen_m_s2 * unit)
     assert found.gain - 1.0 == pytest.approx(np.full((1, 2), rate_1_s * step_s), rel=0.02)
 
@@ -113,12 +117,12 @@ def test_little_is_no_reason_to_learn_nor_is_a_command_at_the_limit() -> None:
         (2.0, 0.451, False),
         (2.0, -0.451, False),
     ):
-        steady = {"quick": model * unit, "seen_quick": 2 * model * unit}
+        steady = {"quick_m_step2": model * unit, "seen_quick_m_step2": 2 * model * unit}
         found = learnt(state(**steady), model * unit, 2 * model * unit, command_rad)
         assert (found.gain[0, 0] != 1.0) == learns, (model, command_rad)
-    wide = learnt(state(quick=2 * unit, gain=1.5), 2 * unit, 0.0, 0.31)
+    wide = learnt(state(quick_m_step2=2 * unit, gain=1.5), 2 * unit, 0.0, 0.31)
     assert wide.gain.tolist() == [[1.5, 1.5]]
-    assert learnt(state(quick=2 * unit, gain=1.5), 2 * unit, 0.0, 0.29).gain[0, 0] < 1.5
+    assert learnt(state(quick_m_step2=2 * unit, gain=1.5), 2 * unit, 0.0, 0.29).gain[0, 0] < 1.5
 
 
 def test_what_is_sent_and_what_is_meant_are_inverse() -> None:
@@ -176,7 +180,7 @@ def test_on_the_floor_and_without_a_state_nothing_is_learnt() -> None:
         found.step(seen, target)
     after = found.memory.tilt_gain
     assert after.gain.tolist() == gain.tolist()
-    assert after.seen_quick.tolist() == after.seen_slow.tolist()
+    assert after.seen_quick_m_step2.tolist() == after.seen_slow_m_step2.tolist()
     found.shift(np.array([[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5]]))
     assert _numbers(found.memory.tilt_gain) == _numbers(after)
     found.reset(np.array([[0.0, 0.0, 9.81]]))

@@ -38,7 +38,7 @@ from mambo_codegen.numbers.representation import (
 )
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.port.row import AIM, BESIDE, CHANCE
-from mambo_codegen.port.tables import TAKEN
+from mambo_codegen.port.taken import TAKEN
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 

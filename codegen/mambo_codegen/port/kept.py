@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from mambo_codegen.port.row import BYTE, SUM, PortRow
+from mambo_codegen.port.row import BYTE, SUM, PortRow, Table
 
 BOUNDS: Final = (
     PortRow("centre_m", "position", "of the fence, x and y", 2),
@@ -177,3 +177,35 @@ ONE_NORM: Final = (
     ),
     PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", when=("limits",), kind=BYTE),
 )
+
+KEPT: Final[dict[str, Table]] = {
+    "quadratic": {
+        "observer": OBSERVER,
+        "attitude": ATTITUDE,
+        "tilt_gain": TILT_GAIN,
+        "noise": NOISE,
+        "tracker": TRACKER,
+        "height": HEIGHT,
+        "bounds": BOUNDS,
+        "controller": QUADRATIC,
+    },
+    "1-norm": {
+        "rollout": ROLLOUT,
+        "tracker": STEP_TRACKER,
+        "prediction": PREDICTION,
+        "bounds": BOUNDS,
+        "controller": ONE_NORM,
+    },
+}
+"""What it keeps, by `cost.norm`."""
+
+WORDS: Final = {
+    "observer": "Estimates along x and y, by the observer of nmpc.c.",
+    "attitude": "The attitude model of nmpc.c along right and forward, the axes of the heading.",
+    "tilt_gain": "The gain of the tilt, of roll and pitch, by the chapter of nmpc.c.",
+    "noise": "Noise of the target's motion along an axis, by the tracker of nmpc.c.",
+    "tracker": "The target's motion along x and y, by the tracker of nmpc.c.",
+    "height": "The height, by the chapter of nmpc.c.",
+    "bounds": "What follows from the limits, for the law in nmpc.c.",
+}
+"""What nmpc.h says of each record that a controller with a quadratic cost keeps."""

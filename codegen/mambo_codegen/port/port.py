@@ -1,12 +1,13 @@
 """The port of one controller: the rows of the table that its settings leave, as the lists others read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
-from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, PortRow
-from mambo_codegen.port.tables import KEPT, MACROS, TAKEN, WORDS, Table
+from mambo_codegen.port.kept import KEPT, WORDS
+from mambo_codegen.port.row import NUMBER, RANGES, WHOLE, Number, PortRow, Table
+from mambo_codegen.port.taken import MACROS, TAKEN
 
 _CHECKED: Final = ("state", "target")
 """The records whose comments tell the ranges."""
@@ -103,6 +104,11 @@ class ControllerPort:
     def quantities(self, record: str) -> tuple[str, ...]:
         """Return the quantity of each number of a record."""
         return tuple(number.quantity for number in self.numbers(record))
+
+    def distinct(self, records: Iterable[str], *others: str) -> list[str]:
+        """Return the quantities of the numbers of records, and others, each once."""
+        found = [one.quantity for record in records for one in self.reals(record)]
+        return [*dict.fromkeys([*found, *others])]
 
     def step_row(self, *, wholes: bool = True) -> tuple[StepNumber, ...]:
         """Return the inputs of a step in one row: state and target, the thrust before what of it is optional.

@@ -99,6 +99,11 @@ class Number:
         return self.row.quantity
 
     @property
+    def is_whole(self) -> bool:
+        """Whether it is an integer, which has no format."""
+        return self.row.kind == WHOLE
+
+    @property
     def told(self) -> tuple[str, str]:
         """Name and description of a variable; without any in the row made of the member's and its words."""
         if self.row.told:
@@ -110,3 +115,7 @@ class Number:
     def range(self) -> str:
         """Its largest magnitude in C if a controller takes it; none of what has no range."""
         return RANGES.get(self.row.quantity, "")
+
+
+Table = dict[str, tuple[PortRow, ...]]
+"""The rows of each record, nmpc_NAME_t in C; `controller` is nmpc_t."""

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Final
 
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, PortRow
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, PortRow, Table
 
 _HEIGHT: Final = ("height",)
 _TILT: Final = Draw("ATTITUDE_RAD", 0.8)
@@ -228,3 +228,24 @@ WEIGHTS: Final = (
         told=(("effort_weight", "lambda2, eq 12"),),
     ),
 )
+
+TAKEN: Final[Table] = {
+    "state": STATE,
+    "target": TARGET,
+    "command": COMMAND,
+    "estimate": ESTIMATE,
+    "limits": LIMITS,
+    "weights": WEIGHTS,
+}
+"""The records that a controller takes and gives, whatever its method, by name."""
+
+MACROS: Final = {
+    "given": ("NMPC_HAS_TARGET_ACCELERATION", "nmpc_target_t has the member acceleration_m_s2"),
+    "guard": ("NMPC_HAS_GUARD", "there is nmpc_set_position_measured()"),
+    "tilt_gain": ("NMPC_HAS_TILT_GAIN", "nmpc_estimate_t has the members roll_gain and pitch_gain"),
+    "height": (
+        "NMPC_HAS_HEIGHT",
+        "states and targets have a height, commands a thrust, which nmpc_step() does not take",
+    ),
+}
+"""How nmpc.h says that a part is there on which its functions and structs depend, and what that means."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from mambo_codegen.port.port import ControllerPort
 from mambo_codegen.port.row import PortRow
-from mambo_codegen.port.tables import TAKEN
+from mambo_codegen.port.taken import TAKEN
 
 
 def _placed(record: str) -> dict[str, slice]:

@@ -164,6 +164,14 @@ class AttitudeModel:
             cosine=cosine,
         )
 
+    def turn_to_world(self, attitude: AttitudeState, heading: Real) -> Real:
+        """Return vectors (n, 2) along x and y from those along right and forward."""
+        return self._products.turn(heading[:, ::-1], attitude.sine, attitude.cosine)
+
+    def turn_to_heading(self, attitude: AttitudeState, world: Real) -> Real:
+        """Return vectors (n, 2) along right and forward from those along x and y."""
+        return self._products.turn(world[:, ::-1], attitude.sine, attitude.cosine)
+
     def shift(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
         """Turn the frame by the angles of sine and cosine (n,), and leave the axes of the body in it."""
         before, products = (attitude.sine, attitude.cosine), self._products

@@ -82,7 +82,7 @@ class QuadraticConstants(Constants):
         model, feedback = self.settings.model, self.feedback_steps or (0.0, 0.0)
         return super().presence | {
             "age": bool(self.observer.age_steps),
-            "confine": self.has_height or self.learns_tilt_gain,
+            "confine": self.has_height or self.tilt_gain is not None,
             "drag": bool(self.observer.drag_1_step),
             "lift": self.height is not None and self.height.learns_acceleration,
             "pitch_feedback": feedback[1] != 0,
@@ -93,6 +93,7 @@ class QuadraticConstants(Constants):
             "roll_trim": model.roll_trim_rad != 0,
             "shift": True,
             "thrust_gain": self.height is not None and self.height.learns_gain,
+            "tilt_gain": self.tilt_gain is not None,
             "two_moves": self.law.moves == 2,
         }
 

@@ -1,23 +1,19 @@
 """Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.height import HeightBounds
-from mambo_codegen.methods.quadratic.observer import Estimate
-from mambo_codegen.methods.quadratic.step import CheckedInputs, ControlStep, QuadraticMemory
-from mambo_codegen.methods.quadratic.tilt_gain import unknown_gain
+from mambo_codegen.methods.quadratic.step import CheckedInputs, ControlStep
 from mambo_codegen.methods.shared.inputs import Inputs, Rows, Status, choose, within
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsMemory
 from mambo_codegen.methods.shared.limits_constants import LIMITS
 from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.methods.shared.tracker import unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, THRUST
+from mambo_codegen.port.row import BYTE, NUMBER
 
 _AIMED_ELSEWHERE = int(ActiveLimit.SPEED | ActiveLimit.BRAKING | ActiveLimit.FENCE)
 """Limits with which no position error counts."""
@@ -56,7 +52,7 @@ class QuadraticController:
         self.scalar = self._numbers.scalar
         defaults = np.repeat(self._limits.defaults, n, axis=0)
         bounds = self._height.bounds(defaults[:, len(LIMITS) :])
-        self.memory = self._restarted(self._height.hover(n), self._limited(defaults), bounds)
+        self.memory = self.parts.restarted(self._height.hover(n), self._limited(defaults), bounds)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Forget everything; the drones hold the attitudes of `command_rad` (n, 2), clamped to the limit.
@@ -66,7 +62,7 @@ class QuadraticController:
         """
         given, good = self._command(command_rad)
         memory = self.memory
-        self.memory = choose(good, self._restarted(given, memory.limits, memory.height_bounds), memory)
+        self.memory = choose(good, self.parts.restarted(given, memory.limits, memory.height_bounds), memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
@@ -75,17 +71,7 @@ class QuadraticController:
         Returns a status (n,) as `reset` does.
         """
         given, good = self._command(command_rad)
-        memory = self.memory
-        height = self._height.set_command(memory.height, given[:, 2:])
-        attitude = self._model.change_command(
-            memory.attitude,
-            memory.command_rad,
-            given[:, 0:2],
-            self._height.command_weight(height),
-            memory.tilt_gain.gain if self.parts.tilt_gain else None,
-        )
-        new = replace(memory, command_rad=given[:, 0:2], attitude=attitude, height=height)
-        self.memory = choose(good, new, memory)
+        self.memory = choose(good, self.parts.set_command(self.memory, given), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
@@ -178,40 +164,10 @@ class QuadraticController:
         angles = clamp(given[:, 0:2], self.memory.limits.bounds.tilt_rad[:, None])
         return np.column_stack([angles, self._height.limited(given[:, 2:])]), good
 
-    def _restarted(self, command: Real, limits: LimitsMemory, height_bounds: HeightBounds) -> QuadraticMemory:
-        """Return the memory of controllers that hold commands (n, 2), with a height (n, 3)."""
-        command_rad = command[:, 0:2]
-        n, zeros = len(command_rad), np.zeros_like(command_rad)
-        height = self._height.steady(command[:, 2:], self.parts.commanded_share(command_rad))
-        return QuadraticMemory(
-            estimate=Estimate(zeros, zeros, zeros),
-            attitude=self._model.steady(command_rad, self._height.command_weight(height)),
-            target=unknown_motion(zeros),
-            limits=replace(limits, active=np.zeros_like(limits.active)),
-            tilt_rad=zeros,
-            command_rad=command_rad,
-            missed=np.full(n, self.parts.at_rest),
-            height=height,
-            height_bounds=height_bounds,
-            budget_rad=np.full_like(command_rad, budget.full)
-            if (budget := self.parts.tilt_budget)
-            else zeros,
-            is_coarse=np.zeros(n, np.bool_),
-            tilt_gain=unknown_gain(zeros, self._numbers.constant(1.0, "factor")),
-        )
-
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
-        limits, command = self.memory.limits, self.memory.command_rad
-        limit, learnt = limits.command_limit, self.parts.tilt_gain
-        if learnt is not None:
-            share = learnt.share(self.memory.tilt_gain)
-            limit = self.parts.products.factor_product(limit, share)
-        sent = partial(learnt.sent, self.memory.tilt_gain) if learnt else None
-        most, least = self._model.largest_commands(limit, limits.bounds.tilt_rad, sent)
-        is_largest = (command >= most) | (command <= least)
-        return np.asarray(np.any(is_largest, axis=1))
+        return self.parts.saturated(self.memory)
 
     @property
     def outcome(self) -> dict[str, NDArray[Any]]:
@@ -230,13 +186,13 @@ class QuadraticController:
     def last_estimate(self) -> Real:
         """All numbers of nmpc_estimate_t (n, k), in their order and in the numbers of the C."""
         memory, products = self.memory, self.parts.products
-        estimate, learnt = memory.estimate, self.parts.tilt_gain
+        estimate = memory.estimate
         columns = [
             estimate.position_m,
             products.per_step_product(estimate.velocity_m_step),
             products.per_step2_product(estimate.disturbance_m_step2),
             *self._height.estimate(memory.height),
-            *([memory.tilt_gain.gain] if learnt else []),
+            *self.parts.learnt(memory),
         ]
         return np.concatenate(columns, axis=1)
 
@@ -269,17 +225,25 @@ class QuadraticController:
     @property
     def stored(self) -> Real:
         """All numbers of nmpc_t (n, k), in their order and in the numbers of the C."""
-        memory = self.memory
-        estimate, attitude, motion = memory.estimate, memory.attitude, memory.target
-        columns = [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2]
-        columns += [attitude.tilt, attitude.integral, attitude.lagged, attitude.command]
-        columns += [attitude.sine[:, None], attitude.cosine[:, None]]
-        if self.parts.tilt_gain is not None:
-            columns += self.parts.tilt_gain.stored(memory.tilt_gain)
-        columns += self.parts.tracker.stored(motion) if self.parts.tracker else []
-        columns += [*self._height.stored(memory.height), self.stored_limits]
-        if self._constants.feedback_steps is not None:
-            columns += [memory.tilt_rad]
-        if self._constants.guard is not None:
-            columns += [memory.budget_rad]
-        return np.concatenate([*columns, memory.command_rad], axis=1)
+        memory, port = self.memory, self._constants.port
+        estimate, attitude = memory.estimate, memory.attitude
+        of_records = {
+            "observer": [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2],
+            "attitude": [
+                *(attitude.tilt, attitude.integral, attitude.lagged, attitude.command),
+                *(attitude.sine[:, None], attitude.cosine[:, None]),
+            ],
+            "tracker": self.parts.tracker.stored(memory.target) if self.parts.tracker else [],
+            "height": self._height.stored(memory.height),
+            "bounds": [self.stored_limits],
+        }
+        columns: list[Real] = []
+        for row in port.rows("controller"):
+            if row.member in of_records:
+                columns += of_records[row.member]
+            elif row.kind == NUMBER:
+                columns.append(getattr(memory, row.member))
+            elif row.kind != BYTE:
+                state = getattr(memory, row.member)
+                columns += [getattr(state, one.member) for one in port.rows(row.kind)]
+        return np.concatenate(columns, axis=1)

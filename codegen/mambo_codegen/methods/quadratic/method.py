@@ -208,7 +208,7 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
     tells_noise = constants.tracker is not None and constants.tracker.noise is not None
-    learns = constants.learns_tilt_gain
+    learns = constants.tilt_gain is not None
     wanted = {
         "speed_product": True,
         **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),

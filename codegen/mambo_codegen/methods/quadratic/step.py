@@ -1,6 +1,7 @@
 """Step: a control step from checked inputs to the next command, in the order of its chapter in nmpc.c."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, Hei
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
-from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState
+from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState, unknown_gain
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory
 from mambo_codegen.methods.shared.math import Real, clamp
@@ -161,6 +162,45 @@ class ControlStep:
         commanded = self._command(memory, seen, aim)
         return self._predict(memory, inputs, seen, aim, commanded)
 
+    def restarted(self, command: Real, limits: LimitsMemory, height_bounds: HeightBounds) -> QuadraticMemory:
+        """Return the memory of controllers that hold commands (n, 2), with a height (n, 3)."""
+        command_rad = command[:, 0:2]
+        n, zeros = len(command_rad), np.zeros_like(command_rad)
+        height = self.height.steady(command[:, 2:], self.commanded_share(command_rad))
+        full = self.tilt_budget.full if self.tilt_budget else 0
+        return QuadraticMemory(
+            estimate=Estimate(zeros, zeros, zeros),
+            attitude=self.model.steady(command_rad, self.height.command_weight(height)),
+            target=unknown_motion(zeros),
+            limits=replace(limits, active=np.zeros_like(limits.active)),
+            tilt_rad=zeros,
+            command_rad=command_rad,
+            missed=np.full(n, self.at_rest),
+            height=height,
+            height_bounds=height_bounds,
+            budget_rad=np.full_like(command_rad, full),
+            is_coarse=np.zeros(n, np.bool_),
+            tilt_gain=unknown_gain(zeros, self.products.numbers.constant(1.0, "factor")),
+        )
+
+    def set_command(self, memory: QuadraticMemory, command: Real) -> QuadraticMemory:
+        """Return the memory after commands (n, 2), with a height (n, 3), were sent in place of the last."""
+        height = self.height.set_command(memory.height, command[:, 2:])
+        weight = self.height.command_weight(height)
+        attitude = self._told(memory, memory.attitude, memory.command_rad, command[:, 0:2], weight)
+        return replace(memory, command_rad=command[:, 0:2], attitude=attitude, height=height)
+
+    def learnt(self, memory: QuadraticMemory) -> list[Real]:
+        """Return what the estimate tells of the drone (n, k) beside its motion and its lift."""
+        return [memory.tilt_gain.gain] if self.tilt_gain else []
+
+    def saturated(self, memory: QuadraticMemory) -> Rows:
+        """Return whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
+        limits, sent = memory.limits, partial(self._sent, memory) if self.tilt_gain else None
+        limit = self._learnt_limit(memory, limits.command_limit)
+        most, least = self.model.largest_commands(limit, limits.bounds.tilt_rad, sent)
+        return np.asarray(np.any((memory.command_rad >= most) | (memory.command_rad <= least), axis=1))
+
     def has_estimate(self, memory: QuadraticMemory) -> NDArray[np.bool_]:
         """Return whether there is an estimate (n,): not before the first good state and after an outage."""
         return memory.missed < self._no_estimate
@@ -199,7 +239,7 @@ class ControlStep:
         measured = self._measure_tilt(inputs, slope, lift)
         tilt = np.where(inputs.has_state[:, None], measured, attitude.tilt)
         tilt_gain = self._learn_tilt_gain(memory, inputs, none_yet, attitude.tilt, measured)
-        world = self._turn_to_world(attitude, tilt)
+        world = self.model.turn_to_world(attitude, tilt)
         estimate = self._correct_estimates(memory, inputs, none_yet, world)
         feedback_rad = self._measure_rates(memory, inputs)
         missed = self._count_missed(memory.missed, inputs.has_state)
@@ -336,14 +376,14 @@ class ControlStep:
         disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(seen.tilt)
         if self.tracker is not None:
             disturbance = disturbance - aim.motion.acceleration_m_step2
-            jerk = self._turn_to_heading(attitude, aim.motion.jerk_m_step2_update)
+            jerk = self.model.turn_to_heading(attitude, aim.motion.jerk_m_step2_update)
         errors = (
             estimate.position_m - aim.target[:, 0:2],
             estimate.velocity_m_step - self.products.speed_product(aim.target[:, 2:4]),
             disturbance,
         )
         state = [
-            *(self._turn_to_heading(attitude, error) for error in errors),
+            *(self.model.turn_to_heading(attitude, error) for error in errors),
             jerk,
             attitude.tilt if self._is_predicted else seen.tilt,
             attitude.integral,
@@ -358,10 +398,8 @@ class ControlStep:
 
     def _largest_move(self, memory: QuadraticMemory, aim: _Aim) -> tuple[Real, Real | None]:
         """Return the largest moves (n, 2), and what the thrust leaves to each, None if it does not count."""
-        limit, spare = aim.limits.command_limit, self.height.spare(aim.height)
-        if self.tilt_gain is not None:
-            limit = self.products.factor_product(limit, self.tilt_gain.share(memory.tilt_gain))
-        limit = self.model.weighed(limit, aim.weight)
+        spare = self.height.spare(aim.height)
+        limit = self.model.weighed(self._learnt_limit(memory, aim.limits.command_limit), aim.weight)
         if spare is None:
             return limit, None
         left = self.products.to_move(spare)[:, None]
@@ -370,7 +408,29 @@ class ControlStep:
     def _find_angles(self, memory: QuadraticMemory, attitude: AttitudeState, aim: _Aim) -> Real:
         """Return roll and pitch (n, 2) that stand for the commands of models."""
         angles_rad = self.model.command_rad(self.height.over_weight(attitude.command, aim.weight))
+        return self._sent(memory, angles_rad)
+
+    def _learnt_limit(self, memory: QuadraticMemory, limit: Real) -> Real:
+        """Return the largest moves (n, 2) of drones that tilt as learnt."""
+        if self.tilt_gain is None:
+            return limit
+        return self.products.factor_product(limit, self.tilt_gain.share(memory.tilt_gain))
+
+    def _sent(self, memory: QuadraticMemory, angles_rad: Real) -> Real:
+        """Return what is sent (n, 2) to drones that tilt as learnt for angles (n, 2) of the model."""
         return self.tilt_gain.sent(memory.tilt_gain, angles_rad) if self.tilt_gain else angles_rad
+
+    def _told(
+        self,
+        memory: QuadraticMemory,
+        model: AttitudeState,
+        asked_rad: Real,
+        sent_rad: Real,
+        weight: Real | None,
+    ) -> AttitudeState:
+        """Return models that know what was sent (n, 2) in place of what they asked for (n, 2)."""
+        gain = memory.tilt_gain.gain if self.tilt_gain else None
+        return self.model.change_command(model, asked_rad, sent_rad, weight, gain)
 
     def _limit_angles(self, memory: QuadraticMemory, angles_rad: Real, seen: _Observed) -> Real:
         """Return angles (n, 2) with rate feedback, within the tilt limit."""
@@ -387,8 +447,7 @@ class ControlStep:
             return moved, asked_rad, budget
         allowed, left = self.tilt_budget.spend(budget, memory.command_rad, asked_rad)
         command = clamp(allowed, memory.limits.bounds.tilt_rad[:, None])
-        gain = memory.tilt_gain.gain if self.tilt_gain else None
-        told = self.model.change_command(moved, asked_rad, command, aim.weight, gain)
+        told = self._told(memory, moved, asked_rad, command, aim.weight)
         moved = choose((command != asked_rad).any(axis=1), told, moved)
         return moved, command, np.where(aim.has_command[:, None], left, budget)
 
@@ -432,11 +491,3 @@ class ControlStep:
             is_coarse=memory.is_coarse,
             tilt_gain=memory.tilt_gain,
         )
-
-    def _turn_to_world(self, attitude: AttitudeState, heading: Real) -> Real:
-        """Return vectors (n, 2) along x and y from those along right and forward."""
-        return self.products.turn(heading[:, ::-1], attitude.sine, attitude.cosine)
-
-    def _turn_to_heading(self, attitude: AttitudeState, world: Real) -> Real:
-        """Return vectors (n, 2) along right and forward from those along x and y."""
-        return self.products.turn(world[:, ::-1], attitude.sine, attitude.cosine)

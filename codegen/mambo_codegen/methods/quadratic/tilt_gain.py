@@ -21,15 +21,17 @@ from mambo_codegen.methods.shared.math import Real, clamp, confine
 class TiltGainState:
     """The learnt gains of n controllers, (n, 2) each, roll and pitch; unused where none is learnt.
 
-    quick, slow: means of the model's acceleration, m/step^2.
-    seen_quick, seen_slow: the same of the measured tilt.
+    Its members are those of nmpc_tilt_gain_t.
+
+    quick_m_step2, slow_m_step2: means of the model's acceleration.
+    seen_quick_m_step2, seen_slow_m_step2: the same of the measured tilt.
     gain: learnt over that of the settings.
     """
 
-    quick: Real
-    slow: Real
-    seen_quick: Real
-    seen_slow: Real
+    quick_m_step2: Real
+    slow_m_step2: Real
+    seen_quick_m_step2: Real
+    seen_slow_m_step2: Real
     gain: Real
 
 
@@ -75,9 +77,12 @@ class TiltGain:
         command_rad (n, 2) was sent before; the tilt limits are (n, 1).
         """
         products = self._products
-        quick, slow = self._mean(self._quick, state.quick, model), self._mean(self._slow, state.slow, model)
-        seen_quick = self._mean(self._quick, state.seen_quick, seen)
-        seen_slow = self._mean(self._slow, state.seen_slow, seen)
+        quick, slow = (
+            self._mean(self._quick, state.quick_m_step2, model),
+            self._mean(self._slow, state.slow_m_step2, model),
+        )
+        seen_quick = self._mean(self._quick, state.seen_quick_m_step2, seen)
+        seen_slow = self._mean(self._slow, state.seen_slow_m_step2, seen)
         moved = quick - slow
         error = clamp((seen_quick - seen_slow) - moved, self._most_m_step2)
         change = products.learning_product(self._rate, np.where(moved < 0, -error, error))
@@ -90,10 +95,6 @@ class TiltGain:
     def restart(self, state: TiltGainState, model: Real, seen: Real, restarts: Rows) -> TiltGainState:
         """Return the states with means of the present accelerations (n, 2) where `restarts` (n,)."""
         return choose(restarts, TiltGainState(model, model, seen, seen, state.gain), state)
-
-    def stored(self, state: TiltGainState) -> list[Real]:
-        """Return the columns (n, 2) of nmpc_tilt_gain_t, in their order."""
-        return [state.quick, state.slow, state.seen_quick, state.seen_slow, state.gain]
 
     def _mean(self, row: list[Any], mean: Real, value: Real) -> Real:
         return self._products.attitude_sum((row[0] * mean) + (row[1] * value))

@@ -85,11 +85,6 @@ class Constants(ABC):
         return self.has_height and self.settings.model.tilt == "exact"
 
     @property
-    def learns_tilt_gain(self) -> bool:
-        """Whether the controller learns how much the drone tilts."""
-        return self.settings.observer is not None and self.settings.observer.tilt_gain == "learnt"
-
-    @property
     def presence(self) -> dict[str, bool]:
         """Whether each part of a controller is there, by its name.
 
@@ -114,7 +109,6 @@ class Constants(ABC):
             "measured": tracker is not None and not tracker.is_given,
             "set_limits": limiting is not None,
             "thrust_vector": self.has_thrust_vector,
-            "tilt_gain": self.learns_tilt_gain,
             "tracker": tracker is not None,
             "turning": limiting is not None and limiting.turn_m_s_rad is not None,
         }

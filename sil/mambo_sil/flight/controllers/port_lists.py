@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from mambo_codegen.port.row import WHOLE, PortRow
-from mambo_codegen.port.tables import MACROS, TAKEN
+from mambo_codegen.port.taken import MACROS, TAKEN
 from mambo_sil.flight.columns import COMMAND, STATE, TARGET
 
 _PLACES: Final = {"state": STATE, "target": TARGET, "command": COMMAND}

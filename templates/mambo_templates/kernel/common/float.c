@@ -30,6 +30,7 @@ static nmpc_real_t quantize(float value, float scale)
     return number;
 }
 
+#include "float_records.h"
 #if WITH_HEIGHT
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               nmpc_float_command_t *command)
@@ -54,30 +55,8 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
         status = nmpc_step(self, NULL, NULL, 0, &fixed_command);
 #endif
     } else {
-        int axis;
-
-        for (axis = 0; axis < 2; axis++) {
-            fixed_state.position_m[axis] = quantize(state->position_m[axis], NMPC_POSITION_SCALE);
-            fixed_state.velocity_m_s[axis] = quantize(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-            fixed_target.position_m[axis] = quantize(target->position_m[axis], NMPC_POSITION_SCALE);
-            fixed_target.velocity_m_s[axis] = quantize(target->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-#if WITH_GIVEN
-            fixed_target.acceleration_m_s2[axis] = quantize(target->acceleration_m_s2[axis], NMPC_THRUST_SCALE);
-#endif
-        }
-        fixed_state.roll_rad = quantize(state->roll_rad, NMPC_ANGLE_SCALE);
-        fixed_state.pitch_rad = quantize(state->pitch_rad, NMPC_ANGLE_SCALE);
-        fixed_state.yaw_rad = quantize(state->yaw_rad, NMPC_YAW_SCALE);
-#if WITH_HEIGHT
-        fixed_state.height_m = quantize(state->height_m, NMPC_POSITION_SCALE);
-        fixed_state.climb_m_s = quantize(state->climb_m_s, NMPC_VELOCITY_SCALE);
-        fixed_state.grounded = state->grounded;
-        fixed_target.height_m = quantize(target->height_m, NMPC_POSITION_SCALE);
-        fixed_target.climb_m_s = quantize(target->climb_m_s, NMPC_VELOCITY_SCALE);
-#endif
-#if WITH_HEIGHT and WITH_GIVEN
-        fixed_target.climb_acceleration_m_s2 = quantize(target->climb_acceleration_m_s2, NMPC_THRUST_SCALE);
-#endif
+        quantize_state(state, &fixed_state);
+        quantize_target(target, &fixed_target);
 #if WITH_HEIGHT
         status = nmpc_step(self, &fixed_state, &fixed_target, &fixed_command);
 #else
@@ -85,11 +64,7 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
                            &fixed_command);
 #endif
     }
-    command->roll_rad = (float)fixed_command.roll_rad * NMPC_ANGLE_UNIT;
-    command->pitch_rad = (float)fixed_command.pitch_rad * NMPC_ANGLE_UNIT;
-#if WITH_HEIGHT
-    command->thrust_m_s2 = (float)fixed_command.thrust_m_s2 * NMPC_THRUST_UNIT;
-#endif
+    in_si_command(&fixed_command, command);
     return status;
 }
 
@@ -101,11 +76,7 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
         return NMPC_NULL_POINTER;
     }
 
-    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
-    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
-#if WITH_HEIGHT
-    fixed_command.thrust_m_s2 = quantize(command->thrust_m_s2, NMPC_THRUST_SCALE);
-#endif
+    quantize_command(command, &fixed_command);
     return nmpc_reset(self, &fixed_command);
 }
 
@@ -118,11 +89,7 @@ nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *c
         return NMPC_NULL_POINTER;
     }
 
-    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
-    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
-#if WITH_HEIGHT
-    fixed_command.thrust_m_s2 = quantize(command->thrust_m_s2, NMPC_THRUST_SCALE);
-#endif
+    quantize_command(command, &fixed_command);
     return nmpc_set_command(self, &fixed_command);
 }
 #if WITH_HEIGHT
@@ -136,31 +103,12 @@ nmpc_status_t nmpc_float_set_thrust(nmpc_t *self, float thrust_m_s2)
 nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate)
 {
     nmpc_estimate_t fixed_estimate;
-    int axis;
 
     if ((estimate == NULL) || (nmpc_last_estimate(self, &fixed_estimate) != NMPC_OK)) {
         return NMPC_NULL_POINTER;
     }
 
-    for (axis = 0; axis < 2; axis++) {
-        estimate->position_m[axis] = (float)fixed_estimate.position_m[axis] * NMPC_POSITION_UNIT;
-        estimate->velocity_m_s[axis] = (float)fixed_estimate.velocity_m_s[axis] * NMPC_VELOCITY_UNIT;
-        estimate->disturbance_m_s2[axis] = (float)fixed_estimate.disturbance_m_s2[axis] * NMPC_DISTURBANCE_UNIT;
-    }
-#if WITH_HEIGHT
-    estimate->height_m = (float)fixed_estimate.height_m * NMPC_POSITION_UNIT;
-    estimate->climb_m_s = (float)fixed_estimate.climb_m_s * NMPC_VELOCITY_UNIT;
-#endif
-#if WITH_HEIGHT and WITH_THRUST_GAIN
-    estimate->thrust_gain = (float)fixed_estimate.thrust_gain * NMPC_FACTOR_UNIT;
-#elif WITH_HEIGHT and WITH_LIFT
-    estimate->lift_m_s2 = (float)fixed_estimate.lift_m_s2 * NMPC_DISTURBANCE_UNIT;
-#endif
-#if WITH_TILT_GAIN
-    estimate->roll_gain = (float)fixed_estimate.roll_gain * NMPC_FACTOR_UNIT;
-    estimate->pitch_gain = (float)fixed_estimate.pitch_gain * NMPC_FACTOR_UNIT;
-#endif
-    estimate->is_valid = fixed_estimate.is_valid;
+    in_si_estimate(&fixed_estimate, estimate);
     return NMPC_OK;
 }
 #else
@@ -172,8 +120,7 @@ nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *w
         return NMPC_NULL_POINTER;
     }
 
-    fixed_weights.tracking = quantize(weights->tracking, NMPC_TRACKING_SCALE);
-    fixed_weights.effort = quantize(weights->effort, NMPC_EFFORT_SCALE);
+    quantize_weights(weights, &fixed_weights);
     return nmpc_set_weights(self, &fixed_weights);
 }
 
@@ -184,64 +131,27 @@ float nmpc_float_last_cost(const nmpc_t *self)
 #endif
 #if WITH_LIMITS
 
-/* The nearest float that is not larger in magnitude, so that nmpc_float_set_limits() accepts what it is a limit of. */
-static float shrink(nmpc_real_t number, float unit)
-{
-    float value = (float)number;
-
-    if ((number > 0) ? ((nmpc_real_t)value > number) : ((nmpc_real_t)value < number)) {
-        value = value * 0.9999999f;
-    }
-    return value * unit;
-}
-
 void nmpc_float_default_limits(nmpc_float_limits_t *limits)
 {
     nmpc_limits_t fixed_limits;
-    int axis;
 
     if (limits == NULL) {
         return;
     }
 
     nmpc_default_limits(&fixed_limits);
-    limits->speed_m_s = shrink(fixed_limits.speed_m_s, NMPC_VELOCITY_UNIT);
-    limits->braking_m_s2 = (float)fixed_limits.braking_m_s2 * NMPC_BRAKING_UNIT;
-    for (axis = 0; axis < 2; axis++) {
-        limits->fence_min_m[axis] = shrink(fixed_limits.fence_min_m[axis], NMPC_POSITION_UNIT);
-        limits->fence_max_m[axis] = shrink(fixed_limits.fence_max_m[axis], NMPC_POSITION_UNIT);
-    }
-    limits->tilt_rad = shrink(fixed_limits.tilt_rad, NMPC_ANGLE_UNIT);
-#if WITH_HEIGHT
-    limits->floor_m = shrink(fixed_limits.floor_m, NMPC_POSITION_UNIT);
-    limits->ceiling_m = shrink(fixed_limits.ceiling_m, NMPC_POSITION_UNIT);
-    limits->climb_m_s = shrink(fixed_limits.climb_m_s, NMPC_VELOCITY_UNIT);
-    limits->descent_m_s = shrink(fixed_limits.descent_m_s, NMPC_VELOCITY_UNIT);
-#endif
+    shrink_limits(&fixed_limits, limits);
 }
 
 nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *limits)
 {
     nmpc_limits_t fixed_limits;
-    int axis;
 
     if (limits == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    fixed_limits.speed_m_s = quantize(limits->speed_m_s, NMPC_VELOCITY_SCALE);
-    fixed_limits.braking_m_s2 = quantize(limits->braking_m_s2, NMPC_BRAKING_SCALE);
-    for (axis = 0; axis < 2; axis++) {
-        fixed_limits.fence_min_m[axis] = quantize(limits->fence_min_m[axis], NMPC_POSITION_SCALE);
-        fixed_limits.fence_max_m[axis] = quantize(limits->fence_max_m[axis], NMPC_POSITION_SCALE);
-    }
-    fixed_limits.tilt_rad = quantize(limits->tilt_rad, NMPC_ANGLE_SCALE);
-#if WITH_HEIGHT
-    fixed_limits.floor_m = quantize(limits->floor_m, NMPC_POSITION_SCALE);
-    fixed_limits.ceiling_m = quantize(limits->ceiling_m, NMPC_POSITION_SCALE);
-    fixed_limits.climb_m_s = quantize(limits->climb_m_s, NMPC_VELOCITY_SCALE);
-    fixed_limits.descent_m_s = quantize(limits->descent_m_s, NMPC_VELOCITY_SCALE);
-#endif
+    quantize_limits(limits, &fixed_limits);
     return nmpc_set_limits(self, &fixed_limits);
 }
 #endif
