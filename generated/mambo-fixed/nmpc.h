@@ -281,11 +281,11 @@ unsigned int nmpc_limits_active(const nmpc_t *self);
 
 /* Tell the controller that the frame of its states has jumped, as an estimator makes it jump that learns that it was
  * wrong: a drone that has not moved is now measured farther by `position_change_m` along x and y, faster by
- * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first one
- * with a state in the new frame.
+ * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first
+ * one with a state in the new frame.
  *
- * The estimates move by the changes, and the disturbance and the target's acceleration turn with the heading; what belongs to the
- * body stays: attitude model, last command.
+ * The estimates move by the changes, and the disturbance and the target's acceleration turn with the heading; what
+ * belongs to the body stays: attitude model, last command.
  * The limits stay where they are in the frame.
  * Move the target by the same changes from the next step on, turned about the drone, and the command does not jump. A
  * target that is left where it is in the frame is flown to like any other that has jumped.
@@ -391,9 +391,9 @@ typedef struct {
     float tilt_rad;
 } nmpc_float_limits_t;
 
-/* nmpc_step(), nmpc_reset(), nmpc_set_command(), nmpc_last_estimate(), nmpc_shift() and nmpc_slew_heading() with floats, which are rounded to
- * the nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
- * outside of every range and so refused, as in nmpc.h. */
+/* nmpc_step(), nmpc_reset(), nmpc_set_command(), nmpc_last_estimate(), nmpc_shift() and nmpc_slew_heading() with
+ * floats, which are rounded to the nearest number, ties away from zero. NaN, infinity and what overflows become the
+ * largest number, which is outside of every range and so refused, as in nmpc.h. */
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);

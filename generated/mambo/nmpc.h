@@ -252,11 +252,11 @@ unsigned int nmpc_limits_active(const nmpc_t *self);
 
 /* Tell the controller that the frame of its states has jumped, as an estimator makes it jump that learns that it was
  * wrong: a drone that has not moved is now measured farther by `position_change_m` along x and y, faster by
- * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first one
- * with a state in the new frame.
+ * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first
+ * one with a state in the new frame.
  *
- * The estimates move by the changes, and the disturbance and the target's acceleration turn with the heading; what belongs to the
- * body stays: attitude model, last command.
+ * The estimates move by the changes, and the disturbance and the target's acceleration turn with the heading; what
+ * belongs to the body stays: attitude model, last command.
  * The limits stay where they are in the frame.
  * Move the target by the same changes from the next step on, turned about the drone, and the command does not jump. A
  * target that is left where it is in the frame is flown to like any other that has jumped.

@@ -40,7 +40,8 @@ static const unsigned long self_test_digests[NMPC_SELF_TEST_STEPS] = {
 /* The episode of which nmpc_self_test() runs the first steps; it has many kinds of results. */
 #define NMPC_SELF_TEST_START 216
 
-/* Consecutive control steps with the same input, but for the target's velocity, so that moves reach their limits and searches converge. */
+/* Consecutive control steps with the same input, but for the target's velocity, so that moves reach their limits and
+ * searches converge. */
 #define NMPC_SELF_TEST_HELD 4U
 
 /* The numbers of a record, in the order of its members, all of which come before its integers. */

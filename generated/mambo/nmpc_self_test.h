@@ -28,8 +28,8 @@ extern "C" {
 /* Make 41 control steps on `scratch`, with built-in good and bad inputs, and calls of the other functions of nmpc.h
  * between them; compare a digest of every bit of their results with that of the reference. Returns 0 if all agree, else
  * the number, counted from 1, of the first step that differs, or that stands behind a call that does. Call it at
- * start-up, before nmpc_init() of the flight controller. `scratch` may be the flight controller itself: it is initialised
- * before and after, which loses its state and its limits. `scratch` must not be null. */
+ * start-up, before nmpc_init() of the flight controller. `scratch` may be the flight controller itself: it is
+ * initialised before and after, which loses its state and its limits. `scratch` must not be null. */
 int nmpc_self_test(nmpc_t *scratch);
 
 /* Run one episode, counted from 0, on `scratch`, with good and bad inputs, and fold every bit of every result

@@ -214,8 +214,8 @@ int nmpc_is_saturated(const nmpc_t *self);
 
 /* Tell the controller that the frame of its states has jumped, as an estimator makes it jump that learns that it was
  * wrong: a drone that has not moved is now measured farther by `position_change_m` along x and y, faster by
- * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first one
- * with a state in the new frame.
+ * `velocity_change_m_s`, and its heading turned by `heading_change_rad`. Call it between two steps, before the first
+ * one with a state in the new frame.
  *
  * Plan and last command belong to the body and stay, and nothing else is remembered: the call only checks the changes.
  * Move the target by the same changes from the next step on, turned about the drone, and the command does not jump. A

@@ -10,6 +10,7 @@ from typing import Any, Final
 import jinja2
 
 from mambo_codegen import __version__, boards
+from mambo_codegen.bundle.comments import fitted
 from mambo_codegen.bundle.digest import TICKS, episode_count, kept_digest, start_up_test
 from mambo_codegen.bundle.draws import input_scales
 from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS_PER_INPUT, lost_inputs
@@ -131,10 +132,15 @@ def _finish(files: Mapping[str, str], settings: Settings) -> dict[str, str]:
     """Return rendered `files` with guards and the prefix of `settings`, and their controller.toml."""
     prefix, settings_id = settings.code.prefix, _settings_id(settings)
     named = {
-        with_prefix(path, prefix): with_prefix(_add_guard(path, text, settings_id), prefix)
+        with_prefix(path, prefix): with_prefix(_add_guard(path, _fitted(path, text), settings_id), prefix)
         for path, text in files.items()
     }
     return named | {"controller.toml": to_toml(settings)}
+
+
+def _fitted(path: str, text: str) -> str:
+    """Return a file, the comments of C in lines that are not too long."""
+    return fitted(text) if path.endswith((".c", ".h")) else text
 
 
 def with_prefix(text: str, prefix: str) -> str:

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Example: run the self-test and its digest, then fly a point mass to a target that moves along x. The point mass follows
- * the commanded attitude with the lags of the settings; `mambo-nmpc fly` simulates the whole drone.
+ * Example: run the self-test and its digest, then fly a point mass to a target that moves along x. The point mass
+ * follows the commanded attitude with the lags of the settings; `mambo-nmpc fly` simulates the whole drone.
  */
 #include <stdio.h>
 
@@ -70,8 +70,8 @@ int main(void)
     for (line = 0; line < LINES; line++) {
         (void)printf("%7.2f  %7.3f  %7.3f  %7.3f  %8.4f  %8.4f\n",
                      (double)(line * STEPS_PER_LINE) * (double)NMPC_UPDATE_PERIOD_S,
-                     (double)state.position_m[0], (double)state.position_m[1], (double)target.position_m[0], (double)command.roll_rad,
-                     (double)command.pitch_rad);
+                     (double)state.position_m[0], (double)state.position_m[1], (double)target.position_m[0],
+                     (double)command.roll_rad, (double)command.pitch_rad);
         for (step = 0; step < STEPS_PER_LINE; step++) {
             if (nmpc_step(&controller, &state, &target, THRUST_ACCELERATION_M_S2, &command) != NMPC_OK) {
                 refused++; /* out of range: the command repeats the last one */

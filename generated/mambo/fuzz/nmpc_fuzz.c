@@ -229,7 +229,8 @@ static int nmpc_fuzz_are_in_range(const nmpc_limits_t *limits)
     int axis;
     int good = nmpc_fuzz_lies_in(limits->speed_m_s, NMPC_SMALLEST_SPEED_LIMIT_M_S, NMPC_VELOCITY_RANGE_M_S)
                && nmpc_fuzz_lies_in(limits->tilt_rad, (nmpc_real_t)0, NMPC_TILT_LIMIT_RAD)
-               && !((limits->braking_m_s2 != limits->braking_m_s2) || (limits->braking_m_s2 < NMPC_SMALLEST_BRAKING_LIMIT_M_S2));
+               && !((limits->braking_m_s2 != limits->braking_m_s2)
+                    || (limits->braking_m_s2 < NMPC_SMALLEST_BRAKING_LIMIT_M_S2));
 
     for (axis = 0; axis < 2; axis++) {
         good = good && nmpc_fuzz_lies_in(limits->fence_min_m[axis], -NMPC_POSITION_RANGE_M, NMPC_POSITION_RANGE_M)
@@ -335,7 +336,8 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     (void)memcpy(&before, self, sizeof(before));
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(self, call, &command) == promised);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(twin, &other, &twin_command) == promised);
-    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_SHIFT) || (promised == NMPC_BAD_LIMITS)) {
+    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_SHIFT)
+        || (promised == NMPC_BAD_LIMITS)) {
         NMPC_FUZZ_REQUIRE(memcmp(&before, self, sizeof(before)) == 0);
         if (is_step && ((call->nulls & NMPC_FUZZ_NULL_COMMAND) == 0U)) {
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, has_self ? last->roll_rad : (nmpc_real_t)0));

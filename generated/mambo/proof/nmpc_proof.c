@@ -6,11 +6,13 @@
  * the tilt limit.
  *
  * There are three proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
- * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_shift(), nmpc_set_command() and nmpc_set_limits() refuse it and write nothing, and
- * a step handles a state or a target with NaN as take_numbers() shows it for one with an infinity: nothing reads it.
- * turn_everywhere() proves for every heading what take_numbers() assumes of sine and cosine.
+ * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_shift(), nmpc_set_command() and
+ * nmpc_set_limits() refuse it and write nothing, and a step handles a state or a target with NaN as take_numbers()
+ * shows it for one with an infinity: nothing reads it. turn_everywhere() proves for every heading what take_numbers()
+ * assumes of sine and cosine.
  *
- * Settings 60dc29ec4c35eb25. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
+ * Settings 60dc29ec4c35eb25. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its
+ * type.
  */
 #include <stddef.h>
 
