@@ -6,12 +6,12 @@ from mambo_codegen.bundle.comments import LONGEST, fitted
 from mambo_codegen.bundle.render import render
 from tests.support.options import OPTIONS
 
-WORDS = "word " * 30
+WORDS = " ".join(["word"] * 30)
 
 
 def test_what_is_too_long_begins_the_next_line() -> None:
     """Of the same paragraph; before a formula, a list and the end it has a line of its own."""
-    text = f"/* {WORDS}\n * and more.\n * {WORDS}\n *     a = b\n * {WORDS}*/\nint a;\n"
+    text = f"/* {WORDS}\n * and more.\n * {WORDS}\n *     a = b\n * {WORDS} */\nint a;\n"
     lines = fitted(text).split("\n")
     assert max(map(len, lines)) <= LONGEST
     assert " ".join(fitted(text).replace(" * ", " ").split()) == " ".join(text.replace(" * ", " ").split())
