@@ -94,6 +94,18 @@ def test_tune_starts_from_it() -> None:
 
 
 @pytest.mark.long
+def test_firm_settings_come_with_their_price() -> None:
+    """After the push that they bear; the file says what is firm."""
+    _, said = run("design", "crazyflie-flown", "--firm")
+    assert re.search(
+        r"bears a steady push of 3 m/s\^2 from every side firm: a push of 0\.5 m/s\^2 moves it by \d+ mm, "
+        r"with --calm by \d+; its commands change [\d.]+ times as much flown on the desk",
+        unwrapped(said),
+    )
+    assert Path("controller.toml").read_text("utf-8").count("# Firm: ") == 2
+
+
+@pytest.mark.long
 def test_to_stdout_it_prints_the_file_alone() -> None:
     """Which is that of -o."""
     text, said = run("design", "generic", "-o", "-")

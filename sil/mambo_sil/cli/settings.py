@@ -179,6 +179,7 @@ def design(
             autocompletion=complete_vehicles,
         ),
     ],
+    *,
     output: OutputFile = Path("controller.toml"),
     force: Overwrite = False,
     sensors: Annotated[
@@ -196,6 +197,13 @@ def design(
             metavar="NAME",
         ),
     ] = "tracked",
+    firm: Annotated[
+        bool,
+        typer.Option(
+            "--firm/--calm",
+            help="Firm settings hold their place better in gusts and pushes, and change their commands more.",
+        ),
+    ] = False,
 ) -> None:
     """Derive settings from a drone, write them with reasons, fly them; exit 1 if they do not fly well.
 
@@ -211,7 +219,7 @@ def design(
     if sensors is not None:
         drone = drone.with_sensors(sensors)
     with progress_bar("deriving"):
-        chosen = choose_settings(drone, source, _relative(vehicle, output), acceleration)
+        chosen = choose_settings(drone, source, _relative(vehicle, output), acceleration, firm=firm)
     settings = controller_toml.parse(chosen.text, f"settings for vehicle {source}")
     if write_file(chosen.text, output, force=force):
         name = echo(str(output))
@@ -221,8 +229,11 @@ def design(
     if chosen.small_angles is not None:
         typer.echo(sentence(f"tilt: small angles, since {chosen.small_angles}"), err=True)
     typer.echo(sentence(reach_words(settings)), err=True)
+    calm = None
+    if firm:
+        calm = controller_toml.parse(choose_settings(drone, source, None, acceleration).text, source)
     with progress_bar("flying") as bar:
-        said, good = _judgement(settings, drone, bar)
+        said, good = _judgement(settings, calm, drone, bar)
     for line in said:
         typer.echo(sentence(line), err=True)
     if not good:
@@ -237,14 +248,19 @@ def _relative(vehicle: str, output: Path) -> str:
     return f"./{found}" if found in VEHICLE_NAMES else found
 
 
-def _judgement(settings: "Settings", drone: "VehicleFile", bar: Bar) -> tuple[list[str], bool]:
+def _judgement(
+    settings: "Settings", calm: "Settings | None", drone: "VehicleFile", bar: Bar
+) -> tuple[list[str], bool]:
     """Return how derived settings fly, here and as an app, with their margins, and whether they fly well.
+
+    Firm ones are compared with `calm`.
 
     Margins are no verdict; those of what does not fly well are said only if they say why. Without a compiler
     nothing is flown, and nothing refused.
     """
     from mambo_sil.api.app_flights import app_flight_of
-    from mambo_sil.model.derive.derived_flight import fly_derived, fly_pushed
+    from mambo_sil.flight.flown_settings import FlownSettings
+    from mambo_sil.model.derive.derived_flight import firm_words, fly_derived, fly_pushed
     from mambo_sil.model.derive.derived_margins import judge_margins
 
     fly_app = app_flight_of(drone)
@@ -252,6 +268,8 @@ def _judgement(settings: "Settings", drone: "VehicleFile", bar: Bar) -> tuple[li
         flown = [fly_derived(settings, drone)]
         bar.stage("flying in wind")
         flown += [fly_pushed(settings, drone)] if flown[0].good else []
+        if calm is not None:
+            flown.append(FlownSettings(good=True, words=firm_words(settings, calm, drone)))
         if fly_app is not None:
             bar.stage("flying the app on the desk")
             flown.append(fly_app(settings, drone))

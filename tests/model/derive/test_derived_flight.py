@@ -23,6 +23,7 @@ from mambo_sil.model.derive.derived_flight import (
     _fault,
     choose_settings,
     chosen_text,
+    firm_words,
     flies_quick_circle,
     fly_derived,
     fly_pushed,
@@ -252,3 +253,29 @@ def test_the_place_that_is_seen_is_judged() -> None:
     assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) is None
     seen["seen_position_m"] = drifted.position_m
     assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) == "FAR OFF, 400 mm along x in the mean"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", VEHICLES.names())
+def test_firm_settings_hold_their_place_better(name: str) -> None:
+    """Of each drone two keys differ; a push moves it by less, it stays, and bears what calm settings bear."""
+    drone = vehicle_toml.preset(name)
+    calm, firm = (
+        controller_toml.parse(choose_settings(drone, name, firm=is_firm).text, name)
+        for is_firm in (False, True)
+    )
+    cost = {"response_time_s": firm.cost.response_time_s}
+    observer = {"disturbance_noise": pytest.approx(calm.observer.disturbance_noise / 0.3, rel=2e-3)}
+    assert firm.model_dump(exclude={"cost", "observer"}) == calm.model_dump(exclude={"cost", "observer"})
+    assert firm.cost.model_dump() == calm.cost.model_dump() | cost
+    assert firm.observer.model_dump() == calm.observer.model_dump() | observer
+    found = re.fullmatch(
+        r"firm: a push of 0\.5 m/s\^2 moves it by (\d+) mm, with --calm by (\d+); "
+        r"its commands change ([\d.]+) times as much",
+        firm_words(firm, calm, drone),
+    )
+    assert found
+    assert int(found[1]) < 0.78 * int(found[2])
+    assert 1.0 < float(found[3]) < 7.0
+    assert fly_derived(firm, drone).good
+    assert fly_pushed(firm, drone).words == fly_pushed(calm, drone).words

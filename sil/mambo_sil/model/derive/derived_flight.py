@@ -50,6 +50,9 @@ PUSHED_S: Final = 15.0
 BORNE_SHARE, BORNE_M_S2 = 0.6, 5.0
 """Push that good settings bear: that share of what the tilt limit holds, at most so much."""
 
+FIRM_PUSH_M_S2: Final = 0.5
+"""Push by which firm settings are compared with calm ones: half a breath of wind."""
+
 SWINGING_M_S: Final = 0.2
 """Rms of a velocity that oscillates: 0.03 is the most of shipped drones, 0.05 that with 2 cm of noise."""
 
@@ -98,6 +101,24 @@ def fly_pushed(settings: Settings, drone: VehicleFile) -> FlownSettings:
     if not borne_m_s2:
         words = f"bears no steady push: its tilt limit holds {holds_m_s2:g} m/s^2"
     return FlownSettings(good=True, words=words)
+
+
+def firm_words(firm: Settings, calm: Settings, drone: VehicleFile) -> str:
+    """Return what firm settings gain in a push over calm ones, and what they take.
+
+    Raises BuildError, CacheError.
+    """
+    moved_m, changed_rad = [], []
+    for settings in (firm, calm):
+        world = Disturbances(push_m_s2=(FIRM_PUSH_M_S2, 0.0))
+        trace = _flown(settings, drone, Hover(), Offset(), world)
+        off_m = (trace.position_m - _target_m(trace))[..., :2]
+        moved_m.append(float(np.hypot(off_m[..., 0], off_m[..., 1]).max()))
+        changed_rad.append(float(np.abs(np.diff(trace.command_rad, axis=0)).mean()))
+    return (
+        f"firm: a push of {FIRM_PUSH_M_S2:g} m/s^2 moves it by {1e3 * moved_m[0]:.0f} mm, with --calm by "
+        f"{1e3 * moved_m[1]:.0f}; its commands change {changed_rad[0] / changed_rad[1]:.1f} times as much"
+    )
 
 
 def quick_rate_rad_s(tilt_rad: float) -> float:
@@ -183,17 +204,19 @@ def choose_settings(
     source: str,
     vehicle: str | None = None,
     acceleration: TargetAcceleration = "tracked",
+    *,
+    firm: bool = False,
 ) -> ChosenSettings:
     """Return the controller.toml that `design` writes: see `controller_text`.
 
     With the exact thrust vector if it is of use, and the drone survives a circle that is too quick for it.
     Small angles stay without a compiler.
     """
-    plain = controller_text(drone, source, vehicle, acceleration=acceleration)
+    plain = controller_text(drone, source, vehicle, acceleration=acceleration, firm=firm)
     if not wants_exact(drone, acceleration):
         why = None if acceleration == "tracked" else why_not_exact(drone)
         return ChosenSettings(plain, why)
-    exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration)
+    exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration, firm=firm)
     settings = controller_toml.parse(exact, source)
     try:
         if flies_quick_circle(settings, drone):

@@ -5,7 +5,7 @@ Thresholds and factors are measured: docs/explanation/design.md.
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -51,10 +51,13 @@ ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
 }
 """Why the settings take the target's acceleration from there."""
 
+DEFAULT_DISTURBANCE_M_S3: Final = 0.3
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
 LATE_VELOCITY_M_S: Final = 0.15
 TRUE_VELOCITY_M_S: Final = 0.02
+FIRM_RESPONSE, FIRM_DISTURBANCE = 0.76, 10.0 / 3.0
+"""Response time and learning of firm settings over those of calm ones, which a push moves twice as far."""
 LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
 ESTIMATED_POSITION_M, ESTIMATED_VELOCITY_M_S, SLOW_DISTURBANCE_M_S3 = 0.03, 1.0, 0.5
@@ -107,12 +110,17 @@ def why_not_exact(drone: VehicleFile) -> str:
 
 
 def derive(
-    drone: VehicleFile, *, exact: bool = False, acceleration: TargetAcceleration = "tracked"
+    drone: VehicleFile,
+    *,
+    exact: bool = False,
+    acceleration: TargetAcceleration = "tracked",
+    firm: bool = False,
 ) -> list[Derived]:
     """Return the settings for a drone that differ from the defaults, section by section.
 
     exact:        with the exact thrust vector, and a tilt limit without the bound of small angles.
     acceleration: what is known of the target's acceleration.
+    firm:         with quicker answers to errors and pushes, and commands that change more.
     """
     attitude = list(_attitude(drone))
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
@@ -126,8 +134,8 @@ def derive(
         *([_exact_tilt(drone)] if exact else []),
         *_target(acceleration),
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
-        _response(sum(times_s) / 2.0),
-        *_observer(drone),
+        _response(sum(times_s) / 2.0, firm=firm),
+        *(_firmly(_observer(drone)) if firm else _observer(drone)),
         _disturbance_limit(drone, float(tilt.value)),
         *_limits(drone, tilt),
         *_thrust_range(drone),
@@ -143,11 +151,12 @@ def controller_text(
     *,
     exact: bool = False,
     acceleration: TargetAcceleration = "tracked",
+    firm: bool = False,
 ) -> str:
     """Return a controller.toml for the drone of `source`, with the reason of each value as a comment.
 
-    vehicle:             what the key `vehicle` names, for commands that fly the settings; None leaves it out.
-    exact, acceleration: as for `derive`.
+    vehicle: what the key `vehicle` names, for commands that fly the settings; None leaves it out.
+    exact, acceleration, firm: as for `derive`.
     """
     lines = [
         comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
@@ -160,7 +169,7 @@ def controller_text(
         ]
         lines += [f"{VEHICLE} = {json.dumps(vehicle, ensure_ascii=False)}"]
     section = ""
-    for each in derive(drone, exact=exact, acceleration=acceleration):
+    for each in derive(drone, exact=exact, acceleration=acceleration, firm=firm):
         if each.section != section:
             section = each.section
             lines += ["", f"[{section}]"]
@@ -218,11 +227,12 @@ def _target(acceleration: TargetAcceleration) -> Iterator[Derived]:
         yield Derived("target", "tracker_gain", 1.0, "What a curve says has no noise to be smoothed")
 
 
-def _response(slowness_s: float) -> Derived:
+def _response(slowness_s: float, *, firm: bool) -> Derived:
     """Return the response time for a mean lag plus delay."""
-    value = _round(min(max(slowness_s, QUICKEST_RESPONSE_S), SLOWEST_RESPONSE_S))
-    words = "Lag plus delay, the mean of roll and pitch"
-    if slowness_s < QUICKEST_RESPONSE_S:
+    wanted_s = (FIRM_RESPONSE if firm else 1.0) * slowness_s
+    value = _round(min(max(wanted_s, QUICKEST_RESPONSE_S), SLOWEST_RESPONSE_S))
+    words = f"{f'Firm: {FIRM_RESPONSE:g} of lag' if firm else 'Lag'} plus delay, the mean of roll and pitch"
+    if wanted_s < QUICKEST_RESPONSE_S:
         words = "A shorter one passes more noise on to the commands, and is no closer"
     return Derived("cost", "response_time_s", value, words)
 
@@ -264,6 +274,17 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         )
         yield Derived("observer", "disturbance_noise", CALM_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
+
+
+def _firmly(observer: Iterable[Derived]) -> Iterator[Derived]:
+    """Yield what is derived of the observer, but that it learns pushes more quickly."""
+    found = {each.key: each for each in observer}
+    calm_m_s3 = DEFAULT_DISTURBANCE_M_S3
+    if "disturbance_noise" in found:
+        calm_m_s3 = float(found["disturbance_noise"].value)
+    words = f"Firm: learns pushes more quickly than with {spell(calm_m_s3)}"
+    firm = Derived("observer", "disturbance_noise", _round(FIRM_DISTURBANCE * calm_m_s3), words)
+    yield from (found | {firm.key: firm}).values()
 
 
 def _age(sensors: MocapSensors) -> Derived:
