@@ -1,7 +1,7 @@
 """Flights for programs: the closed loop of a controller's C and a simulated vehicle."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, cast
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.settings.key import spell
 from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.own_law import Law, OwnLaws
 from mambo_sil.arguments import (
     is_whole,
     require,
@@ -38,6 +39,8 @@ from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Trajectory, is_trajectory
 
 LARGEST_PUSH_M_S2: Final = 100.0
+UPDATE_PERIOD_S: Final = 0.01
+"""Time from one step of a law of one's own to the next, unless it says another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +50,17 @@ class Flown:
     trace:   k samples of n flights, with units in the names of its arrays.
     metrics: of the true positions, each (n,).
     crashed: which flights (n,) were lost, tilted too far or touched the ground.
+    failures: of a law of one's own, why it was lost, by the number of the flight.
     """
 
     trace: Trace
     metrics: Metrics
     crashed: NDArray[np.bool_]
+    failures: dict[int, str] = field(default_factory=dict)
 
 
 def fly(
-    controller: Controller,
+    controller: Controller | Law,
     vehicle: Vehicle,
     trajectory: CurveName | Trajectory = "bernoulli",
     *,
@@ -68,8 +73,11 @@ def fly(
     start: Start = "hover",
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0),
 ) -> Flown:
-    """Fly the settings of a controller on a vehicle, once for each seed, with new controllers.
+    """Fly the settings of a controller, or a law of your own, on a vehicle, once for each seed.
 
+    controller: each flight has a new one with its settings; or any object with the method `step` of `Law`,
+                copied for each flight. A law that raises, or returns what is no command, loses its flight
+                alone, with a warning that says why, and `Flown.failures`.
     trajectory: a curve of the command `fly` with half-width, radius, step or height `size_m` and angular
                 rate `rate_rad_s`, or an object with its methods `target` and `acceleration`, and `vertical`
                 if it has a height, which the altitude loop of the vehicle then follows.
@@ -81,7 +89,8 @@ def fly(
 
     Raises ArgumentError for a wrong argument, FlightError if they do not fit together.
     """
-    require_kind("controller", controller, Controller, "a Controller")
+    has_step = callable(getattr(controller, "step", None))
+    require(has_step, "controller", controller, "be a Controller or an object with the method step")
     require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
     require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
     require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
@@ -99,13 +108,17 @@ def fly(
         start=start,
         yaw_rad=np.asarray(yaw_rad, np.float64),
         vehicle=vehicle,
-        update_period_s=controller.update_period_s,
+        update_period_s=getattr(controller, "update_period_s", UPDATE_PERIOD_S),
         seeds=given,
         disturbances=Disturbances(push_m_s2=push_m_s2),
         sensors=choose_sensors(sensors, vehicle.drone),
     )
-    trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
-    return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
+    if isinstance(controller, Controller):
+        trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
+        return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
+    laws = OwnLaws(controller, flight)
+    trace = simulate.fly(flight, laws)
+    return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone), laws.failures)
 
 
 def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:

@@ -69,6 +69,25 @@ class DroneState:
             grounded,
         )
 
+    @classmethod
+    def unchecked(
+        cls,
+        position_m: FloatArray,
+        velocity_m_s: FloatArray,
+        attitude_rad: FloatArray,
+        grounded: NDArray[np.bool_],
+    ) -> Self:
+        """Return the states of arrays that are known to be right."""
+        found = object.__new__(cls)
+        for name, value in (
+            ("position_m", position_m),
+            ("velocity_m_s", velocity_m_s),
+            ("attitude_rad", attitude_rad),
+            ("grounded", grounded),
+        ):
+            object.__setattr__(found, name, value)
+        return found
+
     def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and attitude in another frame."""
         return (
@@ -136,6 +155,21 @@ class TargetState:
             None if acceleration is None else vectors_to_ned(frame, acceleration, "acceleration_m_s2"),
             None if yaw is None else yaw_to_ned(frame, yaw),
         )
+
+    @classmethod
+    def unchecked(
+        cls, position_m: FloatArray, velocity_m_s: FloatArray, acceleration_m_s2: FloatArray
+    ) -> Self:
+        """Return targets of arrays that are known to be right, without a heading."""
+        found = object.__new__(cls)
+        for name, value in (
+            ("position_m", position_m),
+            ("velocity_m_s", velocity_m_s),
+            ("acceleration_m_s2", acceleration_m_s2),
+            ("yaw_rad", None),
+        ):
+            object.__setattr__(found, name, value)
+        return found
 
     @property
     def batch(self) -> tuple[int, ...]:

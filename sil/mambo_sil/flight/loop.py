@@ -209,7 +209,7 @@ class Flight:
 
     def targets_for(self, columns: Columns) -> FloatArray:
         """Return the targets (k, n, 6 or 9) as a controller is given them."""
-        return self.targets_in_space if columns.commands_thrust else self.given_targets
+        return self.targets_in_space if columns.target == SPACE.target else self.given_targets
 
     @cached_property
     def landing(self) -> NDArray[np.bool_]:
@@ -415,7 +415,8 @@ class _Caller:
         trace: Trace,
         first: FloatArray,
     ) -> None:
-        self._controller, self._drops, self._targets, self._trace = controller, drops, targets, trace
+        self._controller, self._columns = controller, columns_of(controller).state
+        self._drops, self._targets, self._trace = drops, targets, trace
         self.command = first
 
     def call(
@@ -426,7 +427,7 @@ class _Caller:
         A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
         trace, has_thrust = self._trace, len(self.command) > LEVEL.command
-        measured = np.zeros((len(grounded), (SPACE if has_thrust else LEVEL).state))
+        measured = np.zeros((len(grounded), self._columns))
         for member, rows in _measured(seen, grounded).items():
             if STATE[member].stop <= measured.shape[1]:
                 measured[:, STATE[member]] = rows.T

@@ -72,6 +72,8 @@ class LoopController:
 class ThrustController(LoopController):
     """n controllers of the height behind the interface of the closed loop."""
 
+    columns = SPACE
+
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
         """Tell the controllers the thrusts that are no NaN, and return the next commands."""
         if not np.isnan(thrust_acceleration_m_s2).all():
@@ -99,12 +101,13 @@ def innermost(controller: Any) -> Any:
 
 
 def columns_of(controller: Any) -> Columns:
-    """Return the columns of a controller, as the closed loop calls it."""
-    while not isinstance(controller, ThrustController):
+    """Return the columns of a controller, as the closed loop calls it: those that it has, else LEVEL."""
+    while not hasattr(controller, "columns"):
         if not hasattr(controller, "controller"):
             return LEVEL
         controller = controller.controller
-    return SPACE
+    columns: Columns = controller.columns
+    return columns
 
 
 def hover_command(controller: Any) -> tuple[float, ...]:

@@ -137,24 +137,43 @@ def _pid_record(controller: PidFeedForwardController) -> dict[str, Any]:
     }
 
 
+@runtime_checkable
+class EachAlone(Protocol):
+    """n controllers in Python of which each can be called alone."""
+
+    def of_flight(self, flight: int) -> PositionController:
+        """Return the controller of a flight."""
+        ...
+
+
+def can_call_back(flight: Flight, controller: PositionController) -> bool:
+    """Return whether the engine can call a controller in Python: flight by flight."""
+    return flight.flights == 1 or isinstance(controller, EachAlone)
+
+
 def called_back(
     flight: Flight, controller: PositionController, progress: Callable[[float], None] | None
 ) -> tuple[Native, list[BaseException]]:
-    """Return a controller in Python of a single flight, and the list in which its exception will be.
+    """Return a controller in Python, and the list in which its exception will be.
 
     The bits are those of the loop in NumPy. After an exception, which cannot pass through C, the controller
     is not called any more.
     """
     columns, errors = columns_of(controller), list[BaseException]()
     targets = flight.targets_for(columns)
-    updates, done = len(targets), 0
+    updates, done = len(targets) * flight.flights, 0
+    each = [controller]
+    if isinstance(controller, EachAlone):
+        each = [controller.of_flight(number) for number in range(flight.flights)]
+    numbers_of_flights = ffi.new("int64_t[]", list(range(flight.flights)))
 
-    def step(_self: Any, state: Any, target: Any, thrust_m_s2: float, command: Any) -> int:
+    def step(itself: Any, state: Any, target: Any, thrust_m_s2: float, command: Any) -> int:
         nonlocal done
         if errors:
             return NOT_CALLED
+        called = each[ffi.cast("int64_t *", itself)[0]]
         measured, wanted = _row(state, columns.state), _row(target, targets.shape[2])
-        outcome = controller.step(measured, wanted, np.array([thrust_m_s2]))
+        outcome = called.step(measured, wanted, np.array([thrust_m_s2]))
         numbers = numbers_of(outcome)
         ffi.memmove(command, numbers, numbers.nbytes)
         done += 1
@@ -166,7 +185,8 @@ def called_back(
         errors.append(error.with_traceback(traceback))
 
     function = ffi.callback("engine_controller_t", step, error=NOT_CALLED, onerror=keep)
-    return Native(function, ffi.NULL, 0, (function,), columns), errors
+    stride = ffi.sizeof("int64_t")
+    return Native(function, numbers_of_flights, stride, (function, numbers_of_flights), columns), errors
 
 
 def _row(numbers: Any, columns: int) -> FloatArray:

@@ -16,7 +16,7 @@ from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.thrust_controller import adapted
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
-from mambo_sil.flight.engine.native import Native, called_back, is_native, native
+from mambo_sil.flight.engine.native import Native, called_back, can_call_back, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
 from mambo_sil.flight.loop import Flight, PositionController, allocate_trace
 from mambo_sil.flight.traces import Trace
@@ -48,12 +48,12 @@ def fly(
 ) -> Trace:
     """Simulate the flights and return their trace; call `progress` with the share done.
 
-    Uses the engine unless `chosen_engine` is numpy, or several flights have a controller in Python. On a
+    Uses the engine unless `chosen_engine` is numpy, or several flights have one controller in Python. On a
     machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, what the controller
     raises, and CacheError and UnwritableError if the engine cannot be built for want of a folder or space.
     """
     controller = adapted(controller)
-    engine = _engine(flight, [controller] if flight.flights > 1 else [])
+    engine = _engine(flight, [] if can_call_back(flight, controller) else [controller])
     if engine is None:
         return loop.fly(flight, controller, progress)
     return fly_compiled(engine, flight, controller, progress)
@@ -88,7 +88,7 @@ def fly_compiled(
 ) -> Trace:
     """Simulate flights in a library of `engine_library.load`, group after group.
 
-    A controller whose step is no C function has one flight; what it raises ends that.
+    What a controller raises whose step is no C function ends the simulation.
     """
     simulation = _Simulation(engine, flight)
     trace, controller = simulation.allocate(flight.flights), adapted(controller)

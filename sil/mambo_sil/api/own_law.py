@@ -1,0 +1,164 @@
+"""Laws of a program's own, which fly in place of a controller's C."""
+
+import copy
+import warnings
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mambo_codegen.errors import echo
+from mambo_sil.api.states import DroneState, TargetState
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
+from mambo_sil.flight.controllers.thrust_controller import Applied
+from mambo_sil.flight.loop import Flight
+
+RULE: Final = "return roll and pitch in rad, or these and the thrust over mass in m/s^2"
+
+
+class Law(Protocol):
+    """A position controller of a program's own.
+
+    It may have `update_period_s`, the time from one call to the next; without it is called every 10 ms.
+    """
+
+    def step(self, state: DroneState, target: TargetState) -> ArrayLike:
+        """Return [roll, pitch] in rad, or [roll, pitch, thrust over mass in m/s^2], for a single drone.
+
+        Positions, velocities and accelerations are (3,), x north, y east, z down. Without a thrust the
+        altitude loop of the vehicle holds the height.
+        """
+        ...
+
+
+class OwnLaw:
+    """A law of one flight, as the closed loop calls it.
+
+    Once the law has failed, that is raised, or returned what is no command, its commands are NaN: the flight
+    is lost. `failure` says why.
+    """
+
+    def __init__(self, law: Law, columns: Columns, flight: int, update_period_s: float) -> None:
+        self._law, self.columns, self._flight, self._period_s = law, columns, flight, update_period_s
+        self._calls = 0
+        self.failure: str | None = None
+
+    def step(
+        self,
+        state: FloatArray,
+        target: FloatArray,
+        thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
+    ) -> Applied:
+        """Return the command (1, 2) or (1, 3) for a state (1, 10) and a target (1, 9)."""
+        numbers = np.full((1, self.columns.command), np.nan)
+        if self.failure is None and np.isfinite(state).all():
+            try:
+                numbers[0] = command_of(self._law.step(*_seen(state[0], target[0])), self.columns)
+            except Exception as error:
+                said = str(error) if isinstance(error, ArgumentError) else f"{type(error).__name__}: {error}"
+                self.failure = f"flight {self._flight}, {self._calls * self._period_s:g} s: law.step: {said}"
+                warnings.warn(self.failure, stacklevel=2)
+        self._calls += 1
+        return Applied.of(numbers, np.zeros(1, np.int64))
+
+
+class OwnLaws:
+    """A copy of a law for each of n flights."""
+
+    def __init__(self, law: Law, flight: Flight) -> None:
+        self.columns = columns_of_law(_copy(law), flight)
+        period_s = flight.update_period_s
+        self.laws = [OwnLaw(_copy(law), self.columns, each, period_s) for each in range(flight.flights)]
+
+    def of_flight(self, flight: int) -> OwnLaw:
+        """Return the law of a flight."""
+        return self.laws[flight]
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
+        """Return the commands (n, 2) or (n, 3) for states (n, 10) and targets (n, 9)."""
+        numbers = np.empty((len(self.laws), self.columns.command))
+        for each, law in enumerate(self.laws):
+            rows = slice(each, each + 1)
+            found = law.step(state[rows], target[rows], thrust_acceleration_m_s2[rows])
+            numbers[each, :2] = found.command_rad[0]
+            if found.thrust_m_s2 is not None:
+                numbers[each, 2] = found.thrust_m_s2[0]
+        return Applied.of(numbers, np.zeros(len(self.laws), np.int64))
+
+    @property
+    def failures(self) -> dict[int, str]:
+        """Why laws failed, by the number of the flight."""
+        return {each: law.failure for each, law in enumerate(self.laws) if law.failure is not None}
+
+
+def columns_of_law(law: Law, flight: Flight) -> Columns:
+    """Ask a law for a command at the start of a flight, and return how many numbers it takes and gives.
+
+    Raises ArgumentError if it raises, or returns what is no command.
+    """
+    target = flight.targets_in_space[0, 0]
+    state = np.zeros(SPACE.state)
+    for member in ("position_m", "height_m"):
+        state[STATE[member]] = target[TARGET[member]]
+    state[STATE["yaw_rad"]] = np.broadcast_to(flight.yaw_rad, flight.flights)[0]
+    try:
+        found = law.step(*_seen(state, target))
+    except Exception as error:
+        raise ArgumentError(f"law.step: {type(error).__name__}: {error}") from error
+    count = np.size(found)
+    columns = Columns(SPACE.state, SPACE.target, SPACE.command if count == SPACE.command else LEVEL.command)
+    try:
+        command_of(found, columns)
+    except ArgumentError as error:
+        raise ArgumentError(f"law.step: {error}") from error
+    return columns
+
+
+def command_of(found: Any, columns: Columns) -> FloatArray:
+    """Return what a law returned as numbers (2,) or (3,); raises ArgumentError for what is no command."""
+    try:
+        numbers = np.asarray(found, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    good = numbers.shape == (columns.command,) and bool(np.isfinite(numbers).all())
+    if not good:
+        raise ArgumentError(f"returned {echo(repr(found))}; it must {RULE}")
+    return numbers
+
+
+def _copy(law: Law) -> Law:
+    """Return a copy of a law, of its memory too; raises ArgumentError if it has none."""
+    try:
+        return copy.deepcopy(law)
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}"
+        raise ArgumentError(f"law: {said}; it is copied for each flight: give it __deepcopy__") from error
+
+
+def _places(columns: dict[str, slice], *members: str) -> list[int]:
+    """Return the columns of members, x, y and up of each vector."""
+    return [column for member in members for column in range(columns[member].start, columns[member].stop)]
+
+
+_DRONE: Final = _places(
+    STATE, "position_m", "height_m", "velocity_m_s", "climb_m_s", "roll_rad", "pitch_rad", "yaw_rad"
+)
+_TARGET: Final = _places(
+    TARGET,
+    *("position_m", "height_m", "velocity_m_s", "climb_m_s", "acceleration_m_s2", "climb_acceleration_m_s2"),
+)
+_OF_DRONE: Final = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+_OF_TARGET: Final = np.array([1.0, 1.0, -1.0] * 3)
+"""Signs that make up into down."""
+_GROUNDED: Final = STATE["grounded"].start
+
+
+def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetState]:
+    """Return a state (10,) and a target (9,) as a law is given them, z down."""
+    drone, goal = state[_DRONE] * _OF_DRONE, target[_TARGET] * _OF_TARGET
+    return (
+        DroneState.unchecked(drone[:3], drone[3:6], drone[6:], state[_GROUNDED] != 0.0),
+        TargetState.unchecked(goal[:3], goal[3:6], goal[6:]),
+    )
