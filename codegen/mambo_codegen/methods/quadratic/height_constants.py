@@ -4,7 +4,7 @@ The model, the cost and the observer are those of right and forward, with the th
 
     lag a' = c - a,  delay c' = u - c,   e' = v,  v' = a + w
 
-where g + u is the commanded thrust over mass along the vertical. `height.c.j2` has the equations.
+where g + u is the commanded thrust over mass along the vertical. The chapter *height* has the equations.
 """
 
 from dataclasses import dataclass

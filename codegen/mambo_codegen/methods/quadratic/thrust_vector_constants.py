@@ -1,7 +1,7 @@
 """Constants of the thrust vector: which accelerations a tilt gives, by the direction of the thrust.
 
 With roll phi and pitch theta a thrust has, over its vertical component, sin phi / c to the right and
--sin theta cos phi / c forward, with c = cos phi cos theta. `thrust_vector.c.j2` has the equations.
+-sin theta cos phi / c forward, with c = cos phi cos theta. The chapter *thrust vector* has the equations.
 """
 
 import math

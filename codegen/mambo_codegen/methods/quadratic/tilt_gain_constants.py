@@ -1,6 +1,6 @@
 """Constants of the tilt gain: how much the drone tilts, over what the attitude model says.
 
-`tilt_gain.c.j2` has the equations. The quick low-pass makes model and drone equally late, so that a lag
+The chapter *tilt gain* has the equations. The quick low-pass makes model and drone equally late, so that a lag
 that is wrong by half reads as 3 to 10 % of gain, and keeps noise out; the slow one takes away what stands
 still, as trims and steady wind.
 """
