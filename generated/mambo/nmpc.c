@@ -1209,7 +1209,7 @@ unsigned int nmpc_limits_active(const nmpc_t *self)
  * chapters that follow.
  */
 
-/* `missed` when an outage begins: the drone brakes. */
+/* `missed` once good states have failed for longer than the outage that the estimate bridges: the drone brakes. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
 /* `missed` before the first good state, and when the model has come to rest after an outage. */
@@ -1231,6 +1231,7 @@ typedef struct {
     nmpc_real_t feedback_rad[2];
 } nmpc_step_t;
 
+/* Whether there was an estimate before this control step. */
 NMPC_INLINE int has_estimate(const nmpc_t *self)
 {
     return self->missed < NMPC_NO_ESTIMATE;
@@ -1418,8 +1419,8 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
 NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
 {
     nmpc_attitude_t *const attitude = &self->attitude;
-    nmpc_real_t state[2][NMPC_STATES];
-    nmpc_real_t error[3][2]; /* e, v and w along x and y */
+    nmpc_real_t state[2][NMPC_STATES]; /* e, v, w, j, a, i, c and u, right and forward */
+    nmpc_real_t error[3][2];           /* e, v and w along x and y, which turn into the first three of `state` */
     int axis;
 
     NMPC_UNROLL

@@ -1,7 +1,7 @@
 """Constants of the tilt gain: how much the drone tilts, over what the attitude model says.
 
-The chapter *tilt gain* has the equations. The quick low-pass makes model and drone equally late, so that a lag
-that is wrong by half reads as 3 to 10 % of gain, and keeps noise out; the slow one takes away what stands
+The chapter *tilt gain* has the equations. The quick low-pass makes model and drone equally late, so that a
+lag that is wrong by half reads as 3 to 10 % of gain, and keeps noise out; the slow one takes away what stands
 still, as trims and steady wind.
 """
 

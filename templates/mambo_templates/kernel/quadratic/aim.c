@@ -5,7 +5,7 @@
  */
 
 #if WITH_HEIGHT
-/* Set the next thrust, and what it makes of a tilt. */
+/* Set the next thrust, and what it makes of a tilt. The height has limits of its own, and comes first. */
 NMPC_INLINE void command_thrust(nmpc_t *self, nmpc_step_t *step)
 {
     step->limit_active = height_aim(self, step->state, step->aim);

@@ -39,14 +39,12 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
 NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
 {
     nmpc_attitude_t *const attitude = &self->attitude;
-    nmpc_real_t state[2][NMPC_STATES];
-    nmpc_real_t error[3][2]; /* e, v and w along x and y */
+    nmpc_real_t state[2][NMPC_STATES]; /* e, v, w, j, a, i, c and u, right and forward */
+    nmpc_real_t error[3][2];           /* e, v and w along x and y, which turn into the first three of `state` */
     int axis;
 
 #if WITH_THRUST_VECTOR
     step->left_m_step2 = to_move(height_spare(&self->height));
-#endif
-#if WITH_THRUST_VECTOR
     step->by_thrust = 0U;
 #endif
     NMPC_UNROLL
@@ -220,6 +218,7 @@ NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
 /* Say which limits of the thrust act, beside those of the target. */
 NMPC_INLINE void report_limits(nmpc_t *self, nmpc_step_t *step)
 {
+    /* Those of the target, whose bits are lower than that of the height. */
     unsigned int active = (unsigned int)self->limited % NMPC_LIMIT_HEIGHT;
 
     active = active + ((step->limit_active != 0) ? NMPC_LIMIT_HEIGHT : 0U);

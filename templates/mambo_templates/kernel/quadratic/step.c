@@ -4,7 +4,7 @@
  * chapters that follow.
  */
 
-/* `missed` when an outage begins: the drone brakes. */
+/* `missed` once good states have failed for longer than the outage that the estimate bridges: the drone brakes. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
 /* `missed` before the first good state, and when the model has come to rest after an outage. */
@@ -31,8 +31,6 @@ typedef struct {
     nmpc_real_t weight;
     nmpc_real_t inverse;
     int on_ground;
-#endif
-#if WITH_HEIGHT
     /* 1 if a limit of the height acts, else 0. */
     int limit_active;
 #endif
@@ -40,13 +38,12 @@ typedef struct {
     /* The slopes of the thrust, right and forward; the largest move that it leaves. */
     nmpc_real_t slope[2];
     nmpc_real_t left_m_step2;
-#endif
-#if WITH_THRUST_VECTOR
     /* NMPC_LIMIT_THRUST if that limits a move, else 0. */
     unsigned int by_thrust;
 #endif
 } nmpc_step_t;
 
+/* Whether there was an estimate before this control step. */
 NMPC_INLINE int has_estimate(const nmpc_t *self)
 {
     return self->missed < NMPC_NO_ESTIMATE;
