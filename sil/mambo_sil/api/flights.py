@@ -1,5 +1,6 @@
 """Flights for programs: the closed loop of a controller's C and a simulated vehicle."""
 
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, cast
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.settings.key import spell
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.own_law import Law, OwnLaws
+from mambo_sil.api.own_law import Law, OwnLaws, period_of
 from mambo_sil.arguments import (
     is_whole,
     require,
@@ -39,8 +40,6 @@ from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Trajectory, is_trajectory
 
 LARGEST_PUSH_M_S2: Final = 100.0
-UPDATE_PERIOD_S: Final = 0.01
-"""Time from one step of a law of one's own to the next, unless it says another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ def fly(
         start=start,
         yaw_rad=np.asarray(yaw_rad, np.float64),
         vehicle=vehicle,
-        update_period_s=getattr(controller, "update_period_s", UPDATE_PERIOD_S),
+        update_period_s=period_of(controller),
         seeds=given,
         disturbances=Disturbances(push_m_s2=push_m_s2),
         sensors=choose_sensors(sensors, vehicle.drone),
@@ -118,6 +117,8 @@ def fly(
         return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
     laws = OwnLaws(controller, flight)
     trace = simulate.fly(flight, laws)
+    for failure in laws.failures.values():
+        warnings.warn(failure, stacklevel=2)
     return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone), laws.failures)
 
 

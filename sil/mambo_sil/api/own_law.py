@@ -1,8 +1,10 @@
 """Laws of a program's own, which fly in place of a controller's C."""
 
 import copy
-import warnings
-from typing import Any, Final, Protocol
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any, Final, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,12 +12,16 @@ from numpy.typing import ArrayLike
 from mambo_codegen.errors import echo
 from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.errors import ArgumentError
+from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
 from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.loop import Flight
 
 RULE: Final = "return roll and pitch in rad, or these and the thrust over mass in m/s^2"
+
+
+UPDATE_PERIOD_S: Final = 0.01
+"""Time from one call of a law to the next, unless it says another one."""
 
 
 class Law(Protocol):
@@ -31,6 +37,37 @@ class Law(Protocol):
         altitude loop of the vehicle holds the height.
         """
         ...
+
+
+def load_law(named: str) -> Law:
+    """Return a new law of the class that FILE.py:CLASS names; the file may import what lies beside it.
+
+    Raises FlightError, in one sentence, for whatever is wrong with the file or the class.
+    """
+    file, _, name = named.rpartition(":")
+    path = Path(file)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise FlightError(f"{echo(named)}: there is no file {echo(file)}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    sys.path.insert(0, str(path.resolve().parent))
+    try:
+        spec.loader.exec_module(module)
+        law = getattr(module, name)()
+    except Exception as error:
+        raise FlightError(f"{echo(named)}: {type(error).__name__}: {echo(str(error))}") from error
+    finally:
+        sys.path.pop(0)
+    if not callable(getattr(law, "step", None)):
+        raise FlightError(f"{echo(named)}: {echo(name)} has no method step(state, target)")
+    return cast("Law", law)
+
+
+def period_of(law: object) -> float:
+    """Return the time from one call of a law, or step of a controller, to the next."""
+    period_s: float = getattr(law, "update_period_s", UPDATE_PERIOD_S)
+    return period_s
 
 
 class OwnLaw:
@@ -59,7 +96,6 @@ class OwnLaw:
             except Exception as error:
                 said = str(error) if isinstance(error, ArgumentError) else f"{type(error).__name__}: {error}"
                 self.failure = f"flight {self._flight}, {self._calls * self._period_s:g} s: law.step: {said}"
-                warnings.warn(self.failure, stacklevel=2)
         self._calls += 1
         return Applied.of(numbers, np.zeros(1, np.int64))
 

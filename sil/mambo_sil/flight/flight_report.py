@@ -22,7 +22,7 @@ from mambo_sil.flight.animation import animate
 from mambo_sil.flight.crashes import Crash, first_crash
 from mambo_sil.flight.fences import Walls, measure_limits, nears_limit, walls_m
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
-from mambo_sil.flight.names import PD_TITLES
+from mambo_sil.flight.names import PD_TITLES, flies_settings
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_npz
 from mambo_sil.results.blocks import (
@@ -158,12 +158,14 @@ class FlySummary(FlightSummary):
 
     @property
     def _flier(self) -> str:
-        return PD_TITLES.get(self.controller, f"NMPC, {echo(str(self.source))}")
+        if flies_settings(self.controller):
+            return f"NMPC, {echo(str(self.source))}"
+        return PD_TITLES.get(self.controller, echo(self.controller))
 
     @property
     def _source(self) -> str:
-        source = None if self.controller in PD_TITLES else self.source
-        return self.controller if source is None else echo(source)
+        flies_source = flies_settings(self.controller) and self.source is not None
+        return echo(str(self.source) if flies_source else self.controller)
 
     def result(self, folder: Path, /) -> CommandResult:
         """Return the result of this flight; drawing raises TraceError."""
@@ -219,7 +221,9 @@ class RepeatSummary(FlightSummary):
 def _controller(summary: FlightSummary, source: str = "") -> str:
     """Return the controller's name, with its settings if it has any: a PD has none."""
     name, settings = summary.controller, summary.settings
-    return name if settings is None or name in PD_TITLES else f"{name}, settings {settings[:16]}{source}"
+    return (
+        name if settings is None or not flies_settings(name) else f"{name}, settings {settings[:16]}{source}"
+    )
 
 
 def flight_title(name: str, flown: FlySummary | Scenario) -> str:

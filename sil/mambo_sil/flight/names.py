@@ -53,9 +53,15 @@ PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"
 PID_FEEDFORWARD: Final = "PID-feedforward"
 PD_NAMES: Final[tuple[PdName, ...]] = get_args(PdName)
+CONTROLLER_NAMES: Final[tuple[ControllerName, ...]] = get_args(ControllerName)
 PD_TITLES: Final[dict[str, str]] = {
     "pd": PD,
     "pd-feedforward": PD_FEEDFORWARD,
     "pid-feedforward": PID_FEEDFORWARD,
 }
 """What tables and pictures call the laws without a model, by name."""
+
+
+def flies_settings(controller: str) -> bool:
+    """Return whether a controller by name has settings: the C, or the reference in Python."""
+    return controller in ("nmpc", "reference")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
+from mambo_codegen.errors import echo
 from mambo_sil.cli.options import (
     AsJson,
     Baud,
@@ -21,10 +22,10 @@ from mambo_sil.cli.options import (
 )
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import (
+    CONTROLLER_NAMES,
     CURVE_NAMES,
     SENSORS_NAMES,
     AltitudeName,
-    ControllerName,
     SensorsName,
     Start,
 )
@@ -50,6 +51,13 @@ CurveRate = Annotated[
     typer.Option(help=f"Rate of the curve, in rad/s; by default {RATE_RAD_S:g}.", metavar="RATE"),
 ]
 CurveTime = Annotated[float, typer.Option(help="Time on the curve, in s.", metavar="S")]
+
+
+def _known_controller(value: str) -> str:
+    """Return the name of a controller, or of a law's file and class; refuses others."""
+    if value in CONTROLLER_NAMES or ".py:" in value:
+        return value
+    raise typer.BadParameter(f"{echo(value)} is none of {', '.join(CONTROLLER_NAMES)}, FILE.py:CLASS")
 
 
 @dataclass(frozen=True)
@@ -114,11 +122,13 @@ class Runner:
         ),
     ] = None
     controller: Annotated[
-        ControllerName,
+        str,
         typer.Option(
             help="nmpc, the generated C; reference, the same in Python; pd, the paper's; pd-feedforward or "
-            "pid-feedforward, which know the target's motion.",
+            "pid-feedforward, which know the target's motion; FILE.py:CLASS, a law of your own.",
             metavar="NAME",
+            callback=_known_controller,
+            autocompletion=lambda: CONTROLLER_NAMES,
         ),
     ] = "nmpc"
     scalar: Scalar = None

@@ -4,7 +4,7 @@ import hashlib
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import typer
@@ -14,6 +14,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.messages import degrees_hint
 from mambo_codegen.settings.model import Settings
+from mambo_sil.api.own_law import Law, OwnLaws, load_law, period_of
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
 from mambo_sil.cli.options import load, load_drone, show_result
 from mambo_sil.cli.progress import progress_bar
@@ -30,7 +31,7 @@ from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import Walls, walls_m
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.names import PD_TITLES, SIZED, TIMED
+from mambo_sil.flight.names import CONTROLLER_NAMES, SIZED, TIMED, PdName, flies_settings
 from mambo_sil.flight.polynomials import read_course
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
@@ -44,6 +45,7 @@ from mambo_sil.flight.traces import Trace, write_csv, write_npz
 from mambo_sil.flight.trajectories import CURVES, Trajectory
 from mambo_sil.results.build_folders import scratch_folder
 from mambo_sil.results.folders import new_results
+from mambo_sil.results.terminal import sentence
 
 CALM, GUSTS = "none", "gusts"
 TRACE_FILES = ("trace.csv", "trace.npz")
@@ -59,24 +61,30 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         raise FlightError(
             "--real-time lets the clock of a board call the step: give its --port, or leave it out"
         )
-    _refuse_settings_of_a_pd(runner)
+    _refuse_settings(runner)
+    law = None if runner.controller in CONTROLLER_NAMES else load_law(runner.controller)
     settings, drone = load_settings(runner), load_drone(conditions.vehicle, named_source(runner))
-    flight = described_flight(course, conditions, runner, settings, drone)
+    flight = described_flight(course, conditions, runner, settings, drone, law=law)
+    laws = None if law is None else OwnLaws(law, flight)
     with new_results(output.output, FlySummary.command, FLIGHT_FILES) as folder:
-        flies = _controller(runner, settings, flight) if runner.on is None else _on_board(runner, settings)
+        flies = laws or (
+            _controller(runner, settings, flight) if runner.on is None else _on_board(runner, settings)
+        )
         with progress_bar("flying") as progress:
             trace = simulate(flight, flies, progress)
         same_bits = None
         if runner.on is not None:
             same_bits = trace.same_bits(simulate(flight, _controller(runner, settings, flight)))
-        if settings.height is not None and runner.controller not in PD_TITLES:
+        if settings.height is not None and flies_settings(runner.controller):
             trace = trace.in_space()
         fields = summary_fields(course, conditions, runner, flight, settings)
-        limited = None if runner.controller in PD_TITLES else Scenario()
+        limited = Scenario() if flies_settings(runner.controller) else None
         fields |= judge(trace, settings, drone, limited) | {"same_bits_as_host": same_bits}
         summary = FlySummary(**fields)
         write_flight(trace, summary, settings, output, folder)
         summary.write(folder)
+    for failure in laws.failures.values() if laws else ():
+        typer.echo(sentence(failure), err=True)
     finish(summary, output, written(output))
 
 
@@ -91,10 +99,19 @@ def named_source(runner: Runner) -> str:
 
 
 def described_flight(
-    course: Course, conditions: Conditions, runner: Runner, settings: Settings, drone: VehicleFile
+    course: Course,
+    conditions: Conditions,
+    runner: Runner,
+    settings: Settings,
+    drone: VehicleFile,
+    *,
+    law: Law | None = None,
 ) -> Flight:
-    """Return the flight that the options describe; raises FlightError and TrajectoryError."""
-    period_s = settings.horizon.update_period_s
+    """Return the flight that the options describe, of `law` or settings.
+
+    Raises FlightError and TrajectoryError.
+    """
+    period_s = settings.horizon.update_period_s if law is None else period_of(law)
     curve = curve_of(course)
     _demand_angle("--yaw-rad", course.yaw_rad)
     disturbances = Disturbances(_wind_speed_m_s(conditions.wind), push_m_s2=_push_m_s2(conditions.push))
@@ -119,9 +136,9 @@ def described_flight(
             altitude=AltitudeLaw(conditions.altitude_loop),
         )
     except FlightError as error:
-        source = echo(named_source(runner))
-        raise FlightError(f"{source}: horizon.{error}; only the simulation requires this") from error
-    if runner.controller not in PD_TITLES:
+        source = f"{echo(named_source(runner))}: horizon." if law is None else f"{echo(runner.controller)}: "
+        raise FlightError(f"{source}{error}; only the simulation requires this") from error
+    if flies_settings(runner.controller):
         _check_ranges(flight, settings, course.trajectory)
     return flight
 
@@ -131,11 +148,11 @@ def summary_fields(
 ) -> dict[str, Any]:
     """Return the fields of a `FlySummary` that do not follow from the trace."""
     file = None if course.trajectory in CURVES else Path(course.trajectory)
-    flies_settings = runner.controller not in PD_TITLES
+    has_settings = flies_settings(runner.controller)
     size_m, rate_rad_s = _size_and_rate(course)
     return (vars(course) | vars(conditions) | vars(runner)) | {
-        "source": named_source(runner) if flies_settings else None,
-        "settings": settings.digest if flies_settings else None,
+        "source": named_source(runner) if has_settings else None,
+        "settings": settings.digest if has_settings else None,
         "board": runner.on,
         "vehicle": flight.vehicle.drone,
         "motor_lag_s": flight.vehicle.motor_lag_s,
@@ -171,7 +188,7 @@ def write_flight(trace: Trace, summary: FlySummary, settings: Settings, output: 
     """Write the files of `written`."""
     write_trace(trace, folder)
     if not output.no_pictures:
-        limit_m_s = 0.0 if summary.controller in PD_TITLES else settings.limits.speed_m_s
+        limit_m_s = settings.limits.speed_m_s if flies_settings(summary.controller) else 0.0
         draw_flight(trace, summary.title, folder, walls_m(settings), limit_m_s)
 
 
@@ -195,9 +212,9 @@ def finish(summary: FlightSummary, output: Output, files: tuple[str, ...]) -> No
         raise typer.Exit(1)
 
 
-def _refuse_settings_of_a_pd(runner: Runner) -> None:
-    """Raise FlightError for settings or a scalar type that a PD would not fly."""
-    if runner.controller not in PD_TITLES:
+def _refuse_settings(runner: Runner) -> None:
+    """Raise FlightError for settings or a scalar type that would not fly."""
+    if flies_settings(runner.controller):
         return
     for option, value in (("", runner.source), ("--scalar ", runner.scalar)):
         if value is not None:
@@ -214,7 +231,7 @@ def _controller(runner: Runner, settings: Settings, flight: Flight) -> PositionC
         case "nmpc":
             return CompiledController(settings)
         case pd:
-            return pd_controller(pd, flight)
+            return pd_controller(cast("PdName", pd), flight)
 
 
 def _on_board(runner: Runner, settings: Settings) -> PositionController:
