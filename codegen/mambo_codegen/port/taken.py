@@ -239,6 +239,9 @@ TAKEN: Final[Table] = {
 }
 """The records that a controller takes and gives, whatever its method, by name."""
 
+PARTS: Final = sorted({part for rows in TAKEN.values() for row in rows for part in row.when})
+"""The parts that their rows ask for."""
+
 MACROS: Final = {
     "given": ("NMPC_HAS_TARGET_ACCELERATION", "nmpc_target_t has the member acceleration_m_s2"),
     "guard": ("NMPC_HAS_GUARD", "there is nmpc_set_position_measured()"),

@@ -21,6 +21,7 @@ from mambo_codegen.numbers.representation import (
 )
 from mambo_codegen.numbers.trigonometry import fixed_trigonometry, trigonometry
 from mambo_codegen.port.port import ControllerPort
+from mambo_codegen.port.taken import PARTS
 from mambo_codegen.settings.sections import Sections
 
 
@@ -92,7 +93,7 @@ class Constants(ABC):
         """
         limiting, tracker, settings = self.limiting, self.tracker, self.settings
         is_fixed = settings.code.scalar == "fixed"
-        return {
+        return dict.fromkeys(PARTS, False) | {
             "braking_trim": limiting is not None and limiting.tilted.trim_m_s2 != 0,
             "confine": False,
             "double": settings.code.scalar == "float64",
