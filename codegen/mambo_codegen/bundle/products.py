@@ -1,13 +1,12 @@
-"""How templates write the products of a control step: `{{ gain_product("gain", "tilt") }}`.
+"""How C in floating point writes the products of a control step: with operators.
 
-In floating point that is `gain * tilt`, and as an operand, by the filter `term`, `(gain * tilt)`. In fixed
-point it is `gain_product(gain, tilt)`: each product is a function, since it rounds and shifts to the
-format of its result (`products_fixed`). Chapters of the kernel call these functions; for floating
-point the filter `infix` writes them with operators.
+In fixed point each product is a function, since it rounds and shifts to the format of its result
+(`products_fixed`). The kernel calls these functions; for floating point the filter `infix` writes
+`gain * tilt` for `gain_product(gain, tilt)`, in brackets where that is an operand.
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 _NAMES: Final = (
@@ -51,37 +50,6 @@ _COMPARISONS: Final = ("==", "<=", ">=", "!=")
 _MARK: Final = "\0"
 """Of what has become a product with operators."""
 _BLANKS: Final = f" \n{_MARK}"
-
-
-class Infix(str):
-    """A product written with operators."""
-
-    __slots__ = ()
-
-
-def products(*, fixed: bool) -> dict[str, Callable[..., str]]:
-    """Return the functions of the templates that write products, by name."""
-
-    def call(name: str) -> Callable[..., str]:
-        return lambda *arguments: f"{name}({', '.join(arguments)})"
-
-    def infix(name: str) -> Callable[..., str]:
-        def write(*arguments: str) -> str:
-            form = _OTHER_FORMS.get(name) or _FORMS[len(arguments)]
-            return Infix(form.format(*map(_factor if "*" in form else str, arguments)))
-
-        return write
-
-    return {name: call(name) if fixed else infix(name) for name in _NAMES}
-
-
-def term(product: str) -> str:
-    """Return a product as an operand: in brackets if it is written with operators."""
-    return f"({product})" if isinstance(product, Infix) and " " in product else product
-
-
-def _factor(argument: str) -> str:
-    return f"({argument})" if " " in argument else argument
 
 
 def infix(text: str) -> str:

@@ -24,7 +24,7 @@ from mambo_codegen.bundle.flags import (
 from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
-from mambo_codegen.bundle.products import infix, products, term
+from mambo_codegen.bundle.products import infix
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -161,7 +161,6 @@ def environment() -> jinja2.Environment:
         bytecode_cache=TemplateCache(),
     )
     made.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
-    made.filters["term"] = term
     made.filters["infix"] = jinja2.pass_context(_infix)
     return made
 
@@ -188,8 +187,7 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        products(fixed=numbers.formats is not None)
-        | {"height": None, "guard": None, "doubts": False, "vector": None}
+        {"height": None, "guard": None, "doubts": False, "vector": None}
         | method.context
         | {f"WITH_{name.upper()}": is_there for name, is_there in method.presence.items()}
         | {
