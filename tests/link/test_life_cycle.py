@@ -337,6 +337,23 @@ def test_a_dead_link_ends() -> None:
     assert ground.sentence == f"the link is lost: {told}; it acts by its own failsafe"
 
 
+@pytest.mark.parametrize(
+    ("falling_m_s", "still"),
+    [(0.0, "; it stands still: stop its motors by your transmitter"), (0.5, "")],
+)
+def test_a_drone_that_is_never_disarmed_is_told_of(falling_m_s: float, still: str) -> None:
+    """On the ground in strong wind some land detectors never fire."""
+    ground = flying()
+    ground.life.land("as planned", good=True)
+    for _ in range(650):
+        ground.now_s += 0.1
+        moving = estimate(ground.now_s, 1.0)
+        moving.velocity_m_s[2] = falling_m_s
+        ground.tell(beat(armed=True, mode=PX4.land), moving)
+    told = "PX4 was told to land for 62 s, and has not confirmed that it is disarmed"
+    assert ground.sentence == f"NOT DISARMED: {told}{still} (ended: as planned)"
+
+
 def test_an_autopilot_with_a_slow_clock_is_flown() -> None:
     """PX4's simulator falls behind by 1.2 %: 0.24 s in 20 s, and every estimate has its set-point."""
     ground = flying()
