@@ -124,8 +124,8 @@ class Runner:
     controller: Annotated[
         str,
         typer.Option(
-            help="nmpc, the generated C; reference, the same in Python; pd, the paper's; pd-feedforward or "
-            "pid-feedforward, which know the target's motion; FILE.py:CLASS, a law of your own.",
+            help="nmpc, the generated C; reference, it in Python; pd, the paper's; pd-feedforward or "
+            "pid-feedforward, with the target's motion; FILE.py:CLASS, your own.",
             metavar="NAME",
             callback=_known_controller,
             autocompletion=lambda: CONTROLLER_NAMES,
