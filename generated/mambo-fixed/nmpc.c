@@ -1666,8 +1666,9 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
 NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
 {
     nmpc_attitude_t *const attitude = &self->attitude;
-    nmpc_real_t state[2][NMPC_STATES]; /* e, v, w, j, a, i, c and u, right and forward */
-    nmpc_real_t error[3][2];           /* e, v and w along x and y, which turn into the first three of `state` */
+    /* e, v, w, j, a, i, c and u, right and forward; the first three are those along x and y, turned. */
+    nmpc_real_t state[2][NMPC_STATES];
+    nmpc_real_t error[3][2]; /* e, v and w along x and y */
     int axis;
 
     NMPC_UNROLL
