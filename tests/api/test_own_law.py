@@ -121,6 +121,9 @@ def test_its_period_is_its_own() -> None:
     assert len(flown(law).trace.time_s) == 401
     law.update_period_s = 0.02
     assert len(flown(law).trace.time_s) == 201
+    law.update_period_s = "fast"
+    with pytest.raises(ArgumentError, match='update_period_s = "fast" must'):
+        flown(law)
 
 
 @pytest.mark.parametrize(

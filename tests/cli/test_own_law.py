@@ -73,7 +73,7 @@ def test_a_law_that_raises_loses_the_drone() -> None:
     ("named", "words"),
     [
         ("gone.py:Pd", "gone.py:Pd: there is no file gone.py"),
-        ("laws.py:Gone", "laws.py:Gone: AttributeError: module 'laws' has no attribute 'Gone'"),
+        ("laws.py:Gone", "laws.py:Gone: AttributeError: module 'law_laws' has no attribute 'Gone'"),
         ("laws.py:Needing", "laws.py:Needing: TypeError: Needing.__init__() missing 1"),
         ("laws.py:Idle", "laws.py:Idle: Idle has no method step(state, target)"),
         ("laws.py:Odd", "laws.py:Odd: update_period_s = 0.0071 must be a whole multiple"),
@@ -84,6 +84,14 @@ def test_what_is_no_law_is_refused(named: str, words: str) -> None:
     """In a sentence."""
     _, said = run("fly", "--controller", named, *LINE, code=2)
     assert words in unwrapped(said.replace("\u2502", ""))
+
+
+def test_a_law_takes_no_module_s_place() -> None:
+    """Whatever its file is called; and it flies on no board."""
+    Path("json.py").write_text(LAWS, "utf-8")
+    run("fly", "--controller", "json.py:Pd", *LINE)
+    _, said = run("fly", "--controller", "laws.py:Pd", "--on", "crazyflie", *LINE, code=2)
+    assert "--on crazyflie runs the C: use it with --controller nmpc only" in unwrapped(said)
 
 
 def test_settings_beside_a_law_are_refused() -> None:

@@ -339,7 +339,7 @@ def test_a_dead_link_ends() -> None:
 
 @pytest.mark.parametrize(
     ("falling_m_s", "still"),
-    [(0.0, "; it stands still: stop its motors by your transmitter"), (0.5, "")],
+    [(0.0, "; it does not move: if it stands on the ground, stop its motors by your transmitter"), (0.5, "")],
 )
 def test_a_drone_that_is_never_disarmed_is_told_of(falling_m_s: float, still: str) -> None:
     """On the ground in strong wind some land detectors never fire."""

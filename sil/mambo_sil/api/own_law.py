@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mambo_codegen.errors import echo
-from mambo_sil.api.states import DroneState, TargetState
+from mambo_sil.api.states import DroneState, TargetState, unchecked
+from mambo_sil.arguments import require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
@@ -46,11 +47,12 @@ def load_law(named: str) -> Law:
     """
     file, _, name = named.rpartition(":")
     path = Path(file)
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module_name = f"law_{path.stem}"  # a file numpy.py takes nobody's place
+    spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise FlightError(f"{echo(named)}: there is no file {echo(file)}")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
+    sys.modules[module_name] = module
     sys.path.insert(0, str(path.resolve().parent))
     try:
         spec.loader.exec_module(module)
@@ -65,9 +67,10 @@ def load_law(named: str) -> Law:
 
 
 def period_of(law: object) -> float:
-    """Return the time from one call of a law, or step of a controller, to the next."""
-    period_s: float = getattr(law, "update_period_s", UPDATE_PERIOD_S)
-    return period_s
+    """Return the time from one call of a law, or step of a controller, to the next; raises ArgumentError."""
+    period_s = getattr(law, "update_period_s", UPDATE_PERIOD_S)
+    require_number("update_period_s", period_s, 0.001, 1.0)
+    return float(period_s)
 
 
 class OwnLaw:
@@ -195,6 +198,18 @@ def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetStat
     """Return a state (10,) and a target (9,) as a law is given them, z down."""
     drone, goal = state[_DRONE] * _OF_DRONE, target[_TARGET] * _OF_TARGET
     return (
-        DroneState.unchecked(drone[:3], drone[3:6], drone[6:], state[_GROUNDED] != 0.0),
-        TargetState.unchecked(goal[:3], goal[3:6], goal[6:]),
+        unchecked(
+            DroneState,
+            position_m=drone[:3],
+            velocity_m_s=drone[3:6],
+            attitude_rad=drone[6:],
+            grounded=state[_GROUNDED] != 0.0,
+        ),
+        unchecked(
+            TargetState,
+            position_m=goal[:3],
+            velocity_m_s=goal[3:6],
+            acceleration_m_s2=goal[6:],
+            yaw_rad=None,
+        ),
     )

@@ -1,7 +1,7 @@
 """What n controllers receive, the states of drones and of their targets in NED, and what a step returns."""
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,25 +68,6 @@ class DroneState:
             attitude_to_ned(frame, attitude_rad),
             grounded,
         )
-
-    @classmethod
-    def unchecked(
-        cls,
-        position_m: FloatArray,
-        velocity_m_s: FloatArray,
-        attitude_rad: FloatArray,
-        grounded: NDArray[np.bool_],
-    ) -> Self:
-        """Return the states of arrays that are known to be right."""
-        found = object.__new__(cls)
-        for name, value in (
-            ("position_m", position_m),
-            ("velocity_m_s", velocity_m_s),
-            ("attitude_rad", attitude_rad),
-            ("grounded", grounded),
-        ):
-            object.__setattr__(found, name, value)
-        return found
 
     def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and attitude in another frame."""
@@ -156,21 +137,6 @@ class TargetState:
             None if yaw is None else yaw_to_ned(frame, yaw),
         )
 
-    @classmethod
-    def unchecked(
-        cls, position_m: FloatArray, velocity_m_s: FloatArray, acceleration_m_s2: FloatArray
-    ) -> Self:
-        """Return targets of arrays that are known to be right, without a heading."""
-        found = object.__new__(cls)
-        for name, value in (
-            ("position_m", position_m),
-            ("velocity_m_s", velocity_m_s),
-            ("acceleration_m_s2", acceleration_m_s2),
-            ("yaw_rad", None),
-        ):
-            object.__setattr__(found, name, value)
-        return found
-
     @property
     def batch(self) -> tuple[int, ...]:
         """The shape of the batch."""
@@ -227,6 +193,17 @@ class StepOutcome:
         command[..., 2] = yaw_to_ned(frame, self.yaw_rad)
         command[..., 3] = thrust
         return command
+
+
+State = TypeVar("State", DroneState, TargetState)
+
+
+def unchecked(kind: type[State], **members: Any) -> State:
+    """Return a state or target whose members are known to be right; checks take longer than a step."""
+    found = object.__new__(kind)
+    for name, value in members.items():
+        object.__setattr__(found, name, value)
+    return found
 
 
 def _vectors(name: str, values: ArrayLike, batch: tuple[int, ...] | None = None) -> FloatArray:

@@ -35,7 +35,7 @@ from mambo_sil.link.steering import PAUSE_S, Steering
 CONNECT_S, CHECK_S, ARM_S, LAND_S, STOP_S = 10.0, 8.0, 15.0, 60.0, 10.0
 """How long each phase may last before the pilot gives up; climb and landing: longer, by the height."""
 STILL_M_S: Final = 0.2
-"""A drone that is slower stands on the ground, or hovers."""
+"""A drone that is slower stands on the ground, or hovers: nobody may stop its motors unseen."""
 SLOWEST_M_S: Final = 0.5
 REACHED_M, RESTS_S = 0.3, 2.0
 """When the climb is over: as near to the height, for as long."""
@@ -227,11 +227,13 @@ class LifeCycle:
             why = f", which says: {self._last_text}" if self._last_text else ""
             self._finish(f"{stack.name} has stopped the motors in flight{why}", good=False)
 
-    def _finish_armed(self, told: str) -> None:
+    def _finish_armed(self, told: str, now_s: float) -> None:
         """End the flight of a drone of which nobody knows that it is disarmed."""
-        newest = self.estimates.newest
+        newest = self.estimates.newest if now_s - self.estimates.fresh_s < LOST_S else None
         speed_m_s = math.inf if newest is None else float(np.linalg.norm(newest.velocity_m_s))
-        still = "; it stands still: stop its motors by your transmitter" if speed_m_s < STILL_M_S else ""
+        still = ""
+        if speed_m_s < STILL_M_S:
+            still = "; it does not move: if it stands on the ground, stop its motors by your transmitter"
         told = f"{told}, and has not confirmed that it is disarmed{still}"
         self._finish(f"NOT DISARMED: {told} (ended: {self._why})", good=False)
 
@@ -295,9 +297,9 @@ class LifeCycle:
             told = f"{name} was told to land for {passed_s:.0f} s, which it has not confirmed"
             self._finish(f"the link is lost: {told}; it acts by its own failsafe", good=False)
         elif self.phase is Phase.LANDING and passed_s > self._land_s:
-            self._finish_armed(f"{name} was told to land for {passed_s:.0f} s")
+            self._finish_armed(f"{name} was told to land for {passed_s:.0f} s", now_s)
         elif self.phase is Phase.STOPPING and passed_s > STOP_S:
-            self._finish_armed(f"{name} was told to stop the motors for {passed_s:.0f} s")
+            self._finish_armed(f"{name} was told to stop the motors for {passed_s:.0f} s", now_s)
         elif self.phase in _WITH_ESTIMATES and now_s - self.estimates.fresh_s > LOST_S:
             what = "message" if silent_s > LOST_S else "estimate that is not late"
             self.land(f"no {what} has come for {LOST_S:g} s", good=False)

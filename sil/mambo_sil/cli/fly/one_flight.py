@@ -67,9 +67,10 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
     flight = described_flight(course, conditions, runner, settings, drone, law=law)
     laws = None if law is None else OwnLaws(law, flight)
     with new_results(output.output, FlySummary.command, FLIGHT_FILES) as folder:
-        flies = laws or (
-            _controller(runner, settings, flight) if runner.on is None else _on_board(runner, settings)
-        )
+        if runner.on is not None:
+            flies = _on_board(runner, settings)
+        else:
+            flies = laws or _controller(runner, settings, flight)
         with progress_bar("flying") as progress:
             trace = simulate(flight, flies, progress)
         same_bits = None

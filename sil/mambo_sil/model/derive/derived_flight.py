@@ -51,7 +51,7 @@ BORNE_SHARE, BORNE_M_S2 = 0.6, 5.0
 """Push that good settings bear: that share of what the tilt limit holds, at most so much."""
 
 FIRM_PUSH_M_S2: Final = 0.5
-"""Push by which firm settings are compared with calm ones: half a breath of wind."""
+"""Push by which firm settings are compared with calm ones."""
 
 SWINGING_M_S: Final = 0.2
 """Rms of a velocity that oscillates: 0.03 is the most of shipped drones, 0.05 that with 2 cm of noise."""
