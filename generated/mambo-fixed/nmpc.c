@@ -762,7 +762,7 @@ static void observer_clear(nmpc_observer_t *observer)
  * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
  * predicted one P and the new estimates are
  *
- *     M = (tau^2/T_s) (Tv_k - Tv_k-1), or tau^2 a_k where the acceleration a_k is given
+ *     M = (tau^2/T_s) (Tv_k - Tv_k-1)
  *     P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
@@ -845,8 +845,8 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
     }
 }
 
-/* The frame has turned: so does the target's acceleration. Where it is estimated, the next velocity of the target is
- * taken for its first one: there the jerk begins at 0. */
+/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one,
+ * where the jerk begins at 0. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
@@ -1129,7 +1129,7 @@ static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T; and the change of v_d for the target's acceleration, where that is given.
+ * v_d for v_T; and the change of v_d for the target's acceleration, where that may be known.
  */
 
 /* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to

@@ -295,7 +295,7 @@ typedef struct {
     nmpc_real_t cosine;
 } nmpc_attitude_t;
 
-/* The target's motion along x and y, by the tracker of nmpc.c. */
+/* The target's motion along x and y, by its chapter of nmpc.c. */
 typedef struct {
     nmpc_real_t velocity_m_s[2];         /* Tv_k: of the last step */
     nmpc_real_t acceleration_m_step2[2]; /* A_T: the target's acceleration */
@@ -323,7 +323,7 @@ struct nmpc_controller {
     nmpc_real_t tilt_rad[NMPC_ANGLES];    /* roll and pitch of the last good state */
     nmpc_real_t command_rad[NMPC_ANGLES]; /* the last command */
     unsigned char missed;                 /* control steps since the last good state */
-    unsigned char has_target;             /* 1 once the tracker has seen a target */
+    unsigned char has_target;             /* 1 once there was a target */
     unsigned char limited;                /* the limits that act, but NMPC_LIMIT_TILT */
 };
 

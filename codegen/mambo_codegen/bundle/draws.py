@@ -100,17 +100,20 @@ def _own_scales(method: Method, *records: str) -> dict[str, tuple[float, str]]:
 
 
 def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, str]]:
-    """Return the scales of what the trackers read: given accelerations, or changes of the target's velocity.
+    """Return the scales of what observer or trackers read: known accelerations, and changes of velocity.
 
-    They are the least of what a tracker is tested with and of what the range admits.
+    They are the least of what these are tested with and of what the range admits.
     """
-    found = {}
+    found = dict[str, tuple[float, str]]()
+    if (observer := method.target_observer) is not None:
+        most_m_s2 = method.settings.ranges.thrust_acceleration_max_m_s2
+        for limits, name in zip(observer.limits, ("", "CLIMB_"), strict=False):
+            given_m_s2 = min(1.25 * limits.acceleration / observer.update_s, most_m_s2)
+            found[f"{name or 'TARGET_'}M_S2"] = (given_m_s2, "thrust")
+            found[f"{name}CHANGE_M_S"] = (min(1.25 * limits.jump, change_m_s), "velocity")
     for tracker, name in ((method.tracker, ""), (method.climb_tracker, "CLIMB_")):
-        if tracker is not None and tracker.is_given:
-            most_m_s2 = method.settings.ranges.thrust_acceleration_max_m_s2
-            found[f"{name or 'TARGET_'}M_S2"] = (min(tracker.tested_input, most_m_s2), "thrust")
-        elif tracker is not None:
-            found[f"{name}CHANGE_M_S"] = (min(tracker.tested_input, change_m_s), "velocity")
+        if tracker is not None:
+            found[f"{name}CHANGE_M_S"] = (min(tracker.tested_change_m_s, change_m_s), "velocity")
     return found
 
 

@@ -13,7 +13,7 @@ from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.numbers.representation import THRUST
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, PortRow
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, COUNT, SHARE, PortRow
 
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
@@ -106,6 +106,11 @@ def null_calls(method: Method) -> int:
     return 9 + own + method.has_limits + method.has_height + (method.guard is not None)
 
 
+def target_moves(method: Method) -> bool:
+    """Return whether targets change their velocity from step to step: of interest where that is measured."""
+    return "target_motion" in method.parts
+
+
 class Episodes:
     """n episodes, which run side by side: that outweighs NumPy's overhead for each operation."""
 
@@ -167,9 +172,11 @@ class Episodes:
                 if row.draw is not AIM:
                     target[row.member] = self._row(row, drawn, target)
                     change[row.member] = [np.zeros_like(thrust)] * port.count(row)
-                elif self._moves and row.quantity == "velocity":
-                    scale = "CLIMB_CHANGE_M_S" if upward else "CHANGE_M_S"
-                    change[row.member] = [self._moving(rests, scale) for _ in range(port.count(row))]
+            if self._moves and (port.axes > 2 or not upward):
+                scale, member, count = (
+                    ("CLIMB_CHANGE_M_S", "climb_m_s", 1) if upward else ("CHANGE_M_S", "velocity_m_s", 2)
+                )
+                change[member] = [self._moving(rests, scale) for _ in range(count)]
         if index >= FIRST_LOST:
             first = state["position_m"]
             first[0] = np.where(is_early, self._draws.beyond(np.zeros(1, np.uint32)), first[0])
@@ -196,6 +203,9 @@ class Episodes:
             return self._beside(target[row.member], row.quantity, drawn.size)
         if row.draw is CHANCE:
             return [((drawn.choice >> 14) & 7 == 0).astype(self._numbers.computed)]
+        if row.draw is COUNT:
+            count, kept = (drawn.choice >> 17) & 3, (drawn.choice >> 19) & 7 == 0
+            return [np.where((count == 3) & ~kept, 0, count).astype(self._numbers.computed)]
         scale = self._numbers.constant(*self._scales.of[row.draw.scale])
         if row.draw.rests:
             scale = np.where(drawn.is_there, np.zeros_like(scale), scale)
@@ -205,7 +215,7 @@ class Episodes:
     @property
     def _moves(self) -> bool:
         """Whether targets change their velocity from step to step; a change of 0 would make a -0 a 0."""
-        return "measured" in self._method.parts
+        return target_moves(self._method)
 
     def _next_aim(self, rests: Rows, jumps: Rows) -> Real:
         """Draw place and velocity of the targets along each axis (k, n): new ones of those that jump."""

@@ -8,7 +8,8 @@ from typing import Final, Literal
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
-from mambo_codegen.port.row import WHOLE, Number
+from mambo_codegen.port.row import COUNT, WHOLE, Number
+from mambo_codegen.port.taken import MOST_KNOWN
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.model import Settings
 
@@ -45,10 +46,9 @@ class FmuVariable:
 def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
     """Return the variables in the order of the C: 12 inputs, 2 outputs, of some settings, of the heading.
 
-    A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place
-    are 6 parameters. A height has 5 inputs and an output in place of the thrust, an input for a given
-    acceleration, and 4 limits. The heading has an input, a parameter and an output. The last one of a height
-    is the delivered thrust.
+    An observed target has 5 inputs, a 1-norm 2 weights; limits of speed, braking and place are 6 parameters.
+    A height has 5 inputs and an output in place of the thrust, 2 inputs of an observed target, and 4 limits.
+    The heading has an input, a parameter and an output. The last one of a height is the delivered thrust.
     """
     port = method_of(settings).port
     later = [one for one in port.numbers("target") if set(one.row.when) - {"height"}]
@@ -92,7 +92,8 @@ def _taken(settings: Settings, numbers: Iterable[Number]) -> list[FmuVariable]:
     for number in numbers:
         name, words = number.told
         if number.row.kind == WHOLE:
-            found.append(FmuVariable(name, "input", "1", 0.0, 1.0, 0.0, words))
+            most = float(MOST_KNOWN) if number.row.draw is COUNT else 1.0
+            found.append(FmuVariable(name, "input", "1", 0.0, most, 0.0, words))
         else:
             most = largest.get(number.quantity, math.inf)
             found.append(_input(name, _UNITS.get(number.quantity, "1"), most, words))

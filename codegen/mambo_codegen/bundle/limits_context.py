@@ -19,7 +19,6 @@ from mambo_codegen.methods.shared.limits_constants import (
     SPELLING,
     TURN_SHARE,
 )
-from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
@@ -54,7 +53,6 @@ def limits_context(method: Method) -> dict[str, object]:
         "default_bounds": _bounds(method, stored),
         "turning": limiting.turn_m_s_rad is not None,
         "turn_share": TURN_SHARE,
-        "given_limit_m_s2": given_limit_m_s2(method.settings),
         "turn_bits": TURN_BITS,
         "least_turn": LEAST_TURN_M2_S2,
         "outage_steps": method.outage_steps,

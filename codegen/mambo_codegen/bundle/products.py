@@ -11,7 +11,8 @@ from typing import Final
 
 _NAMES: Final = (
     *("aged_position", "aged_velocity", "angle_square", "angle_to_yaw", "approach_product"),
-    *("approach_ratio", "attitude_sum", "braking_product", "command_product", "distance_gradient"),
+    *("approach_ratio", "attitude_sum", "braking_product", "change_product", "command_product"),
+    *("count_product", "distance_gradient"),
     *("disturbance_correction", "drag_product", "effort_cost", "effort_gradient", "error_change"),
     *("factor_product", "factor_to_sine", "feedback_product", "gain_correction", "gain_product"),
     *("gravity_product", "half_change", "halved", "initial_error", "knee_product", "learning_product"),

@@ -13,7 +13,7 @@ from mambo_codegen import __version__, boards
 from mambo_codegen.bundle.comments import fitted
 from mambo_codegen.bundle.digest import TICKS, episode_count, kept_digest, start_up_test
 from mambo_codegen.bundle.draws import input_scales
-from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS_PER_INPUT, lost_inputs
+from mambo_codegen.bundle.episodes import FIRST_LOST, TICKS_PER_INPUT, lost_inputs, target_moves
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -38,8 +38,8 @@ from mambo_codegen.numbers.representation import (
     Representation,
 )
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE
-from mambo_codegen.port.taken import TAKEN
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, COUNT
+from mambo_codegen.port.taken import MOST_KNOWN, TAKEN
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 
@@ -120,7 +120,7 @@ def _pil_payload_bytes(method: Method) -> int:
     """Return the longest payload of the processor in the loop, for the inputs of a step behind its head."""
     port = method.port
     numbers = len(port.numbers("state")) + len(port.numbers("target")) + 1
-    return 128 if 5 + (numbers * method.numbers.bytes[0]) <= 128 else 192
+    return 128 if 5 + (numbers * method.numbers.bytes[0]) <= 128 else 200
 
 
 def _places(name: str, context: Mapping[str, object]) -> list[str]:
@@ -223,9 +223,11 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
             "aim": AIM,
             "beside_target": BESIDE,
             "chance": CHANCE,
+            "counted": COUNT,
+            "target_moves": target_moves(method),
+            "most_known": MOST_KNOWN,
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
-            "given": settings.target.gives_acceleration,
             "trigonometry": method.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,

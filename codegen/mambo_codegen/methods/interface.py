@@ -42,12 +42,13 @@ class ReferenceController(Protocol):
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
-        target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
+        target (n, 4): x, y (m), vx, vy (m/s); (n, 9) with ax, ay and both 0.05 s later (m/s^2) and what is
+            known of these (0, 1 or 2) where the target is observed.
         thrust_acceleration_m_s2 (n,): thrust over mass, up.
 
         With [height] state (n, 10) has height (m), climb (m/s) and contact with the floor (0 or 1) besides,
-        up positive; target has height and climb besides, and the climb's acceleration (m/s^2) where the
-        acceleration is given; and there is no thrust, which the controller commands.
+        up positive; target has height and climb besides, and where it is observed the climb's acceleration
+        and that 0.05 s later; and there is no thrust, which the controller commands.
         """
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:

@@ -19,7 +19,7 @@ BOUNDS: Final = (
         "velocity",
         "what stood for the target's velocity in the last step",
         2,
-        ("given",),
+        ("target_observer",),
     ),
     PortRow("target_m_s", "velocity", "the target's velocity in the last step", 2, ("turning",)),
     PortRow("turn_m2_s2", "velocity", "mean vector product of successive ones", when=("turning",)),
@@ -59,7 +59,7 @@ NOISE: Final = (
 )
 
 TRACKER: Final = (
-    PortRow("velocity_m_s", "velocity", "Tv_k: of the last step", 2, ("measured",)),
+    PortRow("velocity_m_s", "velocity", "Tv_k: of the last step", 2, ("tracker",)),
     PortRow("acceleration_m_step2", "acceleration", "A_T: the target's acceleration", 2),
     PortRow(
         "jerk_m_step2_update",
@@ -68,6 +68,18 @@ TRACKER: Final = (
         2,
     ),
     PortRow("noise", count=2, when=("doubts",), kind="noise"),
+    PortRow("axis", count=2, when=("target_observer",), kind="motion"),
+)
+
+MOTION: Final = (
+    PortRow("velocity_m_s", "velocity", "v"),
+    PortRow("acceleration", "velocity", "a, in m/s per step"),
+    PortRow("jerk", "velocity", "j, in m/s per step^2"),
+    PortRow("snap", "velocity", "s, in m/s per step^3"),
+    PortRow("innovation", "velocity", "nu of the last set-point; 0 if it was rejected"),
+    PortRow("noise", "velocity", "h"),
+    PortRow("memory", "whole", "n; 0 with known accelerations"),
+    PortRow("missed", "whole", "1 if the last set-point was rejected, 2 after a turn, else 0"),
 )
 
 HEIGHT: Final = (
@@ -82,24 +94,25 @@ HEIGHT: Final = (
     PortRow("thrust_m_s2", "thrust", "the last command, thrust over mass"),
     PortRow("commanded_m_s2", "thrust", "the same, whatever the motors were given", when=("guard",)),
     PortRow("budget_m_s2", "thrust", "b", when=("guard",)),
-    PortRow("target_velocity_m_s", "velocity", "of the last step", when=("measured",)),
-    PortRow("target_acceleration_m_step2", "acceleration", when=("tracker",)),
-    PortRow("target_jerk_m_step2_update", "acceleration", when=("tracker",)),
+    PortRow("target_velocity_m_s", "velocity", "of the last step", when=("tracker",)),
+    PortRow("target_acceleration_m_step2", "acceleration", when=("target_motion",)),
+    PortRow("target_jerk_m_step2_update", "acceleration", when=("target_motion",)),
     PortRow("target_noise", when=("doubts",), kind="noise"),
+    PortRow("target", when=("target_observer",), kind="motion"),
 )
 
 QUADRATIC: Final = (
     PortRow("observer", kind="observer"),
     PortRow("attitude", kind="attitude"),
     PortRow("tilt_gain", when=("tilt_gain",), kind="tilt_gain"),
-    PortRow("tracker", when=("tracker",), kind="tracker"),
+    PortRow("tracker", when=("target_motion",), kind="tracker"),
     PortRow("height", when=("height",), kind="height"),
     PortRow("bounds", kind="bounds"),
     PortRow("tilt_rad", "angle", "roll and pitch of the last good state", "NMPC_ANGLES", ("feedback",)),
     PortRow("budget_rad", "angle", "b of roll and pitch", "NMPC_ANGLES", ("guard",)),
     PortRow("command_rad", "angle", "the last command", "NMPC_ANGLES"),
     PortRow("missed", words="control steps since the last good state", kind=BYTE),
-    PortRow("has_target", words="1 once the tracker has seen a target", when=("tracker",), kind=BYTE),
+    PortRow("has_target", words="1 once there was a target", when=("target_motion",), kind=BYTE),
     PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
     PortRow("is_coarse", words="1 while no position is measured", when=("guard",), kind=BYTE),
 )
@@ -118,7 +131,7 @@ ROLLOUT: Final = (
 )
 
 STEP_TRACKER: Final = (
-    PortRow("velocity_m_s", "velocity", "Tv_k: of the last good step", 2, ("measured",)),
+    PortRow("velocity_m_s", "velocity", "Tv_k: of the last good step", 2, ("tracker",)),
     PortRow("acceleration_m_step2", "acceleration", "A_T: tau^2 times the target's acceleration", 2),
     TRACKER[2],
 )
@@ -168,7 +181,7 @@ ONE_NORM: Final = (
     PortRow("iterations", words="how many iterations updated the plan, at most I_max", kind=BYTE),
     PortRow("converged", words="1 once J changed by less than epsilon", kind=BYTE),
     PortRow("has_tilt", words="1 once tilt_rad is measured", when=("feedback",), kind=BYTE),
-    PortRow("has_target", words="1 once the tracker has seen a target", when=("tracker",), kind=BYTE),
+    PortRow("has_target", words="1 once there was a target", when=("tracker",), kind=BYTE),
     PortRow(
         "missed",
         words="control steps since the last good state, at most NMPC_OUTAGE_STEPS",
@@ -184,6 +197,7 @@ KEPT: Final[dict[str, Table]] = {
         "attitude": ATTITUDE,
         "tilt_gain": TILT_GAIN,
         "noise": NOISE,
+        "motion": MOTION,
         "tracker": TRACKER,
         "height": HEIGHT,
         "bounds": BOUNDS,
@@ -203,8 +217,9 @@ WORDS: Final = {
     "observer": "Estimates along x and y, by the observer of nmpc.c.",
     "attitude": "The attitude model of nmpc.c along right and forward, the axes of the heading.",
     "tilt_gain": "The gain of the tilt, of roll and pitch, by the chapter of nmpc.c.",
+    "motion": "The target's motion along an axis, by its observer in nmpc.c.",
     "noise": "Noise of the target's motion along an axis, by the tracker of nmpc.c.",
-    "tracker": "The target's motion along x and y, by the tracker of nmpc.c.",
+    "tracker": "The target's motion along x and y, by its chapter of nmpc.c.",
     "height": "The height, by the chapter of nmpc.c.",
     "bounds": "What follows from the limits, for the law in nmpc.c.",
 }

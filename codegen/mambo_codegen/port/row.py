@@ -29,7 +29,8 @@ class Draw:
     scale:   the name of the scale, NMPC_SELF_TEST_NAME in C.
     largest: of the scale in SI units; None where the settings say it.
     way:     SIGNED, or SHARE, without a sign. Without a scale: of AIM, where the target is; of BESIDE, near
-             the target's member of the same name; of CHANCE, 1 in one input of eight, else 0.
+             the target's member of the same name; of CHANCE, 1 in one input of eight, else 0;
+             of COUNT, 0 to 2, or, in one of 32, a 3, which is refused.
     rests:   whether it is 0 of a drone that is at its target.
     """
 
@@ -42,6 +43,7 @@ class Draw:
 AIM: Final = Draw(way="aim")
 BESIDE: Final = Draw(way="beside")
 CHANCE: Final = Draw(way="chance")
+COUNT: Final = Draw(way="count")
 
 
 @dataclass(frozen=True)

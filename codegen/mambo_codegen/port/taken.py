@@ -3,9 +3,14 @@
 from dataclasses import replace
 from typing import Final
 
-from mambo_codegen.port.row import AIM, BESIDE, CHANCE, SHARE, WHOLE, Draw, PortRow, Table
+from mambo_codegen.port.row import AIM, BESIDE, CHANCE, COUNT, SHARE, WHOLE, Draw, PortRow, Table
 
 _HEIGHT: Final = ("height",)
+_OBSERVED: Final = ("target_observer",)
+AHEAD_S: Final = 0.05
+"""How far ahead of a set-point the acceleration ahead is."""
+MOST_KNOWN: Final = 2
+"""What a target that knows most says of it."""
 _TILT: Final = Draw("ATTITUDE_RAD", 0.8)
 """Beyond what any small angle stands for, and the steepest that counts for a thrust."""
 _STATE_TILT: Final = replace(_TILT, rests=True)
@@ -86,7 +91,7 @@ TARGET: Final = (
         "thrust",
         "",
         2,
-        ("given",),
+        _OBSERVED,
         draw=Draw("TARGET_M_S2"),
         told=(
             ("target_ax", "acceleration of the target north"),
@@ -113,9 +118,40 @@ TARGET: Final = (
         "climb_acceleration_m_s2",
         "thrust",
         "up",
-        when=("height", "given"),
+        when=(*_HEIGHT, *_OBSERVED),
         draw=Draw("CLIMB_M_S2"),
         told=(("target_az", "acceleration of the target upwards"),),
+    ),
+    PortRow(
+        "ahead_m_s2",
+        "thrust",
+        "acceleration 0.05 s later",
+        2,
+        _OBSERVED,
+        draw=Draw("TARGET_M_S2"),
+        told=(
+            ("target_ahead_x", "acceleration of the target north, 0.05 s later"),
+            ("target_ahead_y", "acceleration of the target east, 0.05 s later"),
+        ),
+    ),
+    PortRow(
+        "climb_ahead_m_s2",
+        "thrust",
+        "up, 0.05 s later",
+        when=(*_HEIGHT, *_OBSERVED),
+        draw=Draw("CLIMB_M_S2"),
+        told=(("target_ahead_z", "acceleration of the target upwards, 0.05 s later"),),
+    ),
+    PortRow(
+        "known",
+        "whole",
+        "0: position and velocity; 1: acceleration too; 2: and the one ahead; what is not known is 0",
+        when=_OBSERVED,
+        kind=WHOLE,
+        draw=COUNT,
+        told=(
+            ("target_known", "1 if the target's acceleration is known, 2 if that 0.05 s later too, else 0"),
+        ),
     ),
 )
 
@@ -243,7 +279,10 @@ PARTS: Final = sorted({part for rows in TAKEN.values() for row in rows for part 
 """The parts that their rows ask for."""
 
 MACROS: Final = {
-    "given": ("NMPC_HAS_TARGET_ACCELERATION", "nmpc_target_t has the member acceleration_m_s2"),
+    "target_observer": (
+        "NMPC_HAS_TARGET_KNOWN",
+        "nmpc_target_t has the members known, acceleration_m_s2 and ahead_m_s2",
+    ),
     "guard": ("NMPC_HAS_GUARD", "there is nmpc_set_position_measured()"),
     "tilt_gain": ("NMPC_HAS_TILT_GAIN", "nmpc_estimate_t has the members roll_gain and pitch_gain"),
     "height": (

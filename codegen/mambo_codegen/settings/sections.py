@@ -184,37 +184,38 @@ class Model(SettingsSection):
 class Target(SettingsSection):
     """What the controller knows of the target's motion beyond its position and velocity."""
 
-    acceleration: Literal["none", "given", "tracked"] = Field(
+    acceleration: Literal["none", "tracked", "observed"] = Field(
         "none",
         description='Acceleration of the target in the prediction: "none" predicts a target of constant '
-        'velocity, as the paper does (eq 11); "given" takes it from the caller, in a further member of the '
-        'target; "tracked" estimates it from the velocities of successive steps, which must then be those '
-        "of the target's motion, without noise. Held over the horizon, it removes most of the tracking error "
-        "on curved paths.",
+        'velocity, as the paper does (eq 11); "tracked" estimates it from the velocities of successive '
+        'steps, which must then be those of the target\'s motion, without noise; "observed" does so with '
+        "noise too, and takes the acceleration, and the one 0.05 s ahead, of each target that says it knows "
+        "them (quadratic cost). Held over the horizon, it removes most of the tracking error on curved "
+        "paths.",
     )
 
     @field_validator("acceleration", mode="before")
     @classmethod
     def _is_known(cls, acceleration: Any) -> Any:
-        if acceleration == "preview":
+        if acceleration in ("given", "preview"):
             raise PydanticCustomError(
-                "preview",
-                'must be "none", "given" or "tracked": version 0.4 has no preview, and "given" is closer',
+                "removed",
+                'must be "none", "tracked" or "observed": since version 0.4 a target with "observed" says '
+                "what it knows of its acceleration, in its member `known` (quadratic cost)",
             )
         return acceleration
 
     @property
-    def gives_acceleration(self) -> bool:
-        """Whether the caller gives the acceleration."""
-        return self.acceleration == "given"
+    def is_observed(self) -> bool:
+        """Whether each target says what it knows, and an observer finds the rest."""
+        return self.acceleration == "observed"
 
     tracker_gain: Number = Field(
         0.3,
         ge=0.01,
         le=1,
-        description="Share of a new acceleration that the estimate of the acceleration and its rate takes: "
-        "a larger gain follows faster and is noisier. 1 takes a given acceleration, and its change for the "
-        "jerk, as they come, and a guard does not doubt them.",
+        description='With "tracked" alone: share of a new acceleration that the estimate of the acceleration '
+        "and its rate takes; a larger gain follows faster and is noisier.",
     )
 
 

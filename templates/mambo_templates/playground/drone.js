@@ -5,12 +5,12 @@ const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array 
 
 class Drone {
   constructor(module, entry, data) {
-    Object.assign(this, { module, entry, offsets: data.offsets, real: KINDS[entry.scalar], shown: true });
+    Object.assign(this, { module, entry, offsets: data.offsets, columns: data.columns, real: KINDS[entry.scalar], shown: true });
     this.simulation = module.put(bytesOf(data.simulation));
     this.flight = module.put(bytesOf(data.flight));
     this.flying = module.space(module.calls.playground_flying_bytes());
     [this.time, this.target, this.sensors, this.gusts] =
-      [8, 8 * TARGET_COLUMNS, 48 * data.ticks, 24 * (data.ticks + 1)].map((size) => module.space(size));
+      [8, 8 * data.columns.target, 48 * data.ticks, 24 * (data.ticks + 1)].map((size) => module.space(size));
     this.draws = module.pointers(this.sensors, this.gusts, 0);
     const arrays = TRACE_AXES.map((axes) => module.space(8 * axes));
     this.trace = module.pointers(...arrays);
@@ -22,7 +22,7 @@ class Drone {
     [this.position, this.velocity, this.angles] = arrays.slice(0, 3).map((address) => module.at(address, 3));
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
-      module.at(address, [1, TARGET_COLUMNS, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
+      module.at(address, [1, data.columns.target, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
     const flies = { disturbed: [1], windy: [1], sensed: [0], captured: [0], commands_thrust: [entry.commands_thrust] };
     this.setMembers("simulation", flies, BigInt64Array);
   }
@@ -78,10 +78,10 @@ class Drone {
   begin(target, draws) {
     this.module.reset();
     this.sensed = false;
-    this.setMembers("flight", { body_start: [target[0], target[1], -target[LEVEL_COLUMNS]] });
+    this.setMembers("flight", { body_start: [target[0], target[1], -target[this.columns.level]] });
     this.setMembers("flight", { impulse_tick: [-1] }, BigInt64Array);
     this.inputs[3].set(draws);
-    this.position.set([target[0], target[1], -target[LEVEL_COLUMNS]]);
+    this.position.set([target[0], target[1], -target[this.columns.level]]);
     this.velocity.fill(0);
     this.angles.fill(0);
     this.module.calls.engine_begin(this.simulation, this.flight, this.draws, this.flying);

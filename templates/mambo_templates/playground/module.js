@@ -50,8 +50,6 @@ class Module {
 /* The flight that the native engine flew too: engine_fly with the same records and random numbers. */
 const TRACE_AXES = [3, 3, 3, 2, 1, 1, 3, 3, 3];
 const TARGET_PLACE = 3; /* in a trace, the target follows position, velocity and angles */
-const LEVEL_COLUMNS = 6, TARGET_COLUMNS = 9; /* x, y, vx, vy, ax, ay; and height, climb, its acceleration */
-const TRACED = [0, 1, 2, 3, 6, 7]; /* the columns without accelerations */
 
 async function sha256(parts) {
   const whole = new Uint8Array(await new Blob(parts).arrayBuffer());
@@ -73,7 +71,7 @@ async function traceDigest(entry, data) {
     module.pointers(sensors, gusts, 0), module.step, module.self, 0n, module.pointers(...arrays),
   );
   const parts = arrays.map((address, place) => module.at(address, TRACE_AXES[place] * updates));
-  parts.splice(TARGET_PLACE, 0, targets.filter((_, index) => TRACED.includes(index % columns)));
+  parts.splice(TARGET_PLACE, 0, targets.filter((_, index) => data.columns.traced.includes(index % columns)));
   return sha256([times, ...parts]);
 }
 

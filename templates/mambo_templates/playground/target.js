@@ -11,28 +11,41 @@ class Target {
   /* The curves are computed in the module of a drone. Its height swings about `height` by `swing`, in m. */
   constructor(drone, data) {
     Object.assign(this, { drone, data, kind: "eight", goal: [0, 0], height: data.height_m, swing: 0, haste: 1, lead: 0 });
-    this.now = new Float64Array(TARGET_COLUMNS);
+    this.now = new Float64Array(data.columns.target);
   }
 
   /* Stands at its goal, or at the beginning of its curve. */
   begin() {
     this.lead = 0;
-    this.now.set([...this.goal, 0, 0, 0, 0]);
+    this.stand(...this.goal);
     this.at(0);
     if (this.kind !== "hand") this.goal = [this.now[0], this.now[1]];
   }
 
-  /* Moves to its place at a time: x, y, vx, vy, ax, ay, height, climb, vertical acceleration. */
+  /* Moves to its place at a time; on a curve it knows the acceleration ahead, where it is dragged that of now. */
   at(time) {
-    const { data, drone: { module, curve } } = this;
-    if (this.kind !== "hand") {
-      const [size, rate] = data.curves[this.kind];
-      module.calls[`playground_${this.kind}`](size, rate * this.haste, time + this.lead, curve);
-      this.now.set(module.at(curve, LEVEL_COLUMNS));
+    const { now, kind, data: { columns, curves, swing_rad_s, ahead_s } } = this;
+    if (kind !== "hand") {
+      const [size, rate] = curves[kind];
+      const [place, later] = [0, ahead_s].map((ahead) => this.computed(kind, 6, size, rate * this.haste, time + this.lead + ahead));
+      now.set([...place, ...later.slice(4)]);
     }
-    module.calls.playground_swing(this.height, this.swing, data.swing_rad_s, time, curve);
-    this.now.set(module.at(curve, TARGET_COLUMNS - LEVEL_COLUMNS), LEVEL_COLUMNS);
-    return this.now;
+    const [height, later] = [0, ahead_s].map((ahead) => this.computed("swing", 3, this.height, this.swing, swing_rad_s, time + ahead));
+    now.set([...height, later[2]], columns.level);
+    now[columns.known] = kind === "hand" ? 1 : 2;
+    return now;
+  }
+
+  /* What a function of the module computes: x, y, vx, vy, ax, ay of a curve, or height, climb and its acceleration. */
+  computed(name, count, ...values) {
+    const { module, curve } = this.drone;
+    module.calls[`playground_${name}`](...values, curve);
+    return Array.from(module.at(curve, count));
+  }
+
+  /* Rests at a place. */
+  stand(x, y) {
+    this.now.set([x, y, 0, 0, 0, 0]);
   }
 
   /* Follows its curve so many times as fast from a time on, from where it is. */
@@ -59,6 +72,6 @@ class Target {
   /* When the pointer leaves it: stands at a goal that is far at once; glides to one that is near. */
   release() {
     const [x, y] = this.goal;
-    if (Math.abs(x - this.now[0]) > FAR_M || Math.abs(y - this.now[1]) > FAR_M) this.now.set([x, y, 0, 0, 0, 0]);
+    if (Math.abs(x - this.now[0]) > FAR_M || Math.abs(y - this.now[1]) > FAR_M) this.stand(x, y);
   }
 }

@@ -114,7 +114,7 @@ class World {
     const [x, y, z] = drone.position, [roll, pitch] = drone.angles;
     const why = Math.cos(roll) * Math.cos(pitch) < 0 ? "it turned over"
       : z >= 0 ? "it hit the ground"
-      : Math.hypot(x - target[0], y - target[1], z + target[LEVEL_COLUMNS]) < LOST_M ? null : `it is more than ${LOST_M} m from the target`;
+      : Math.hypot(x - target[0], y - target[1], z + target[this.data.columns.level]) < LOST_M ? null : `it is more than ${LOST_M} m from the target`;
     if (!why) return;
     drone.losses++;
     drone.lost = { why, place: drone.last, until: this.time + LOST_S };
@@ -146,7 +146,7 @@ class World {
       drone.last = [x, y];
       return [x, y, -z, ...angles];
     });
-    this.history.push([this.time, now[0], now[1], now[LEVEL_COLUMNS], ...states]);
+    this.history.push([this.time, now[0], now[1], now[this.data.columns.level], ...states]);
     if (this.history.length > HISTORY_S / this.data.period_s) this.history.shift();
   }
 }

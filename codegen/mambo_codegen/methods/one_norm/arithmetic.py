@@ -18,7 +18,7 @@ class OneNormArithmetic(Arithmetic):
     def __init__(self, constants: OneNormConstants) -> None:
         formats = constants.numbers.formats
         assert formats is None or isinstance(formats, OneNormFormats)
-        super().__init__(constants, _shifts(constants, formats) if formats else None)
+        super().__init__(constants, _shifts(formats) if formats else None)
         constant = self.numbers.constant
         self._step_s = constant(constants.settings.horizon.prediction_step_s, "step")
         self._step_squared_s2 = constant(constants.tables.step_squared_s2, "step_squared")
@@ -79,9 +79,8 @@ class OneNormArithmetic(Arithmetic):
         return self._down(step_rad * factor, "step_product")
 
 
-def _shifts(constants: OneNormConstants, bits: OneNormFormats) -> dict[str, int]:
+def _shifts(bits: OneNormFormats) -> dict[str, int]:
     """Return the shifts of the products in fixed point: the bits of both factors less the result's."""
-    is_given = constants.tracker is not None and constants.tracker.is_given
     return {
         "thrust_product": bits.thrust + bits.step_squared - bits.gain,
         "velocity_product": bits.step + bits.velocity - bits.acceleration,
@@ -93,6 +92,6 @@ def _shifts(constants: OneNormConstants, bits: OneNormFormats) -> dict[str, int]
         "effort_cost": bits.effort + bits.angle - bits.cost,
         "effort_gradient": bits.gradient - bits.effort,
         "step_product": bits.factor,
-        "target_product": bits.tracker + (bits.thrust if is_given else bits.velocity) - bits.acceleration,
+        "target_product": bits.tracker + bits.velocity - bits.acceleration,
         "feedback_product": bits.feedback,
     }

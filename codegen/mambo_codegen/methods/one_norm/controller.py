@@ -177,7 +177,7 @@ class OneNormController:
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
-        target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
+        target (n, 4): x, y (m), vx, vy (m/s).
         thrust_acceleration_m_s2 (n,): thrust over mass, up.
         """
         states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
@@ -192,7 +192,7 @@ class OneNormController:
             self.memory.limits, self.memory.target, states[:, 0:2], targets, good
         )
         if self._tracker is not None:
-            motion = self._tracker.update(motion, within[:, self._tracker.columns])
+            motion = self._tracker.update(motion, within[:, 2:4])
         searched = self._search(states, within, thrusts, motion.acceleration_m_step2)
         new = replace(
             self.memory,

@@ -70,8 +70,7 @@ class OneNormFormats:
     distance_gradient:  gradient of the distance, m/rad.
     tracking, effort:   lambda_1 and lambda_2, 1/m and 1/rad.
     factor:             eta+ and eta-.
-    tracker:            tau^2 over the update period, s, or tau^2, s^2, for a given acceleration; 0 without a
-                        tracker.
+    tracker:            tau^2 over the update period, s; 0 without a tracker.
     feedback:           rate feedback in steps; 0 without.
     braking, approach, knee, slope, rate: of the limits, see `limits_bits`; 0 without.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
@@ -203,7 +202,7 @@ def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
         tracking=tracking,
         effort=effort,
         factor=factor,
-        tracker=fractional_bits(tracker.factor) if tracker else 0,
+        tracker=fractional_bits(tracker.factor_s) if tracker else 0,
         feedback=feedback_bits(feedback),
         **limits_bits(limiting, velocity, position),
         cost=tracking + error,

@@ -65,18 +65,11 @@ class Paper:
         return np.array(errors)
 
     def track(self, Ta: Array, Tj: Array, measured: Array) -> tuple[Array, Array]:
-        """Return acceleration and jerk of the target from the acceleration that its velocities have (24).
-
-        If the acceleration is given, `measured` is the one given.
-        """
+        """Return acceleration and jerk of the target from the acceleration that its velocities have (24)."""
         settings, T_s = self.settings, self.settings.horizon.update_period_s
         alpha = settings.target.tracker_gain
         beta = alpha**2 / (2 - alpha)
-        if settings.target.acceleration == "given":
-            limit = min(1.5 * 9.81 * settings.limits.tilt_rad, settings.ranges.thrust_acceleration_max_m_s2)
-            measured = np.clip(measured, -limit, limit)
-        else:
-            limit = min(1.5 * 9.81 * settings.limits.tilt_rad, 2 * settings.ranges.velocity_m_s / T_s)
+        limit = min(1.5 * 9.81 * settings.limits.tilt_rad, 2 * settings.ranges.velocity_m_s / T_s)
         jump = np.abs(measured) > limit
         rest = measured - (Ta + T_s * Tj)
         acceleration = Ta + T_s * Tj + alpha * rest

@@ -120,6 +120,14 @@ class QuadraticArithmetic(Arithmetic):
         """Return rate * acceleration, a relative change of the tilt gain."""
         return self._nearest(rate * acceleration_m_step2, "learning_product")
 
+    def change_product(self, step_s: Any, acceleration_m_s2: Real) -> Real:
+        """Return T_s * acceleration, m/s in a step."""
+        return self._nearest(step_s * acceleration_m_s2, "change_product")
+
+    def count_product(self, per_m_s: Any, velocity_m_s: Real) -> Real:
+        """Return per_m_s * velocity, a number of set-points; in fixed point a whole one."""
+        return self._nearest(per_m_s * velocity_m_s, "count_product")
+
     def reach_product(self, steps: Any, velocity_m_step: Real) -> Real:
         """Return steps * velocity, m."""
         return self._nearest(steps * velocity_m_step, "reach_product")

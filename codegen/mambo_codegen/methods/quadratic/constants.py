@@ -8,6 +8,10 @@ from mambo_codegen.methods.quadratic.guard_constants import GuardConstants, guar
 from mambo_codegen.methods.quadratic.height_constants import HeightConstants, height_constants
 from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
+from mambo_codegen.methods.quadratic.target_observer_constants import (
+    TargetObserverConstants,
+    target_observer_constants,
+)
 from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     ThrustVectorConstants,
     thrust_vector_constants,
@@ -68,6 +72,11 @@ class QuadraticConstants(Constants):
         return self.height.tracker if self.height else None
 
     @cached_property
+    def target_observer(self) -> TargetObserverConstants | None:
+        """The constants of the target's observer, in float64; None without one."""
+        return target_observer_constants(self.settings)
+
+    @cached_property
     def limiting(self) -> LimitsConstants:
         """The constants of the limits of speed, braking and place, in float64."""
         return limits(self.settings)
@@ -93,6 +102,8 @@ class QuadraticConstants(Constants):
             "roll_trim": model.roll_trim_rad != 0,
             "shift": True,
             "thrust_gain": self.height is not None and self.height.learns_gain,
+            "target_motion": self.settings.target.acceleration != "none",
+            "target_observer": self.target_observer is not None,
             "tilt_gain": self.tilt_gain is not None,
             "two_moves": self.law.moves == 2,
         }

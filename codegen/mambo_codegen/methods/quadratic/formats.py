@@ -29,6 +29,11 @@ from mambo_codegen.methods.quadratic.height_formats import (
 )
 from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
+from mambo_codegen.methods.quadratic.target_observer_constants import (
+    TargetObserverConstants,
+    largest_velocities,
+    target_observer_constants,
+)
 from mambo_codegen.methods.quadratic.thrust_vector_constants import (
     MOST_SLOPE,
     has_thrust_vector,
@@ -37,7 +42,7 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_constants
 from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
-from mambo_codegen.methods.shared.tracker_constants import tracker_constants
+from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.key import Refusal
@@ -100,6 +105,7 @@ def formats(settings: Sections) -> QuadraticFormats:
     law, height = law_constants(settings), height_constants(settings)
     vector = thrust_vector_constants(settings, attitude.gain_m_step2_rad)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
+    target = target_observer_constants(settings)
     learnt = tilt_gain_constants(settings)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
     ranges = settings.ranges
@@ -124,7 +130,7 @@ def formats(settings: Sections) -> QuadraticFormats:
     speed, position = min(speed, acceleration - 1), min(position, speed - 1)
     bits = {
         "position": position,
-        "velocity": fractional_bits(2 * ranges.velocity_m_s),
+        "velocity": fractional_bits(2 * ranges.velocity_m_s, *(largest_velocities(target) if target else [])),
         "angle": fractional_bits(bounds.angle * (learnt.inverse.most if learnt else 1.0)),
         "yaw": fractional_bits(YAW_LIMIT_RAD),
         "thrust": fractional_bits(bounds.thrust_m_s2),
@@ -133,7 +139,7 @@ def formats(settings: Sections) -> QuadraticFormats:
         "move": min(fractional_bits(4 * bounds.move), acceleration),
         "disturbance": fractional_bits(bounds.learnt_m_s2),
         "step": fractional_bits(period_s),
-        "tracker": fractional_bits(tracker.factor) if tracker else 0,
+        "tracker": _tracker_bits(settings, tracker, target),
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
         "command": fractional_bits(*attitude.command_rad_step2_m, vector.slope_step2_m if vector else 0.0),
         "feedback": feedback_bits(feedback_steps(settings)),
@@ -142,7 +148,12 @@ def formats(settings: Sections) -> QuadraticFormats:
         "ratio": fractional_bits(*ratios) if law.moves == 2 else 0,
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
-        "per_noise": fractional_bits(tracker.noise.steps2_per_m) if tracker and tracker.noise else 0,
+        "per_noise": fractional_bits(target.fade)
+        if target
+        else fractional_bits(tracker.noise.steps2_per_m)
+        if tracker and tracker.noise
+        else 0,
+        "per_count": fractional_bits(target.known_slope, *target.memory_slopes) if target else 0,
         "learning": fractional_bits(learnt.rate_step2_m) if learnt else 0,
         "factor": FACTOR_BITS,
     }
@@ -169,7 +180,7 @@ def formats(settings: Sections) -> QuadraticFormats:
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
     for name, source in zip(STATES, inputs, strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
-    shifts |= _product_shifts(bits, tracker.input_quantity if tracker else "")
+    shifts |= _product_shifts(bits, "velocity" if target else "acceleration")
     shifts |= vertical_shifts(bits) if height else {}
     return QuadraticFormats(bits, shifts | (vector_shifts(bits) if vector else {}))
 
@@ -203,7 +214,11 @@ def _bounds(settings: Sections) -> _Bounds:
     if height is None:
         return level
     found = vertical_bounds(
-        height, observer_constants(settings), attitude_constants(settings), settings.ranges
+        height,
+        observer_constants(settings),
+        attitude_constants(settings),
+        settings.ranges,
+        target_observer_constants(settings),
     )
     names = ("position", "speed", "acceleration", "move", "thrust_m_s2", "angle")
     gain = attitude_constants(settings).gain_m_step2_rad
@@ -228,8 +243,11 @@ def _level_bounds(settings: Sections) -> _Bounds:
         tilted = attitude.gain_m_step2_rad * MOST_SLOPE
     tilted *= MOST_WEIGHT if settings.height else 1.0
     tilted, turned = max(tilted, limit), _TURN * limit
+    observed = target_observer_constants(settings)
     target = tracker.acceleration_bound_m_step2 if tracker else 0.0
     jerk = tracker.jerk_limit_m_step2_update if tracker else 0.0
+    if observed:
+        target, jerk = (observed.update_s * one for one in (observed.level.acceleration, observed.level.jerk))
     innovation = (2 * reach_m) + (observer.age_steps * speed)
     explained = (_TURN * tilted) + observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
     innovation_step = (2 * speed) + (observer.age_steps * explained)
@@ -284,6 +302,17 @@ def _level_bounds(settings: Sections) -> _Bounds:
     )
 
 
+def _tracker_bits(
+    settings: Sections, tracker: TrackerConstants | None, target: TargetObserverConstants | None
+) -> int:
+    """Return the bits of what makes an acceleration in m/step^2 of what a tracker or an observer reads."""
+    if target is None:
+        return fractional_bits(tracker.factor_s) if tracker else 0
+    height = height_constants(settings)
+    snaps_s = [*law_constants(settings).snap_s, *([height.snap_s] if height else [])]
+    return fractional_bits(target.update_s, target.half_ahead_s, *snaps_s)
+
+
 def _attitude_shift(rows: Any, states: Mapping[str, float], bits: Mapping[str, int]) -> int:
     bounds = [states[name] for name in _ATTITUDE_STATES]
     return _shift(np.abs(rows), bounds, [bits["acceleration"]] * 4, bits["acceleration"])
@@ -305,10 +334,10 @@ def _shift(gains: Any, bounds: Sequence[float], inputs: Sequence[int], result: i
     return min(*words, _SUM_BITS - 1 - math.frexp(1.01 * total)[1] - result)
 
 
-def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int]:
+def _product_shifts(bits: Mapping[str, int], noise_input: str) -> dict[str, int]:
     """Return the right shift of each product: the bits of both factors less those of the result.
 
-    `target_input` is the quantity that the tracker reads, if there is one.
+    `noise_input` is the quantity of the noise of a tracker or observer of the target.
     """
     factors = {
         "speed_product": ("step", "velocity", "speed"),
@@ -319,12 +348,19 @@ def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int
         "per_step2_product": ("per_step2", "acceleration", "disturbance"),
         "aged_position": ("age", "speed", "position"),
         "aged_velocity": ("age", "acceleration", "speed"),
-        "target_product": ("tracker", target_input, "acceleration"),
-        "noise_product": ("per_noise", "acceleration", "factor"),
+        "target_product": ("tracker", "velocity", "acceleration"),
+        "noise_product": ("per_noise", noise_input, "factor"),
+        "count_product": ("per_count", "velocity", "whole"),
+        "change_product": ("step", "thrust", "velocity"),
         "factor_product": ("factor", "acceleration", "acceleration"),
         "learning_product": ("learning", "acceleration", "factor"),
     }
-    unused = {name for name in ("drag", "age", "tracker", "per_noise", "learning") if not bits[name]}
+    bits = {**bits, "whole": 0}
+    if not bits["per_count"]:
+        factors.pop("change_product")
+    unused = {
+        name for name in ("drag", "age", "tracker", "per_noise", "per_count", "learning") if not bits[name]
+    }
     shifts = {
         name: bits[one] + bits[other] - bits[result]
         for name, (one, other, result) in factors.items()

@@ -18,10 +18,11 @@ from mambo_codegen.methods.quadratic.height_constants import (
     LEAST_WEIGHT,
     HeightConstants,
 )
+from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, TargetObserver, climb_observer
 from mambo_codegen.methods.quadratic.thrust_vector import inverse, inverse_line
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.math import Real, clamp, confine
-from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 
@@ -44,7 +45,7 @@ class HeightState:
     thrust: Real
     lagged: Real
     command: Real
-    target: TargetMotion
+    target: Any
     share: Real
     thrust_m_s2: Real
     commanded_m_s2: Real
@@ -116,7 +117,9 @@ class HeightAxis:
         self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
-        self._tracker = Tracker(found.tracker, products) if found.tracker else None
+        self._tracker: Tracker | TargetObserver | None = climb_observer(constants, products)
+        if found.tracker:
+            self._tracker = Tracker(found.tracker, products)
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
             self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
@@ -127,11 +130,12 @@ class HeightAxis:
             name: inverse_line(line, products)
             for name, line in (("thrust", found.thrust_inverse), ("weight", found.weight_inverse))
         }
-        self._spare: tuple[Any, list[Any], Any] | None = None
+        self._spare: tuple[Any, list[Any], Any, Any] | None = None
         if vector := constants.thrust_vector:
             chords = [[constant(value, "factor") for value in chord] for chord in vector.chords]
             least = constant(vector.least_spare_m_step2, "acceleration")
-            self._spare = constant(vector.spare_m_step2, "acceleration"), chords, least
+            known = constant(vector.known_spare, "factor")
+            self._spare = constant(vector.spare_m_step2, "acceleration"), chords, least, known
         self._least_speed = constant(SMALLEST_LIMIT, "velocity")
         self._most_speeds = np.array([constant(value, "velocity") for value in found.most_m_s])
 
@@ -160,6 +164,8 @@ class HeightAxis:
     def steady(self, thrust_m_s2: Real, share: Real) -> HeightState:
         """Return the height of drones with a steady thrust (n, 1), of which `share` (n,) acts vertically."""
         unknown = unknown_height(thrust_m_s2[:, 0])
+        if self._tracker is not None:
+            unknown = replace(unknown, target=self._tracker.unknown(unknown.target.velocity_m_s))
         command = self._vertical(share, thrust_m_s2[:, 0])
         if self._budget is not None:
             full = np.full_like(command, self._budget.full)
@@ -237,8 +243,9 @@ class HeightAxis:
         climb = np.where(follows, products.speed_product(target[:, 1]), np.zeros_like(goal))
         disturbance, jerk = state.disturbance_m_step2, np.zeros_like(goal)
         if self._tracker is not None:
-            given = target[:, 2:3] if self._tracker.is_given else target[:, 1:2]
-            motion = choose(follows, self._tracker.update(motion, given), motion)
+            found, fitted = self._follow(motion, target)
+            motion = choose(follows, found, motion)
+            climb = np.where(follows, products.speed_product(fitted), climb)
             acceleration = motion.acceleration_m_step2[:, 0]
             disturbance = np.where(follows, disturbance - acceleration, disturbance)
             jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
@@ -269,6 +276,15 @@ class HeightAxis:
         command = self._vertical(state.share, thrust)
         return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
+    def _follow(self, motion: Any, target: Real) -> tuple[Any, Real]:
+        """Return the motions after targets (n, 2 or more), and the climbs (n,) that stand for theirs."""
+        if isinstance(self._tracker, TargetObserver):
+            never = np.zeros(len(target), np.bool_)
+            found, aim = self._tracker.follow(motion, target, target[:, :2], (never, never))
+            return found, aim[:, 1]
+        assert self._tracker is not None, "asked for with one only"
+        return self._tracker.update(motion, target[:, 1:2]), target[:, 1]
+
     def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
         acceleration = np.where(on_ground, 0, self._acceleration(state))
@@ -293,7 +309,8 @@ class HeightAxis:
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:
         """Forget the targets of some controllers (n,)."""
-        return replace(state, target=choose(cleared, unknown_motion(state.target.velocity_m_s), state.target))
+        unknown = self._tracker.unknown if self._tracker else unknown_motion
+        return replace(state, target=choose(cleared, unknown(state.target.velocity_m_s), state.target))
 
     def weight(self, acceleration: Real) -> Real:
         """Return (g + acceleration)/g (n,), by which the tilt of a climbing drone counts, within limits."""
@@ -322,7 +339,7 @@ class HeightAxis:
         """Return the horizontal acceleration (n,) that the thrust leaves; None if unknown."""
         if self._spare is None:
             return None
-        product, (largest, chords, least) = self._products.factor_product, self._spare
+        product, (largest, chords, least, known) = self._products.factor_product, self._spare
         vertical = self.lift(state, state.command) + self._gravity
         if self._found.learns_gain:
             largest = product(largest, state.gain)
@@ -330,6 +347,9 @@ class HeightAxis:
         found = lines[0]
         for line in lines[1:]:
             found = np.where(line < found, line, found)
+        if isinstance(state.target, ObservedMotion):
+            always = np.where(state.target.memory[:, 0] > 0, found, product(vertical, known))
+            found = np.where(found < always, always, found)
         limited: Real = np.where(found < least, least, found)
         return limited
 

@@ -68,6 +68,7 @@ class HeightConstants:
     most_m_s:      (2,) largest limits of climb and descent: those that can be braked in time.
     least_share:   the thrust is compensated for the tilt as if cos roll cos pitch were at least this.
     thrust_inverse, weight_inverse: of the thrust's factors, and of (g + u)/g; the latter is never too small.
+    snap_s:        as in `LawConstants`.
     tracker:       of the target's height; None without.
     """
 
@@ -94,6 +95,7 @@ class HeightConstants:
     least_share: float
     thrust_inverse: Reciprocal
     weight_inverse: Reciprocal
+    snap_s: float
     tracker: TrackerConstants | None
 
     @property
@@ -146,7 +148,8 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         least_share=least_share,
         thrust_inverse=reciprocal(least_share * (1 - deviation), 1 + deviation),
         weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
-        tracker=tracker_constants(settings, step_s, _jump_m_s2(height)),
+        snap_s=_solution(settings, height).snap_s,
+        tracker=tracker_constants(settings, step_s, jump_m_s2(height)),
     )
 
 
@@ -205,7 +208,7 @@ def _most_m_s(settings: Sections, height: Height, approach_s: float) -> tuple[fl
     )
 
 
-def _jump_m_s2(height: Height) -> float:
+def jump_m_s2(height: Height) -> float:
     """Return the acceleration of a target that has jumped."""
     return JUMP_MARGIN * max(GRAVITY_M_S2 - height.thrust_min_m_s2, height.thrust_max_m_s2 - GRAVITY_M_S2)
 

@@ -8,6 +8,7 @@ import numpy as np
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants
 from mambo_codegen.methods.quadratic.height_constants import LEAST_WEIGHT, HeightConstants
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants
+from mambo_codegen.methods.quadratic.target_observer_constants import TargetObserverConstants
 from mambo_codegen.methods.quadratic.thrust_vector_constants import ThrustVectorConstants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
@@ -39,6 +40,7 @@ def vertical_bounds(
     observer: ObserverConstants,
     attitude: AttitudeConstants,
     ranges: Ranges,
+    observed: TargetObserverConstants | None,
 ) -> VerticalBounds:
     """Return the bounds of the height for inputs within `ranges`."""
     reach_m = ranges.position_m
@@ -47,6 +49,8 @@ def vertical_bounds(
     deviation = height.learn_limit if height.learns_gain else 0.0
     target = height.tracker.acceleration_bound_m_step2 if height.tracker else 0.0
     jerk = height.tracker.jerk_limit_m_step2_update if height.tracker else 0.0
+    if observed and observed.climb:
+        target, jerk = (observed.update_s * one for one in (observed.climb.acceleration, observed.climb.jerk))
     innovation = (2 * reach_m) + (observer.age_steps * speed)
     innovation_step = (2 * speed) + (observer.age_steps * (limit + learnt))
     corrections = np.abs(height.gain) @ [innovation, innovation_step]

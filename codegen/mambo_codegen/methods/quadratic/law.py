@@ -15,7 +15,7 @@ the state, [e, v, w, j, a, i, c, u_k-1]; the limits of the command cut it off.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -38,6 +38,9 @@ from mambo_codegen.settings.sections import Sections
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
 MOVED: Final = ("e", "v", "a", "i", "c", "u")
 """The states that the command moves."""
+SECOND_SHARE: Final = 1 / 3
+"""With an observer of the target the second free move looks ahead by so much of the ramp beyond the first."""
+_JERK: Final = STATES.index("j")
 MOST_OUTAGE_STEPS: Final = 250
 """The controller counts the control steps of an outage in one byte."""
 
@@ -49,6 +52,8 @@ class LawConstants:
     moves:          1, or 2 with a ramp.
     rows:           (2, moves, 8) the unlimited minimum, the free moves in m/step^2, from the state,
                     `STATES`; axis 0 is right (roll), axis 1 forward (pitch).
+    snap_s:         (2,) what the first move takes of the derivative of the target's jerk, over what it
+                    takes of the jerk; 0 without an observer of the target.
     ratios:         (2,) H12/H11 of the second derivatives H of the cost by two moves: by how much the best
                     first move falls when the second rises; 0 for one move.
     spectral_radius: (2,) of the closed loop without limits.
@@ -56,6 +61,7 @@ class LawConstants:
 
     moves: int
     rows: NDArray[np.float64]
+    snap_s: NDArray[np.float64]
     ratios: NDArray[np.float64]
     spectral_radius: NDArray[np.float64]
 
@@ -65,6 +71,7 @@ class LawSolution:
     """The law along one axis, in lists of floats.
 
     rows, ratio: as in `LawConstants`.
+    snap_s:      as in `LawConstants`.
     curvature:   (2, 2) second derivatives of the cost by the two free moves; None for one.
     closed_loop: (6, 6) transition of the states `MOVED` without the limits of the command, in SI units.
     """
@@ -73,6 +80,7 @@ class LawSolution:
     ratio: float
     curvature: list[list[float]] | None
     closed_loop: list[list[float]]
+    snap_s: float = 0.0
 
     @property
     def spectral_radius(self) -> float:
@@ -86,6 +94,7 @@ def law_constants(settings: Sections) -> LawConstants:
     return LawConstants(
         moves=len(laws[0].rows),
         rows=np.array([law.rows for law in laws]),
+        snap_s=np.array([law.snap_s for law in laws]),
         ratios=np.array([law.ratio for law in laws]),
         spectral_radius=np.array([law.spectral_radius for law in laws]),
     )
@@ -127,7 +136,23 @@ def axis_law(
 
         return solve_law(*inputs)
 
-    return LawSolution(**keep("law", inputs, solve))
+    found = LawSolution(**keep("law", inputs, solve))
+    if not settings.target.is_observed:
+        return found
+    ahead_s = horizon.ramp_s, SECOND_SHARE * horizon.ramp_s
+    second = horizon.update_period_s, ahead_s, response_time_s, velocity_weight_s, loop
+
+    def solve_jerk() -> dict[str, Any]:
+        from mambo_codegen.methods.quadratic.solutions import solve_following  # noqa: PLC0415 - as above
+
+        return solve_following(*second)
+
+    following = keep("following", second, solve_jerk)
+    rows = [
+        [*row[:_JERK], jerk, *row[_JERK + 1 :]]
+        for row, jerk in zip(found.rows, following["jerk"], strict=True)
+    ]
+    return replace(found, rows=rows, snap_s=following["snap_s"])
 
 
 def limits(settings: Sections) -> LimitsConstants:

@@ -18,6 +18,7 @@ from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.law import STATES
 from mambo_codegen.methods.quadratic.optimizer import ROW_QUANTITIES
 from mambo_codegen.methods.quadratic.step import REST_M_S
+from mambo_codegen.methods.quadratic.target_observer_constants import FALL
 from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vector_context
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
@@ -45,6 +46,7 @@ class Quadratic(QuadraticConstants, Method):
         "axis": "what x, y and the height have in common",
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
+        "target_observer": "motion of the target, by set-points that say what they know",
         "optimizer": "the minimum of the cost",
         "guard": "how much the commands may vary",
         "height": "the third axis, whose command is the thrust",
@@ -90,6 +92,15 @@ class Quadratic(QuadraticConstants, Method):
     def reference_controller(self, n: int = 1) -> QuadraticController:
         """Return n controllers in NumPy that compute the bits of the C."""
         return QuadraticController(self, n)
+
+    @property
+    def proofs(self) -> Mapping[str, tuple[str, ...]]:
+        """The options of the proofs; with an observer of the target its rows have a contract."""
+        found = super().proofs
+        if self.target_observer is None or "refuse_nan" not in found:
+            return found
+        *others, specs = found["refuse_nan"]
+        return {**found, "refuse_nan": (*others, f"{specs},motion_row")}
 
     @property
     def results(self) -> tuple[StepResult, ...]:
@@ -148,6 +159,7 @@ class Quadratic(QuadraticConstants, Method):
             **height_context(self.height),
             **thrust_vector_context(self.thrust_vector),
             **tilt_gain_context(self.tilt_gain),
+            **_target_context(self),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
             "doubts": self.tracker is not None and self.tracker.noise is not None,
@@ -171,6 +183,20 @@ class Quadratic(QuadraticConstants, Method):
             "plain_products": _plain_products(self),
             "rest_m_step": REST_M_S * period_s,
         }
+
+
+def _target_context(constants: QuadraticConstants) -> dict[str, object]:
+    """Return what the template of the target's observer inserts."""
+    found = constants.target_observer
+    if found is None:
+        return {}
+    return {
+        "observer_of_target": found,
+        "memory_fall": FALL,
+        "level_snap_s": float(np.mean(constants.law.snap_s)),
+        "climb_snap_s": constants.height.snap_s if constants.height else None,
+        "drag": bool(constants.observer.drag_1_step),
+    }
 
 
 def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: float) -> NDArray[np.float64]:
@@ -197,6 +223,15 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
         (formats.LAGGED * limit, "acceleration"),
         (constants.settings.limits.tilt_rad, "angle"),
     ]
+    if observed := constants.target_observer:
+        bounds += [
+            (observed.update_s * observed.level.acceleration, "acceleration"),
+            (observed.update_s * observed.level.jerk, "acceleration"),
+            (observed.velocity_range, "velocity"),
+            (observed.most_noise, "velocity"),
+            (observed.longest, "whole"),
+            *((one, "velocity") for limits in observed.limits for one in limits.row),
+        ]
     if tracker:
         bounds += [
             (tracker.acceleration_bound_m_step2, "acceleration"),
@@ -208,7 +243,7 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
     tells_noise = constants.tracker is not None and constants.tracker.noise is not None
-    learns = constants.tilt_gain is not None
+    learns, observes = constants.tilt_gain is not None, constants.target_observer is not None
     wanted = {
         "speed_product": True,
         **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),
@@ -224,10 +259,12 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
             ("reach_product", "gravity_product", "step2_product", "thrust_product"),
             constants.has_height,
         ),
-        "factor_product": constants.has_height or tells_noise or learns,
+        "factor_product": constants.has_height or tells_noise or learns or observes,
         "learning_product": learns,
-        "noise_product": tells_noise,
-        "target_product": constants.tracker is not None,
-        "tracker_product": constants.tracker is not None,
+        "noise_product": tells_noise or observes,
+        "target_product": constants.tracker is not None or observes,
+        "tracker_product": constants.tracker is not None or observes,
+        "change_product": observes,
+        "count_product": observes,
     }
     return [name for name, is_wanted in wanted.items() if is_wanted]

@@ -20,6 +20,9 @@ _DISTURBANCE_POLE_1_S: Final = "0.001"
 _LEAK_1_S: Final = "0.001"
 """The integral part decays at this rate, so that a loop that never answers has a bounded model."""
 
+_MOST_SNAP_S: Final = 1
+"""Of what a move takes of the derivative of the target's jerk, over what it takes of the jerk."""
+
 _SETTLING: Final = 42
 """Lags after which what decays with at least half their rate is below 1e-9."""
 
@@ -70,7 +73,7 @@ class _Law:
     """The law along one axis."""
 
     def __init__(self, period_s: Any, response_time_s: float, velocity_weight_s: float, loop: _Loop) -> None:
-        self._period_s, self._loop = period_s, loop
+        self.period_s, self._loop = period_s, loop
         self._transition, self._input = _model(loop, period_s)
         self._state_cost = mp.zeros(8)
         self._state_cost[0, 0] = mp.mpf(1)
@@ -111,15 +114,88 @@ class _Law:
         loop = self._transition + (self._input * change)
         return mp.matrix([[loop[row, column] for column in _MOVED] for row in _MOVED])
 
+    def steady(self, degree: int) -> tuple[list[Any], Any]:
+        """Return state and command of a drone that keeps its distance, 0, to a target in motion.
+
+        The target's acceleration is t^degree / degree!, and now t = 0. The state has the next command for
+        `_COMMAND`; the last one stands beside it. Exact at the control steps: the change of the velocity in
+        each is the target's, so state and command are polynomials of the step's number.
+        """
+        inner, period_s = [4, 5, 6], self.period_s
+        system, right = mp.zeros(4), mp.zeros(4, degree + 1)
+        for i, row in enumerate([*inner, 1]):
+            for j, column in enumerate([*inner, _COMMAND]):
+                system[i, j] = self._input[row] if column == _COMMAND else self._transition[row, column]
+        for i in range(3):
+            system[i, i] -= 1
+        for power in range(degree + 1):
+            right[3, power] = (
+                period_s ** (degree + 1) * mp.binomial(degree + 1, power) / mp.factorial(degree + 1)
+            )
+        found = mp.zeros(4, degree + 1)
+        for power in range(degree, -1, -1):
+            wanted = right[:, power].copy()
+            for higher in range(power + 1, degree + 1):
+                for i in range(3):
+                    wanted[i] += mp.binomial(higher, power) * found[i, higher]
+            found[:, power] = mp.lu_solve(system, wanted)
+        state = [mp.mpf(0)] * 8
+        for i, column in enumerate([*inner, _COMMAND]):
+            state[column] = found[i, 0]
+        drift = sum(self._transition[0, column] * state[column] for column in inner)
+        drift += self._input[0] * state[_COMMAND]
+        state[1] = (period_s ** (degree + 2) / mp.factorial(degree + 2) - drift) / period_s
+        before = sum(found[3, power] * (-1) ** power for power in range(degree + 1))
+        return state, before
+
+    def following(self, rows: Matrix) -> tuple[Any, Any]:
+        """Return what the first move must take of the target's jerk, and of its next derivative."""
+        found = []
+        for degree in (1, 2):
+            state, before = self.steady(degree)
+            others = sum(rows[0, k] * state[k] for k in _MOVED if k != _COMMAND)
+            found.append(state[_COMMAND] - others - rows[0, _COMMAND] * before)
+        return found[0], found[1]
+
     def scale(self) -> list[Any]:
         """Return the factors from rows for SI units to rows for steps.
 
         Moves are in m/step^2, the jerk in m/step^3; the integral part counts as an acceleration.
         """
-        share, period_s = self._loop.integral_1_s, self._period_s
+        share, period_s = self._loop.integral_1_s, self.period_s
         integral = 1 / share if share else mp.mpf(0)
         one = mp.mpf(1)
         return [period_s**2, period_s, one, 1 / period_s, one, integral, one, one]
+
+
+def solve_following(
+    update_period_s: float,
+    horizon_s: tuple[float, float],
+    response_time_s: float,
+    velocity_weight_s: float,
+    loop: LoopValues,
+) -> dict[str, Any]:
+    """Return what the free moves must take of the target's jerk to follow it without a distance.
+
+    `horizon_s` is the ramp, and by how much the second move looks further ahead than the first.
+    "jerk": of each move, in steps.
+    "snap_s": what the first move must take of the target's next derivative, over that, in s.
+    """
+    ramp_s, second_s = horizon_s
+    law = _Law(mp.mpf(update_period_s), response_time_s, velocity_weight_s, _Loop(*loop))
+    ramp = round(ramp_s / update_period_s)
+    rows = law.two_moves(ramp)[0] if ramp else law.one_move()
+    jerk, snap = law.following(rows)
+    found = [jerk]
+    if ramp:
+        first, before = law.steady(1)
+        ahead = first[_COMMAND] + mp.mpf(second_s)
+        others = sum(rows[1, k] * first[k] for k in _MOVED if k != _COMMAND)
+        found.append(ahead - others - rows[1, _COMMAND] * before)
+    return {
+        "jerk": [float(one / law.period_s) for one in found],
+        "snap_s": float(min(max(snap / jerk, 0), _MOST_SNAP_S)) if jerk > 0 else 0.0,
+    }
 
 
 def _model(loop: _Loop, period_s: Any) -> tuple[Matrix, Matrix]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +15,18 @@ from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, Hei
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
+from mambo_codegen.methods.quadratic.target_observer import TargetObserver, level_observer
 from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState, unknown_gain
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory
 from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.methods.shared.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 
 _GROUNDED: Final = 9
 """The column of a state that says whether the drone touches the floor, if there is a height."""
 
-_LEVEL: Final = ("position_m", "velocity_m_s", "acceleration_m_s2")
-_UPWARD: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2")
+_LEVEL: Final = ("position_m", "velocity_m_s", "acceleration_m_s2", "ahead_m_s2", "known")
+_UPWARD: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2", "climb_ahead_m_s2", "known")
 """What is read of a target along x and y, and up."""
 REST_M_S: Final = 0.02
 """After an outage the model brakes to this speed along both axes; then the command is level."""
@@ -35,14 +36,14 @@ REST_M_S: Final = 0.02
 class QuadraticMemory:
     """State of n controllers between two steps.
 
-    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state.
-    height_bounds are zeros without a height. budget_rad (n, 2) is how much the commands may
-    vary, is_coarse (n,) whether no position is measured; zeros without a guard.
+    target is of a tracker or an observer. tilt_rad and command_rad are (n, 2), missed (n,) counts control
+    steps since the last good state. height_bounds are zeros without a height, as are, without a guard,
+    budget_rad (n, 2), how much the commands may vary, and is_coarse (n,), whether no position is measured.
     """
 
     estimate: Estimate
     attitude: AttitudeState
-    target: TargetMotion
+    target: Any
     limits: LimitsMemory
     tilt_rad: Real
     command_rad: Real
@@ -100,7 +101,7 @@ class _Aim:
     """
 
     target: Real
-    motion: TargetMotion
+    motion: Any
     limits: LimitsMemory
     height: HeightState
     weight: Real | None
@@ -129,7 +130,9 @@ class ControlStep:
         self.observer = KalmanObserver(constants, products)
         self.model = AttitudeModel(constants, products)
         self.optimizer = QuadraticOptimizer(constants, products, self.model.command_limit)
-        self.tracker = Tracker(constants.tracker, products) if constants.tracker else None
+        alpha_beta = Tracker(constants.tracker, products) if constants.tracker else None
+        self.tracker: Tracker | TargetObserver | None = alpha_beta or level_observer(constants, products)
+        self._no_motion = self.tracker.unknown if self.tracker else unknown_motion
         self.limits = LimitsLaw(constants, constants.limiting)
         self.height: HeightAxis | NoHeight = NoHeight(constants)
         if constants.height:
@@ -171,7 +174,7 @@ class ControlStep:
         return QuadraticMemory(
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self.model.steady(command_rad, self.height.command_weight(height)),
-            target=unknown_motion(zeros),
+            target=self._no_motion(zeros),
             limits=replace(limits, active=np.zeros_like(limits.active)),
             tilt_rad=zeros,
             command_rad=command_rad,
@@ -323,17 +326,21 @@ class ControlStep:
         limits, motion, target = self.limits.aim(
             memory.limits, memory.target, seen.estimate.position_m, level, follows
         )
-        motion = self._track_target(motion, target, follows)
+        motion, target = self._track_target(motion, level, target, (limits, memory.limits), follows)
         aim = _Aim(
             target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
         )
         return self._end_outage(aim, seen.estimate)
 
-    def _track_target(self, motion: TargetMotion, target: Real, follows: Rows) -> TargetMotion:
-        """Return how the targets (n, 4 or more) move that are followed (n,)."""
+    def _track_target(
+        self, motion: Any, program: Real, aim: Real, limits: tuple[LimitsMemory, LimitsMemory], follows: Rows
+    ) -> tuple[Any, Real]:
+        """Return how the programs' targets move that are followed (n,), and the aims (n, 4 or more)."""
         if self.tracker is None:
-            return motion
-        return choose(follows, self.tracker.update(motion, target[:, self.tracker.columns]), motion)
+            return motion, aim
+        now, before = (one.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST) != 0 for one in limits)
+        found, fitted = self.tracker.follow(motion, program, aim, (now, before))
+        return choose(follows, found, motion), np.where(follows[:, None], fitted, aim)
 
     def _end_outage(self, aim: _Aim, estimate: Estimate) -> _Aim:
         """Brake by the model's velocity where an outage lasts too long, until the model is at rest."""
@@ -345,7 +352,7 @@ class ControlStep:
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),
-            motion=choose(overdue, unknown_motion(aim.motion.velocity_m_s), aim.motion),
+            motion=choose(overdue, self._no_motion(aim.motion.velocity_m_s), aim.motion),
             limits=replace(aim.limits, active=active),
             height=self.height.clear_target(aim.height, overdue),
             missed=np.where(rests, self.at_rest, aim.missed),

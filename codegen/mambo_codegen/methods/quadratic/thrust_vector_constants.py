@@ -37,6 +37,9 @@ SPARE_SHARE: Final = 0.85
 LEAST_SPARE_M_S2: Final = 1.7
 """A horizontal acceleration that the height always leaves."""
 
+KNOWN_SPARE_RAD: Final = 0.36
+"""A tilt that the height always leaves where the target's acceleration is known."""
+
 CHORDS: Final = 4
 """Chords of equal angles that stand for a quarter circle."""
 
@@ -54,6 +57,7 @@ class ThrustVectorConstants:
     spare_m_step2:  the share THRUST_LEFT of the largest thrust.
     chords:         (CHORDS, 2) factors of the largest thrust and of its vertical part in what is spare.
     least_spare_m_step2: what is always spare.
+    known_spare:    the same over the vertical part of the thrust, where the target's acceleration is known.
     """
 
     slope_step2_m: float
@@ -66,6 +70,7 @@ class ThrustVectorConstants:
     spare_m_step2: float
     chords: NDArray[np.float64]
     least_spare_m_step2: float
+    known_spare: float
 
 
 def has_thrust_vector(settings: Sections) -> bool:
@@ -90,6 +95,7 @@ def thrust_vector_constants(settings: Sections, gain_m_step2_rad: float) -> Thru
         spare_m_step2=THRUST_LEFT * height.thrust_max_m_s2 * step2,
         chords=_chords(),
         least_spare_m_step2=LEAST_SPARE_M_S2 * step2,
+        known_spare=math.tan(KNOWN_SPARE_RAD),
     )
 
 
@@ -103,6 +109,7 @@ def thrust_vector_context(vector: ThrustVectorConstants | None) -> dict[str, obj
         "thrust_left": THRUST_LEFT,
         "spare_share": SPARE_SHARE,
         "least_spare_m_s2": LEAST_SPARE_M_S2,
+        "known_spare_rad": KNOWN_SPARE_RAD,
     }
 
 

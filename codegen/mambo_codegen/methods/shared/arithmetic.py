@@ -76,7 +76,7 @@ class Arithmetic(Products):
         )
 
     def target_product(self, factor: Any, value: Real) -> Real:
-        """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
+        """Return factor * change of a velocity, m/s, or a derivative of it in steps; in m/step^2."""
         return self._nearest(factor * value, "target_product")
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:

@@ -61,6 +61,11 @@ class Constants(ABC):
         return None
 
     @property
+    def target_observer(self) -> Any:
+        """The constants of the target's observer; None without one."""
+        return None
+
+    @property
     def climb_tracker(self) -> TrackerConstants | None:
         """The constants of the tracker of the target's height; None without one."""
         return None
@@ -101,15 +106,15 @@ class Constants(ABC):
             "feedback": self.feedback_steps is not None,
             "fixed": is_fixed,
             "float": is_fixed,
-            "given": settings.target.gives_acceleration,
             "guard": self.guard is not None,
             "height": self.has_height,
             "height_command": self.has_height,
             "limits": limiting is not None,
             "limits_arithmetic": limiting is not None,
-            "measured": tracker is not None and not tracker.is_given,
             "set_limits": limiting is not None,
             "thrust_vector": self.has_thrust_vector,
+            "target_motion": tracker is not None,
+            "target_observer": False,
             "tracker": tracker is not None,
             "turning": limiting is not None and limiting.turn_m_s_rad is not None,
         }

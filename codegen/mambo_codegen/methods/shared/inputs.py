@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.math import Real, clamp
 from mambo_codegen.numbers.representation import THRUST
+from mambo_codegen.port.taken import MOST_KNOWN
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -53,6 +54,7 @@ class Inputs:
         self._numbers, self._target = constants.numbers, constants.target
         self._state, self._command, self._shift = constants.state, constants.command, constants.shift
         self._has_height = constants.has_height
+        self._known = [one.column for one in constants.port.wholes("target")]
         self.limits = constants.limits
 
     def quantize(
@@ -85,6 +87,8 @@ class Inputs:
         """Return whether each state, each target and each thrust (n,) is finite and within its range."""
         limits = self.limits
         good_state, good_target = self._within(state, self._state), self._within(target, self._target)
+        if self._known:
+            good_target = good_target & np.isin(target[:, self._known[0]], range(MOST_KNOWN + 1))
         good_thrust: Rows = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
         return good_state, good_target, good_thrust
 

@@ -16,7 +16,7 @@ from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
-from mambo_codegen.methods.shared.tracker_constants import given_limit_m_s2
+from mambo_codegen.methods.shared.tracker_constants import target_limit_m_s2
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]
@@ -64,8 +64,8 @@ class LimitsMemory:
 
     command_limit: (n, 2) acceleration of a command at the tilt limit, right and forward, m/step^2; zeros with
                    the 1-norm.
-    velocity_m_s:  (n, 2) what stood for the target's velocity in the last step; zeros unless the target's
-                   acceleration is given.
+    velocity_m_s:  (n, 2) what stood for the target's velocity in the last step; zeros unless the target is
+                   observed.
     active:        (n,) the limits that acted in the last step, but TILT.
     target_m_s:    (n, 2) the target's velocity in the last step; zeros unless its turns limit the speed.
     turn_m2_s2:    (n,) mean product of successive ones, |v|^2 times the angle of an update period; likewise.
@@ -142,12 +142,13 @@ class LimitsLaw:
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
         self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
         self._trim = constant(limits.tilted.trim_m_s2, "braking")
-        self.is_given = constants.settings.target.gives_acceleration
-        self._jump = constant(given_limit_m_s2(constants.settings), "thrust") if self.is_given else None
+        self.is_observed = constants.settings.target.is_observed
+        self._jump = constant(target_limit_m_s2(constants.settings), "thrust") if self.is_observed else None
         self._turn = None
         if limits.turn_m_s_rad is not None:
             self._turn = constant(limits.turn_m_s_rad, "slope")
             self._least_turn = constant(LEAST_TURN_M2_S2, "velocity")
+        self._forgets = constants.tracker is not None
         self.defaults: Real = self.quantize([limits.limits])
 
     def memory(self, limits: Real) -> LimitsMemory:
@@ -304,7 +305,11 @@ class LimitsLaw:
         """
         after, within = self.limit(memory, position, target)
         motion = choose(follows, self.forget_braking(motion, memory, after, target), motion)
-        return choose(follows, after, memory), motion, np.where(follows[:, None], within, target)
+        return (
+            choose(follows, after, memory),
+            motion,
+            np.where(follows[:, None], within, target[:, : within.shape[1]]),
+        )
 
     def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
         """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
@@ -313,7 +318,7 @@ class LimitsLaw:
         limit_active = (active != 0)[:, None]
         velocity = np.where(limit_active, desired, target[:, 2:4])
         columns = [np.where(limit_active, position, target[:, 0:2]), velocity]
-        if self.is_given:
+        if self.is_observed:
             columns.append(np.where(limit_active, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
             memory = replace(memory, velocity_m_s=velocity)
         return replace(memory, active=active), np.concatenate(columns, axis=1)
@@ -322,6 +327,8 @@ class LimitsLaw:
         self, motion: TargetMotion, before: LimitsMemory, after: LimitsMemory, target: Real
     ) -> TargetMotion:
         """Return what is known of targets (n, 4 or more), nothing where braking ends."""
+        if not self._forgets:
+            return motion
         was = before.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)
         ends = (was == ActiveLimit.BRAKING) & (after.active == 0) & self.is_slow(after.bounds, target)
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
@@ -332,7 +339,7 @@ class LimitsLaw:
         def changed(velocity: Real) -> Real:
             return clamp(velocity + change_m_s[:, 0:2], self._ranges.velocity)
 
-        if self.is_given:
+        if self.is_observed:
             memory = replace(memory, velocity_m_s=changed(memory.velocity_m_s))
         return memory if self._turn is None else replace(memory, target_m_s=changed(memory.target_m_s))
 
@@ -355,7 +362,7 @@ class LimitsLaw:
             )
         ]
         columns += [memory.command_limit] if has_command else []
-        columns += [memory.velocity_m_s] if self.is_given else []
+        columns += [memory.velocity_m_s] if self.is_observed else []
         return columns + ([] if self._turn is None else [memory.target_m_s, memory.turn_m2_s2[:, None]])
 
     def _rate(self, velocity: Real, previous: Real) -> Real:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.shared.arithmetic import Arithmetic
+from mambo_codegen.methods.shared.inputs import Rows
 from mambo_codegen.methods.shared.math import Real, clamp, confine
 from mambo_codegen.methods.shared.tracker_constants import (
     LEAST_CHANGE,
@@ -20,7 +21,7 @@ from mambo_codegen.methods.shared.tracker_constants import (
 class TargetMotion:
     """What n controllers know of their targets' motion.
 
-    velocity_m_s:         (n, 2) velocity along x, y in the last good step; 0 if the acceleration is given.
+    velocity_m_s:         (n, 2) velocity along x, y in the last good step.
     acceleration_m_step2: (n, 2) tau^2 times the estimated acceleration.
     jerk_m_step2_update:  (n, 2) estimated change of that from one control step to the next.
     deviation:            (n, 2) what was new of the acceleration in the last step, over the most that counts.
@@ -89,11 +90,9 @@ class Tracker:
 
     def __init__(self, constants: TrackerConstants, arithmetic: Arithmetic) -> None:
         constant = arithmetic.numbers.constant
-        self._arithmetic, self.is_given = arithmetic, constants.is_given
-        self.columns = slice(4, 6) if constants.is_given else slice(2, 4)
-        """What the tracker reads of a target."""
-        self._input_limit = constant(constants.input_limit, constants.input_quantity)
-        self._factor = constant(constants.factor, "tracker")
+        self._arithmetic = arithmetic
+        self._change_limit = constant(constants.change_limit_m_s, "velocity")
+        self._factor = constant(constants.factor_s, "tracker")
         self._bound = constant(constants.acceleration_bound_m_step2, "acceleration")
         self._velocity_range = constant(constants.velocity_range_m_s, "velocity")
         self._jerk_limit = constant(constants.jerk_limit_m_step2_update, "acceleration")
@@ -102,30 +101,31 @@ class Tracker:
         self._jerk_gain = constant(constants.jerk_gain, "sine")
         self._noise = TargetNoiseShare(constants.noise, constants, arithmetic) if constants.noise else None
 
+    def unknown(self, like: Real) -> TargetMotion:
+        """Return the motion before the first step, with the shape (n, k) and the type of `like`."""
+        return unknown_motion(like)
+
+    def follow(
+        self, motion: TargetMotion, program: Real, aim: Real, limited: tuple[Rows, Rows]
+    ) -> tuple[TargetMotion, Real]:
+        """Return the motions after targets within the limits (n, 4 or more), which stay as they are."""
+        del program, limited
+        return self.update(motion, aim[:, 2:4]), aim
+
     def stored(self, motion: TargetMotion) -> list[Real]:
         """Return the columns (n, k) that nmpc_t stores of motions, in their order."""
-        velocity = [] if self.is_given else [motion.velocity_m_s]
-        stored = [*velocity, motion.acceleration_m_step2, motion.jerk_m_step2_update]
+        stored = [motion.velocity_m_s, motion.acceleration_m_step2, motion.jerk_m_step2_update]
         if self._noise is not None:
             noise = np.stack([motion.deviation, motion.reversal, motion.doubt], axis=2)
             stored.append(noise.reshape(len(noise), -1))
         return stored
 
-    def update(self, motion: TargetMotion, given: Real) -> TargetMotion:
-        """Take what the tracker reads of the target (n, 2) in a control step into the estimates.
-
-        That is its velocity, or its acceleration if that is given.
-        """
-        product, known = self._arithmetic.tracker_product, motion.is_known[:, None]
-        if self.is_given:
-            velocity, steady = motion.velocity_m_s, known
-            measured = self._arithmetic.target_product(self._factor, clamp(given, self._input_limit))
-            at_first = measured
-        else:
-            velocity, at_first = given, motion.acceleration_m_step2
-            change = velocity - motion.velocity_m_s
-            steady = known & (np.abs(change) <= self._input_limit)
-            measured = self._arithmetic.target_product(self._factor, change)
+    def update(self, motion: TargetMotion, velocity: Real) -> TargetMotion:
+        """Take the targets' velocities (n, 2) of a control step into the estimates."""
+        product = self._arithmetic.tracker_product
+        change = velocity - motion.velocity_m_s
+        steady = motion.is_known[:, None] & (np.abs(change) <= self._change_limit)
+        measured = self._arithmetic.target_product(self._factor, change)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
         jerk, noise = motion.jerk_m_step2_update, (motion.deviation, motion.reversal, motion.doubt)
@@ -139,7 +139,7 @@ class Tracker:
         jerk = clamp(jerk + product(self._jerk_gain, difference), self._jerk_limit)
         return TargetMotion(
             velocity_m_s=velocity,
-            acceleration_m_step2=np.where(steady, acceleration, at_first),
+            acceleration_m_step2=np.where(steady, acceleration, motion.acceleration_m_step2),
             jerk_m_step2_update=np.where(steady, jerk, np.zeros_like(jerk)),
             deviation=np.where(steady, noise[0], motion.deviation),
             reversal=np.where(steady, noise[1], motion.reversal),
@@ -149,25 +149,18 @@ class Tracker:
 
     def shift(self, motion: TargetMotion, change_m_s: Real) -> TargetMotion:
         """Change the targets' velocities by the first columns of `change_m_s`, which is no acceleration."""
-        if self.is_given:
-            return motion
         change = change_m_s[:, : motion.velocity_m_s.shape[1]]
         return replace(motion, velocity_m_s=clamp(motion.velocity_m_s + change, self._velocity_range))
 
     def turn(self, motion: TargetMotion, sine: Real, cosine: Real) -> TargetMotion:
         """Turn the targets' accelerations (n, 2) by the angles of sine and cosine (n,).
 
-        And their jerks if the accelerations are given; else the next velocities are the first ones, where the
-        jerk begins at 0.
+        The next velocities are the first ones, where the jerk begins at 0.
         """
         turn = self._arithmetic.turn
         acceleration = clamp(turn(motion.acceleration_m_step2, sine, cosine), self._bound)
-        turned = replace(motion, acceleration_m_step2=acceleration)
-        if not self.is_given:
-            return self.begin_again(turned)
-        jerk = clamp(turn(motion.jerk_m_step2_update, sine, cosine), self._jerk_limit)
-        return replace(turned, jerk_m_step2_update=jerk)
+        return self.begin_again(replace(motion, acceleration_m_step2=acceleration))
 
     def begin_again(self, motion: TargetMotion) -> TargetMotion:
-        """Take the next velocities for the first ones; accelerations that are given go on."""
-        return motion if self.is_given else replace(motion, is_known=np.zeros_like(motion.is_known))
+        """Take the next velocities for the first ones."""
+        return replace(motion, is_known=np.zeros_like(motion.is_known))

@@ -47,20 +47,17 @@ class TargetNoise:
 class TrackerConstants:
     """Constants of the target tracker, float64.
 
-    is_given: whether the caller gives the acceleration; else the tracker measures it by changes of velocity.
-    input_limit: largest measured change of the target's velocity in an update period that is no jump, m/s;
-        or the limit of a given acceleration, m/s^2.
-    factor: makes such an input an acceleration in m/step^2: tau^2/T_s, in s; or tau^2, in s^2.
-    acceleration_limit_m_step2: the acceleration of the largest input, M.
+    change_limit_m_s: largest change of the target's velocity in an update period that is no jump.
+    factor_s: tau^2/T_s, which makes such a change an acceleration in m/step^2.
+    acceleration_limit_m_step2: the acceleration of the largest change, M.
     jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
     gain, jerk_gain: alpha and beta.
-    noise: that of the guard; None without one, and where a given acceleration is taken as it comes.
+    noise: that of the guard; None without one.
     velocity_range_m_s: largest velocity of a target.
     """
 
-    is_given: bool
-    input_limit: float
-    factor: float
+    change_limit_m_s: float
+    factor_s: float
     acceleration_limit_m_step2: float
     jerk_limit_m_step2_update: float
     gain: float
@@ -75,14 +72,9 @@ class TrackerConstants:
         return 1.01 * (self.acceleration_limit_m_step2 + rest)
 
     @property
-    def input_quantity(self) -> str:
-        """The quantity of the inputs."""
-        return "thrust" if self.is_given else "velocity"
-
-    @property
-    def tested_input(self) -> float:
-        """Largest input in tests: one in five drawn is beyond the limit."""
-        return 1.25 * self.input_limit
+    def tested_change_m_s(self) -> float:
+        """Largest change in tests: one in five drawn is beyond the limit."""
+        return 1.25 * self.change_limit_m_s
 
 
 def tracker_constants(
@@ -93,41 +85,34 @@ def tracker_constants(
     `jump_m_s2` is the acceleration from which
     on the target has jumped; None for what the tilt limit gives.
     """
-    if settings.target.acceleration == "none":
+    if settings.target.acceleration != "tracked":
         return None
-    is_given, ranges = settings.target.acceleration == "given", settings.ranges
     update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
-    if is_given:
-        input_limit = given_limit_m_s2(settings, jump_m_s2)
-        factor = step_s * step_s
-    else:
-        acceleration_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
-        input_limit = min(acceleration_m_s2 * update_s, 2 * ranges.velocity_m_s)
-        factor = (step_s * step_s) / update_s
-    acceleration_m_step2 = factor * input_limit
+    acceleration_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
+    change_limit_m_s = min(acceleration_m_s2 * update_s, 2 * settings.ranges.velocity_m_s)
+    factor_s = (step_s * step_s) / update_s
+    acceleration_m_step2 = factor_s * change_limit_m_s
     return TrackerConstants(
-        is_given=is_given,
-        input_limit=input_limit,
-        factor=factor,
+        change_limit_m_s=change_limit_m_s,
+        factor_s=factor_s,
         acceleration_limit_m_step2=acceleration_m_step2,
         jerk_limit_m_step2_update=JERK_SHARE * acceleration_m_step2,
         gain=gain,
         jerk_gain=gain * gain / (2 - gain),
         noise=_target_noise(settings, step_s),
-        velocity_range_m_s=ranges.velocity_m_s,
+        velocity_range_m_s=settings.ranges.velocity_m_s,
     )
 
 
-def given_limit_m_s2(settings: Sections, jump_m_s2: float | None = None) -> float:
-    """Return the limit of a given acceleration; `jump_m_s2` as of `tracker_constants`."""
-    most_m_s2 = jump_m_s2 or (JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad)
+def target_limit_m_s2(settings: Sections) -> float:
+    """Return the acceleration of a target from which on it has jumped."""
+    most_m_s2 = JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad
     return min(most_m_s2, settings.ranges.thrust_acceleration_max_m_s2)
 
 
 def _target_noise(settings: Sections, step_s: float) -> TargetNoise | None:
-    """Return the noise of a target; None if what is new of it is believed as it comes."""
-    target = settings.target
-    if settings.guard is None or (target.acceleration == "given" and target.tracker_gain == 1):
+    """Return the noise of a target; None without a guard: then what is new is believed as it comes."""
+    if settings.guard is None:
         return None
     limit_m_step2 = MOST_NOISE * settings.guard.target_noise_m_s2 * step_s * step_s
     return TargetNoise(

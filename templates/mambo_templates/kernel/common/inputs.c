@@ -26,12 +26,16 @@ NMPC_INLINE int is_good_target(const nmpc_target_t *target)
 {
     int is_good = is_good_point(target->position_m, target->velocity_m_s);
 
-#if WITH_GIVEN
+#if WITH_TARGET_OBSERVER
     is_good = is_good && within(target->acceleration_m_s2[0], NMPC_THRUST_ACCELERATION_MAX_M_S2)
               && within(target->acceleration_m_s2[1], NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    is_good = is_good && within(target->ahead_m_s2[0], NMPC_THRUST_ACCELERATION_MAX_M_S2)
+              && within(target->ahead_m_s2[1], NMPC_THRUST_ACCELERATION_MAX_M_S2) && (target->known >= 0)
+              && (target->known <= NMPC_MOST_KNOWN);
 #endif
-#if WITH_HEIGHT and WITH_GIVEN
+#if WITH_HEIGHT and WITH_TARGET_OBSERVER
     is_good = is_good && within(target->climb_acceleration_m_s2, NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    is_good = is_good && within(target->climb_ahead_m_s2, NMPC_THRUST_ACCELERATION_MAX_M_S2);
 #endif
 #if WITH_HEIGHT
     is_good = is_good && within(target->height_m, NMPC_POSITION_RANGE_M)

@@ -18,7 +18,7 @@
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T; and the change of v_d for the target's acceleration, where that is given.
+ * v_d for v_T; and the change of v_d for the target's acceleration, where that may be known.
  */
 
 #if WITH_TRACKER
@@ -280,7 +280,7 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     const nmpc_real_t fastest_m_s = bounds->speed_m_s;
 #endif
     unsigned int active = 0U;
-#if WITH_GIVEN
+#if WITH_TARGET_OBSERVER
     const nmpc_real_t *velocity_m_s = target->velocity_m_s;
 #endif
 
@@ -289,7 +289,7 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
-#if WITH_GIVEN
+#if WITH_TARGET_OBSERVER
     if (active != 0U) {
         int axis;
 

@@ -6,7 +6,7 @@
  * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
  * predicted one P and the new estimates are
  *
- *     M = (tau^2/T_s) (Tv_k - Tv_k-1), or tau^2 a_k where the acceleration a_k is given
+ *     M = (tau^2/T_s) (Tv_k - Tv_k-1)
  *     P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
@@ -24,14 +24,9 @@
  * of Newton's steps to s, s (2 - s (1 + c^2 r)), which needs no division; s falls to a quarter of itself at most. */
 
 #endif
-#if WITH_GIVEN
-/* A given acceleration a_k is limited to 1.5 times what gravity and the tilt limit let the drone follow. In the first
- * control step A_T is M, and J_T is 0. */
-#else
 /* A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
  * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are
  * 0. */
-#endif
 
 #include "tracker.h"
 
@@ -45,9 +40,7 @@ static void tracker_clear(nmpc_t *self)
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
-#if not WITH_GIVEN
         self->tracker.velocity_m_s[axis] = (nmpc_real_t)0;
-#endif
         self->tracker.acceleration_m_step2[axis] = (nmpc_real_t)0;
         self->tracker.jerk_m_step2_update[axis] = (nmpc_real_t)0;
 #if WITH_DOUBTS
@@ -115,30 +108,6 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
 #endif
 }
 
-#if WITH_GIVEN
-/* Take the target's acceleration of this control step into the estimates. */
-NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t acceleration_m_s2[2])
-{
-    nmpc_tracker_t *const tracker = &self->tracker;
-    int axis;
-
-#if not WITH_HEIGHT
-    NMPC_UNROLL
-#endif
-    for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t given_m_s2 = clamp(acceleration_m_s2[axis], NMPC_TARGET_LIMIT_M_S2);
-        const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_S2, given_m_s2);
-
-        if (self->has_target != 0U) {
-            tracker_correct(tracker, axis, measured_m_step2);
-        } else {
-            tracker->acceleration_m_step2[axis] = measured_m_step2;
-            tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
-        }
-    }
-    self->has_target = 1U;
-}
-#else
 /* Take the target's velocity of this control step into the estimates. */
 NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
 {
@@ -169,9 +138,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     }
     self->has_target = 1U;
 }
-#endif
 
-#if not WITH_GIVEN
 /* The frame has jumped: the target's velocity changes with it, and that is no acceleration. */
 static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[])
 {
@@ -182,26 +149,16 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
     }
 }
 
-#endif
-/* The frame has turned: so does the target's acceleration. Where it is estimated, the next velocity of the target is
- * taken for its first one: there the jerk begins at 0. */
+/* The frame has turned: so does the target's acceleration. The next velocity of the target is taken for its first one,
+ * where the jerk begins at 0. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
     int axis;
 
     turn_vector(tracker->acceleration_m_step2, sine, cosine);
-#if WITH_GIVEN
-    turn_vector(tracker->jerk_m_step2_update, sine, cosine);
-#endif
     for (axis = 0; axis < 2; axis++) {
         tracker->acceleration_m_step2[axis] = clamp(tracker->acceleration_m_step2[axis], NMPC_TARGET_BOUND_M_STEP2);
-#if WITH_GIVEN
-        tracker->jerk_m_step2_update[axis] =
-            clamp(tracker->jerk_m_step2_update[axis], NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
-#endif
     }
-#if not WITH_GIVEN
     self->has_target = 0U;
-#endif
 }

@@ -207,7 +207,7 @@ nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m
         return NMPC_BAD_SHIFT;
     }
 
-#if WITH_TRACKER and not WITH_GIVEN
+#if WITH_TRACKER
     tracker_shift(&self->tracker, velocity_change_m_s);
 #endif
 #if WITH_LIMITS

@@ -91,13 +91,8 @@ NMPC_INLINE nmpc_real_t step_product(nmpc_real_t step_rad, nmpc_real_t factor)
 
 NMPC_INLINE nmpc_real_t target_product(nmpc_real_t factor, nmpc_real_t value)
 {
-#if WITH_GIVEN
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value,
-                                     NMPC_TRACKER_BITS + NMPC_THRUST_BITS - NMPC_ACCELERATION_BITS);
-#else
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value,
                                      NMPC_TRACKER_BITS + NMPC_VELOCITY_BITS - NMPC_ACCELERATION_BITS);
-#endif
 }
 
 /* A gain of the tracker is at most 1 and has the format of a sine. */

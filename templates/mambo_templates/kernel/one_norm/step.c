@@ -48,9 +48,7 @@ static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t
         aim = &limited;
     }
 #endif
-#if WITH_TRACKER and WITH_GIVEN
-    tracker_update(self, aim->acceleration_m_s2);
-#elif WITH_TRACKER
+#if WITH_TRACKER
     tracker_update(self, aim->velocity_m_s);
 #endif
 #if WITH_HOVER

@@ -19,30 +19,45 @@ NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
 {
     const nmpc_real_t position_m[2] = { step->observer.position_m[0], step->observer.position_m[1] };
 
+#if WITH_TARGET_OBSERVER and WITH_HEIGHT
+    step->was_limited = ((unsigned int)self->limited % NMPC_LIMIT_HEIGHT) != 0U;
+#elif WITH_TARGET_OBSERVER
+    step->was_limited = self->limited != 0U;
+#endif
     if (limits_apply(self, position_m, step->aim, step->limited) != 0U) {
         step->aim = step->limited;
     }
 }
 
-#if WITH_TRACKER
+#if WITH_TARGET_OBSERVER
+/* Estimate how a target moves; where its velocity alone is known, the estimated one stands for it. */
+NMPC_INLINE void observe_target(nmpc_t *self, nmpc_step_t *step, const nmpc_target_t *target)
+{
+    tracker_update(self, target, step->aim, step->was_limited);
+    if ((step->aim == target) && (target->known == 0)) {
+        step->limited->position_m[0] = target->position_m[0];
+        step->limited->position_m[1] = target->position_m[1];
+        step->limited->velocity_m_s[0] = self->tracker.axis[0].velocity_m_s;
+        step->limited->velocity_m_s[1] = self->tracker.axis[1].velocity_m_s;
+        step->aim = step->limited;
+    }
+}
+
+#elif WITH_TRACKER
 /* Estimate how the target moves. */
 NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_GIVEN
-    tracker_update(self, step->aim->acceleration_m_s2);
-#else
     tracker_update(self, step->aim->velocity_m_s);
-#endif
 }
 
 #endif
 /* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. */
 NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_TRACKER
+#if WITH_TARGET_MOTION
     tracker_clear(self);
 #endif
-#if WITH_TRACKER and WITH_HEIGHT
+#if WITH_TARGET_MOTION and WITH_HEIGHT
     height_clear_target(&self->height);
 #endif
 #if WITH_THRUST_VECTOR
@@ -77,8 +92,14 @@ NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
     if (step->missed == NMPC_NO_ESTIMATE) {
         end_outage(self, step);
     } else if (step->aim != NULL) {
+#if WITH_TARGET_OBSERVER
+        const nmpc_target_t *const target = step->aim;
+
+#endif
         limit_target(self, step);
-#if WITH_TRACKER
+#if WITH_TARGET_OBSERVER
+        observe_target(self, step, target);
+#elif WITH_TRACKER
         track_target(self, step);
 #endif
     } else {

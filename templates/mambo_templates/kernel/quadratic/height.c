@@ -184,20 +184,29 @@ NMPC_INLINE void height_track_acceleration(nmpc_height_t *height, nmpc_real_t me
 #endif
 }
 
+#endif
+#if WITH_TARGET_OBSERVER
 /* Take the target of this control step into the estimate of its motion. */
 NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target, int is_known)
 {
-#if WITH_GIVEN
-    const nmpc_real_t given_m_s2 = clamp(target->climb_acceleration_m_s2, NMPC_CLIMB_ACCELERATION_LIMIT_M_S2);
-    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_S2, given_m_s2);
+    nmpc_set_point_t point;
 
-    if (is_known != 0) {
-        height_track_acceleration(height, measured_m_step2);
-    } else {
-        height->target_acceleration_m_step2 = measured_m_step2;
-        height->target_jerk_m_step2_update = (nmpc_real_t)0;
-    }
-#else
+    point.velocity_m_s = target->climb_m_s;
+    point.acceleration_m_s2 = target->climb_acceleration_m_s2;
+    point.ahead_m_s2 = target->climb_ahead_m_s2;
+    point.known = target->known;
+    motion_observe(&height->target, &point, motion_limits[1], is_known == 0);
+    motion_feed(&height->target, point.known,
+                (point.known > 1) ? NMPC_AHEAD_SNAP_TO_CLIMB_JERK_S : NMPC_SNAP_TO_CLIMB_JERK_S,
+                &height->target_acceleration_m_step2, &height->target_jerk_m_step2_update);
+    height->target_jerk_m_step2_update = clamp(height->target_jerk_m_step2_update,
+                                               target_product(NMPC_STEP_TO_STEP2_S, motion_limits[1][NMPC_MOST_JERK]));
+}
+
+#elif WITH_TRACKER
+/* Take the target of this control step into the estimate of its motion. */
+NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target, int is_known)
+{
     const nmpc_real_t change_m_s = target->climb_m_s - height->target_velocity_m_s;
 #if WITH_FIXED
     /* The clamp changes nothing where it counts: it tells a proof by intervals how large the change is. */
@@ -213,13 +222,14 @@ NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target
         height->target_jerk_m_step2_update = (nmpc_real_t)0;
     }
     height->target_velocity_m_s = target->climb_m_s;
-#endif
 }
 
+#endif
+#if WITH_TARGET_MOTION
 /* Forget the target. */
 NMPC_INLINE void height_clear_target(nmpc_height_t *height)
 {
-#if not WITH_GIVEN
+#if WITH_TRACKER
     height->target_velocity_m_s = (nmpc_real_t)0;
 #endif
     height->target_acceleration_m_step2 = (nmpc_real_t)0;
@@ -228,6 +238,9 @@ NMPC_INLINE void height_clear_target(nmpc_height_t *height)
     height->target_noise.deviation = (nmpc_real_t)0;
     height->target_noise.reversal = (nmpc_real_t)0;
     height->target_noise.doubt = (nmpc_real_t)0;
+#endif
+#if WITH_TARGET_OBSERVER
+    motion_clear(&height->target);
 #endif
 }
 
@@ -250,8 +263,11 @@ static void height_set_thrust(nmpc_height_t *height, nmpc_real_t thrust_m_s2)
 static void height_shift(nmpc_height_t *height, nmpc_real_t change_m, nmpc_real_t change_m_s)
 {
     axis_shift(&height->height_m, &height->velocity_m_step, change_m, speed_product(NMPC_UPDATE_STEP_S, change_m_s));
-#if WITH_TRACKER and not WITH_GIVEN
+#if WITH_TRACKER
     height->target_velocity_m_s = clamp(height->target_velocity_m_s + change_m_s, NMPC_VELOCITY_RANGE_M_S);
+#endif
+#if WITH_TARGET_OBSERVER
+    height->target.velocity_m_s = clamp(height->target.velocity_m_s + change_m_s, NMPC_VELOCITY_RANGE_M_S);
 #endif
 }
 
@@ -273,7 +289,7 @@ static void height_reset(nmpc_height_t *height, nmpc_real_t thrust_m_s2, nmpc_re
     height->commanded_m_s2 = height->thrust_m_s2;
     height->budget_m_s2 = NMPC_THRUST_BUDGET_M_S2;
 #endif
-#if WITH_TRACKER
+#if WITH_TARGET_MOTION
     height_clear_target(height);
 #endif
 }
