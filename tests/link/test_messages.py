@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
+from scipy.spatial.transform import Rotation
 
 from mambo_sil.link.messages import RecordReader, read_order, send_order, send_record
 from mambo_sil.link.records import (
@@ -169,6 +170,23 @@ def test_a_position_and_an_attitude_make_an_estimate() -> None:
     np.testing.assert_allclose(estimate.position_m, [1.0, 2.0, -3.0])
     np.testing.assert_allclose(estimate.velocity_m_s, [0.1, 0.2, -0.3], atol=1e-7)
     np.testing.assert_allclose(estimate.attitude_rad, [0.2, 0.0, 0.0], atol=1e-7)
+
+
+@pytest.mark.parametrize("after_s", [0.05, -0.05])
+def test_an_attitude_turns_with_its_rates_to_the_time_of_the_position(after_s: float) -> None:
+    """By the rotation of the body, about an axis that is none of its own; a rate of NaN makes no estimate."""
+    sender, reader = Sender(), RecordReader(ARDUCOPTER.streams)
+    attitude, rates_rad_s = Rotation.from_euler("ZYX", [2.0, -0.3, 0.5]), np.array([2.0, -3.0, 1.0])
+    x, y, z, w = attitude.as_quat()
+    sender.mav.attitude_quaternion_send(1000, w, x, y, z, *rates_rad_s)
+    sender.mav.local_position_ned_send(1000 + round(1e3 * after_s), 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
+    sender.mav.attitude_quaternion_send(2000, w, x, y, z, math.nan, 0.0, 0.0)
+    sender.mav.local_position_ned_send(2000, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3)
+    _, estimate, _, without = map(reader.read, sender.messages())
+    assert isinstance(estimate, EstimatedState)
+    turned = attitude * Rotation.from_rotvec(after_s * rates_rad_s)
+    np.testing.assert_allclose(estimate.attitude_rad[::-1], turned.as_euler("ZYX"), atol=1e-6)
+    assert without is None
 
 
 @pytest.mark.parametrize(("child", "velocity"), [(1, [0.5, 0.0, 0.0]), (12, [0.0, 0.5, 0.0])])

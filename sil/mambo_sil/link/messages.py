@@ -182,7 +182,8 @@ def _send_estimate(mav: Any, estimate: EstimatedState, stream: Stream | None) ->
     q, ms = quaternion(estimate.attitude_rad), _milliseconds(estimate.time_s)
     match stream:
         case Stream.ATTITUDE_QUATERNION:
-            mav.attitude_quaternion_send(ms, *q, 0.0, 0.0, 0.0)
+            rates_rad_s = (0.0, 0.0, 0.0) if estimate.rates_rad_s is None else estimate.rates_rad_s.tolist()
+            mav.attitude_quaternion_send(ms, *q, *rates_rad_s)
         case Stream.LOCAL_POSITION_NED:
             mav.local_position_ned_send(ms, *position, *velocity)
         case Stream.ODOMETRY:
@@ -217,14 +218,15 @@ def _read_record(message: Any) -> Record | None:
 
 
 class RecordReader:
-    """Reads records from messages; a position and the attitude nearest to it make an estimate.
+    """Reads records from messages; a position and the attitude nearest to it in time make an estimate.
 
+    The attitude turns with its rates to the time of the position.
     Estimates are read only from the streams that the autopilot is asked for, by the stack of its heartbeat.
     """
 
     def __init__(self, streams: tuple[Stream, ...] = ()) -> None:
         self._streams = streams
-        self._attitudes: deque[tuple[float, FloatArray]] = deque(maxlen=ATTITUDES)
+        self._attitudes: deque[Any] = deque(maxlen=ATTITUDES)
 
     def read(self, message: Any) -> Record | None:
         """Return the record in a message; None for one that is of no use."""
@@ -240,9 +242,8 @@ class RecordReader:
             case "ODOMETRY":
                 return _read_odometry(message)
             case "ATTITUDE_QUATERNION":
-                attitude_rad = _attitude([message.q1, message.q2, message.q3, message.q4])
-                if attitude_rad is not None:
-                    self._attitudes.append((message.time_boot_ms / 1e3, attitude_rad))
+                if _turned(message, message.time_boot_ms / 1e3) is not None:
+                    self._attitudes.append(message)
             case "LOCAL_POSITION_NED":
                 return self._with_attitude(message)
         return None
@@ -250,10 +251,14 @@ class RecordReader:
     def _with_attitude(self, message: Any) -> EstimatedState | None:
         """Return the estimate of a position; None if no attitude is near to it in time."""
         time_s = message.time_boot_ms / 1e3
-        near = [one for one in self._attitudes if abs(time_s - one[0]) <= OLDEST_ATTITUDE_S]
-        if not near:
+        nearest = min(
+            self._attitudes, key=lambda one: abs(one.time_boot_ms - message.time_boot_ms), default=None
+        )
+        if nearest is None or abs(nearest.time_boot_ms / 1e3 - time_s) > OLDEST_ATTITUDE_S:
             return None
-        _, attitude_rad = min(near, key=lambda one: abs(time_s - one[0]))
+        attitude_rad = _turned(nearest, time_s)
+        if attitude_rad is None:
+            return None
         position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
         return _finite(EstimatedState(time_s, np.array(position), np.array(velocity), attitude_rad))
 
@@ -283,6 +288,24 @@ def _read_odometry(message: Any) -> EstimatedState | None:
 def _finite(estimate: EstimatedState) -> EstimatedState | None:
     """Return an estimate of finite numbers, None for another."""
     return estimate if np.isfinite([estimate.position_m, estimate.velocity_m_s]).all() else None
+
+
+def _turned(message: Any, time_s: float) -> FloatArray | None:
+    """Return roll, pitch, yaw of an ATTITUDE_QUATERNION, turned to a time; None if they are not finite."""
+    half = (time_s - message.time_boot_ms / 1e3) / 2.0
+    p, q, r = (half * rate for rate in (message.rollspeed, message.pitchspeed, message.yawspeed))
+    w, x, y, z = message.q1, message.q2, message.q3, message.q4
+    size = math.sqrt(p * p + q * q + r * r)
+    share = math.sin(size) / size if size else 1.0
+    c, p, q, r = math.cos(size), share * p, share * q, share * r
+    return _attitude(
+        [
+            w * c - x * p - y * q - z * r,
+            w * p + x * c + y * r - z * q,
+            w * q - x * r + y * c + z * p,
+            w * r + x * q - y * p + z * c,
+        ]
+    )
 
 
 def _attitude(q: Any) -> FloatArray | None:

@@ -139,6 +139,8 @@ class EstimatedState:
     """Roll, pitch, yaw (3,)."""
     resets: int | None = None
     """How often the estimator has moved its state by a jump; None if it does not say."""
+    rates_rad_s: FloatArray | None = None
+    """About the axes of the body (3,); None of an estimate that was read."""
 
 
 @dataclass(frozen=True)

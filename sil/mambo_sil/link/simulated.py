@@ -161,7 +161,8 @@ class SimulatedAutopilot:
             self._errors.advance()
             position_m = position_m + self._errors.position_m
             velocity_m_s = velocity_m_s + self._errors.velocity_m_s
-        return EstimatedState(self.time_s, position_m, velocity_m_s, attitude_rad, self._resets)
+        rates_rad_s = seen.rates_rad_s[:, 0]
+        return EstimatedState(self.time_s, position_m, velocity_m_s, attitude_rad, self._resets, rates_rad_s)
 
     def _obey(self, order: Order) -> None:
         match order:
