@@ -53,8 +53,6 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         require_choice("action", action, ("attitude", "target"))
         require_number("reach_m", reach_m, 0.1, LOST_M)
         require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
-        known, rule = options.get("acceleration"), 'be "none" or "tracked": an action is a position at rest'
-        require(known != "given", "acceleration", known, rule)
         self._action, self._curve = action, curve(trajectory, size_m, rate_rad_s)
         self._controller = Controller.from_vehicle(vehicle, sensors="true", **options)
         self._drone = SimulatedDrone(vehicle_toml.load(vehicle), self._controller.update_period_s)

@@ -80,7 +80,7 @@ class Controller:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
         sensors:      what measures, in place of the sensors in the file; "true" for the state of a simulator.
-        acceleration: "given" as `design --acceleration` derives them, with more tilt.
+        acceleration: "observed" as `design --acceleration observed` derives it, with more tilt.
 
         Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
         InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
@@ -160,9 +160,8 @@ class Controller:
         thrust_acceleration_m_s2: thrust over mass, of the shape of the batch or one value for all; without it
                                   9.81. With `[height]` in the settings, or `height`, it is commanded.
 
-        Raises ArgumentError for records of another number of drones, for other shapes, for targets without
-        acceleration where the settings have `target.acceleration = "given"`, and for states or targets
-        without z where the thrust is commanded.
+        Raises ArgumentError for records of another number of drones, for other shapes, and for
+        states or targets without z where the thrust is commanded.
         """
         batch = self._batch(state, target)
         flies_height = self._method.has_height or self._height is not None
@@ -323,13 +322,11 @@ class Controller:
 
     def _aims(self, target: TargetState) -> list[FloatArray]:
         """Return the columns of targets; raises ArgumentError if the controller is not told enough."""
-        given = self.settings.target
-        if given.gives_acceleration:
-            acceleration = target.acceleration_m_s2
-            if acceleration is None:
-                raise ArgumentError(_missing("acceleration_m_s2", given.acceleration))
-            if self._method.has_height and acceleration.shape[-1] != 3:
-                raise ArgumentError("target: acceleration_m_s2 has no z; [height] wants x, y, z (..., 3)")
+        if self.settings.target.is_observed and self._method.has_height:
+            for name in ("acceleration_m_s2", "ahead_m_s2"):
+                values = getattr(target, name)
+                if values is not None and values.shape[-1] != 3:
+                    raise ArgumentError(f"target: {name} has no z; [height] wants x, y, z (..., 3)")
         return self._columns_of("target", target, _TARGET)
 
     def _columns_of(
@@ -413,11 +410,6 @@ class Controller:
         return array.reshape(self.n)
 
 
-def _missing(name: str, acceleration: str) -> str:
-    """Return the message for a target without the array `name`."""
-    return f'target: {name} is missing; the settings have target.acceleration = "{acceleration}"'
-
-
 def _columns(*batches: FloatArray, count: int = 2) -> list[FloatArray]:
     """Return the first columns (n,) of each of several batches of vectors."""
     flat = [values.reshape(-1, values.shape[-1]) for values in batches]
@@ -442,12 +434,25 @@ _STATE: Final[Mapping[str, Callable[[DroneState], list[FloatArray]]]] = {
 _TARGET: Final[Mapping[str, Callable[[Any], list[FloatArray]]]] = {
     "position_m": lambda target: _columns(target.position_m),
     "velocity_m_s": lambda target: _columns(target.velocity_m_s),
-    "acceleration_m_s2": lambda target: _columns(target.acceleration_m_s2),
+    "acceleration_m_s2": lambda target: _columns_if_known(target, target.acceleration_m_s2),
+    "ahead_m_s2": lambda target: _columns_if_known(target, target.ahead_m_s2),
+    "known": lambda target: [np.full(math.prod(target.batch), float(target.known))],
     "height_m": lambda target: _heights(target.position_m),
     "climb_m_s": lambda target: _heights(target.velocity_m_s),
-    "climb_acceleration_m_s2": lambda target: _heights(target.acceleration_m_s2),
+    "climb_acceleration_m_s2": lambda target: _heights_if_known(target, target.acceleration_m_s2),
+    "climb_ahead_m_s2": lambda target: _heights_if_known(target, target.ahead_m_s2),
 }
 """Where the columns of members come from: axes are x, y, z with z down."""
+
+
+def _columns_if_known(target: TargetState, vectors: FloatArray | None) -> list[FloatArray]:
+    """Return the columns of accelerations along x and y, zeros of what is not known."""
+    return _columns(np.zeros((*target.batch, 2)) if vectors is None else vectors)
+
+
+def _heights_if_known(target: TargetState, vectors: FloatArray | None) -> list[FloatArray]:
+    """Return the column of accelerations upwards, zeros of what is not known."""
+    return _heights(np.zeros((*target.batch, 3)) if vectors is None else vectors)
 
 
 def _require_z(state: DroneState, target: TargetState) -> None:

@@ -15,7 +15,7 @@ class ControllerOptions(TypedDict, total=False):
 
     age_s: float
     """Age of the measured position and velocity (`observer.age_s`): 0 for the true state of a simulator."""
-    acceleration: Literal["none", "given", "tracked"]
+    acceleration: Literal["none", "tracked", "observed"]
     """What the controller knows of the target's acceleration (`target.acceleration`)."""
     tilt_rad: float
     """Largest command (`limits.tilt_rad`); a smaller one without `braking_m_s2` lowers that by as much."""

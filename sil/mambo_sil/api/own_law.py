@@ -91,7 +91,7 @@ class OwnLaw:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> Applied:
-        """Return the command (1, 2) or (1, 3) for a state (1, 10) and a target (1, 9)."""
+        """Return the command (1, 2) or (1, 3) for a state (1, 10) and a target (1, 13)."""
         numbers = np.full((1, self.columns.command), np.nan)
         if self.failure is None and np.isfinite(state).all():
             try:
@@ -116,7 +116,7 @@ class OwnLaws:
         return self.laws[flight]
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
-        """Return the commands (n, 2) or (n, 3) for states (n, 10) and targets (n, 9)."""
+        """Return the commands (n, 2) or (n, 3) for states (n, 10) and targets (n, 13)."""
         numbers = np.empty((len(self.laws), self.columns.command))
         for each, law in enumerate(self.laws):
             rows = slice(each, each + 1)
@@ -186,17 +186,18 @@ _DRONE: Final = _places(
 )
 _TARGET: Final = _places(
     TARGET,
-    *("position_m", "height_m", "velocity_m_s", "climb_m_s", "acceleration_m_s2", "climb_acceleration_m_s2"),
+    *("position_m", "height_m", "velocity_m_s", "climb_m_s"),
+    *("acceleration_m_s2", "climb_acceleration_m_s2", "ahead_m_s2", "climb_ahead_m_s2"),
 )
 _OF_DRONE: Final = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
-_OF_TARGET: Final = np.array([1.0, 1.0, -1.0] * 3)
+_OF_TARGET: Final = np.array([1.0, 1.0, -1.0] * 4)
 """Signs that make up into down."""
-_GROUNDED: Final = STATE["grounded"].start
+_GROUNDED, _KNOWN = STATE["grounded"].start, TARGET["known"].start
 
 
 def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetState]:
-    """Return a state (10,) and a target (9,) as a law is given them, z down."""
-    drone, goal = state[_DRONE] * _OF_DRONE, target[_TARGET] * _OF_TARGET
+    """Return a state (10,) and a target (13,) as a law is given them, z down."""
+    drone, goal, known = state[_DRONE] * _OF_DRONE, target[_TARGET] * _OF_TARGET, target[_KNOWN]
     return (
         unchecked(
             DroneState,
@@ -209,7 +210,8 @@ def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetStat
             TargetState,
             position_m=goal[:3],
             velocity_m_s=goal[3:6],
-            acceleration_m_s2=goal[6:],
+            acceleration_m_s2=goal[6:9] if known >= 1 else None,
+            ahead_m_s2=goal[9:] if known >= 2 else None,
             yaw_rad=None,
         ),
     )

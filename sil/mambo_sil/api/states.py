@@ -95,8 +95,10 @@ class TargetState:
     velocity_m_s: FloatArray
     """Along the same axes (..., 2) or (..., 3)."""
     acceleration_m_s2: FloatArray | None
-    """Along the same axes (..., 2) or (..., 3). Read, and then needed, with `target.acceleration = "given"`
-    only, z of it with `[height]`; z is read by the altitude loop too, if there."""
+    """Along the same axes (..., 2) or (..., 3), or None if it is not known. Read with `target.acceleration
+    = "observed"`, z of it with `[height]`; z is read by the altitude loop too, if there."""
+    ahead_m_s2: FloatArray | None
+    """The acceleration 0.05 s later, or None if it is not known. Read likewise."""
     yaw_rad: FloatArray | None
     """Heading (...), or None to keep the one of the first step."""
 
@@ -106,17 +108,23 @@ class TargetState:
         velocity_m_s: ArrayLike,
         acceleration_m_s2: ArrayLike | None = None,
         yaw_rad: ArrayLike | None = None,
+        *,
+        ahead_m_s2: ArrayLike | None = None,
     ) -> None:
         position = _vectors("position_m", position_m)
         batch = position.shape[:-1]
         acceleration, yaw = acceleration_m_s2, yaw_rad
         if acceleration is not None:
             acceleration = _vectors("acceleration_m_s2", acceleration, batch)
+        elif ahead_m_s2 is not None:
+            raise ArgumentError("target: ahead_m_s2 wants acceleration_m_s2 beside it")
+        ahead = None if ahead_m_s2 is None else _vectors("ahead_m_s2", ahead_m_s2, batch)
         if yaw is not None:
             yaw = np.broadcast_to(of_shape("yaw_rad", yaw, (), batch), batch)
         object.__setattr__(self, "position_m", position)
         object.__setattr__(self, "velocity_m_s", _vectors("velocity_m_s", velocity_m_s, batch))
         object.__setattr__(self, "acceleration_m_s2", acceleration)
+        object.__setattr__(self, "ahead_m_s2", ahead)
         object.__setattr__(self, "yaw_rad", yaw)
 
     @classmethod
@@ -127,15 +135,23 @@ class TargetState:
         velocity_m_s: ArrayLike,
         acceleration_m_s2: ArrayLike | None = None,
         yaw_rad: ArrayLike | None = None,
+        *,
+        ahead_m_s2: ArrayLike | None = None,
     ) -> Self:
         """Return targets in another frame; the arrays have the shapes of a TargetState."""
-        acceleration, yaw = acceleration_m_s2, yaw_rad
+        acceleration, ahead, yaw = acceleration_m_s2, ahead_m_s2, yaw_rad
         return cls(
             vectors_to_ned(frame, position_m, "position_m"),
             vectors_to_ned(frame, velocity_m_s, "velocity_m_s"),
             None if acceleration is None else vectors_to_ned(frame, acceleration, "acceleration_m_s2"),
             None if yaw is None else yaw_to_ned(frame, yaw),
+            ahead_m_s2=None if ahead is None else vectors_to_ned(frame, ahead, "ahead_m_s2"),
         )
+
+    @property
+    def known(self) -> int:
+        """0 if position and velocity are known, 1 if the acceleration is, 2 if the one ahead is too."""
+        return (self.acceleration_m_s2 is not None) + (self.ahead_m_s2 is not None)
 
     @property
     def batch(self) -> tuple[int, ...]:

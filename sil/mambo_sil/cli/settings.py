@@ -193,7 +193,7 @@ def design(
         TargetAcceleration,
         typer.Option(
             help="What the controller knows of the target's acceleration: tracked, what its velocity shows; "
-            "given, what your program says, for quick curves.",
+            "observed, what each target knows, noisy or not, and flies quick curves.",
             metavar="NAME",
         ),
     ] = "tracked",

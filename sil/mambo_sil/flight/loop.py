@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.port.taken import AHEAD_S, MOST_KNOWN
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -49,7 +50,7 @@ HEIGHT_REFERENCE_M = -HOVER_HEIGHT_M
 """Altitude reference of a flight on a level course: z points down."""
 
 _TRACED: Final = ("position_m", "velocity_m_s")
-_VERTICAL: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2")
+_VERTICAL: Final = ("height_m", "climb_m_s", "climb_acceleration_m_s2", "climb_ahead_m_s2")
 """Members of a target that a trace has, and those of a course with heights."""
 
 TAKE_OFF_PHASE_S = 5.0
@@ -80,10 +81,10 @@ class PositionController(Protocol):
     """The interface of a position controller to the closed loop."""
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
-        """Return the command for states (n, 7), targets (n, 6) and thrust accelerations (n,).
+        """Return the command for states (n, 7), targets (n, 9) and thrust accelerations (n,).
 
-        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy, ax, ay], in the world frame (NED).
-        On a course with a height the targets (n, 9) end with height, climb and vertical acceleration, up.
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and those of `flight/columns.py`, in the world frame
+        (NED). On a course with a height the targets (n, 13) end with what is of the height, up.
         The thrust acceleration is positive along -z of the body. Inputs of a controller of the height:
         `controllers/thrust_controller.py`.
         """
@@ -169,7 +170,7 @@ class Flight:
 
     @cached_property
     def given_targets(self) -> FloatArray:
-        """The targets as controllers are given them: with accelerations (k, n, 6), with heights (k, n, 9).
+        """The targets as controllers are given them: (k, n, 9), on a course with a height (k, n, 13).
 
         Those of a flight are contiguous in memory, as in `allocate_trace`.
         Raises `FlightError` as `targets`.
@@ -179,12 +180,18 @@ class Flight:
         given = np.zeros((self.flights, len(targets), columns)).swapaxes(0, 1)
         given[..., TARGET["position_m"]] = targets[..., :2]
         given[..., TARGET["velocity_m_s"]] = targets[..., 2:]
-        given[..., TARGET["acceleration_m_s2"]] = self._for_each_flight(
-            "acceleration", self.trajectory.acceleration(self.times_s()), 2
-        )
+        times_s = self.times_s()
+        for name, when_s in (("acceleration_m_s2", times_s), ("ahead_m_s2", times_s + AHEAD_S)):
+            given[..., TARGET[name]] = self._for_each_flight(
+                "acceleration", self.trajectory.acceleration(when_s), 2
+            )
+        given[..., TARGET["known"]] = MOST_KNOWN
         if spatial:
-            heights = vertical_of(self.trajectory, self.times_s())
-            _put_vertical(given, self._for_each_flight("vertical", heights, 3))
+            now, ahead = (
+                self._for_each_flight("vertical", vertical_of(self.trajectory, when_s), 3)
+                for when_s in (times_s, times_s + AHEAD_S)
+            )
+            _put_vertical(given, np.concatenate([now, ahead[..., 2:]], axis=-1))
         return given
 
     @cached_property
@@ -197,18 +204,18 @@ class Flight:
 
     @cached_property
     def targets_in_space(self) -> FloatArray:
-        """The targets (k, n, 9) as controllers of the height are given them, also on a level course."""
+        """The targets (k, n, 13) as controllers of the height are given them, also on a level course."""
         given = self.given_targets
         if given.shape[2] == SPACE.target:
             return given
         by_flight = given.swapaxes(0, 1)
         space = np.zeros((*by_flight.shape[:2], SPACE.target))
         space[..., : LEVEL.target] = by_flight
-        _put_vertical(space, np.array([HOVER_HEIGHT_M, 0.0, 0.0]))
+        _put_vertical(space, np.array([HOVER_HEIGHT_M, 0.0, 0.0, 0.0]))
         return space.swapaxes(0, 1)
 
     def targets_for(self, columns: Columns) -> FloatArray:
-        """Return the targets (k, n, 6 or 9) as a controller is given them."""
+        """Return the targets (k, n, 9 or 13) as a controller is given them."""
         return self.targets_in_space if columns.target == SPACE.target else self.given_targets
 
     @cached_property
@@ -320,7 +327,7 @@ def open_loop_updates(flight: Flight, times_s: FloatArray) -> int:
 
 
 def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
-    """Return the initial state of n flights, at their first targets (n, 6 or 9) or on the ground below."""
+    """Return the initial state of n flights, at their first targets (n, 9 or 13) or on the ground below."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
     nominal = airframe_of(flight.vehicle.drone)
@@ -343,15 +350,15 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
 
 
 def vertical_target(target: FloatArray) -> Vertical:
-    """Return what the altitude loop is to follow, for targets (n, 6) or (n, 9)."""
+    """Return what the altitude loop is to follow, for targets (n, 9) or (n, 13)."""
     if target.shape[1] < SPACE.target:
         return Vertical(HEIGHT_REFERENCE_M)
-    height_m, climb_m_s, acceleration_m_s2 = (target[:, TARGET[name].start] for name in _VERTICAL)
+    height_m, climb_m_s, acceleration_m_s2 = (target[:, TARGET[name].start] for name in _VERTICAL[:3])
     return Vertical(0.0 - height_m, climb_m_s, acceleration_m_s2)
 
 
 def _put_vertical(targets: FloatArray, vertical: FloatArray) -> None:
-    """Write height, climb and vertical acceleration (..., 3) into the columns of targets, in place."""
+    """Write height, climb, vertical acceleration and that ahead (..., 4) into targets, in place."""
     for k, name in enumerate(_VERTICAL):
         targets[..., TARGET[name].start] = vertical[..., k]
 

@@ -30,7 +30,7 @@ ControllerName = Literal["nmpc", PdName, "reference"]
 AltitudeName = Literal["stock", "feedforward", "pid"]
 """The loop that holds the height: the vehicle's own, that with feed-forward of the target's climb and
 acceleration and compensation of the tilt, or a PID with these."""
-TargetAcceleration = Literal["tracked", "given"]
+TargetAcceleration = Literal["tracked", "observed"]
 """What a controller that is derived knows of its target's acceleration: target.acceleration."""
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""

@@ -2,6 +2,7 @@
 
 import hashlib
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final, Self
@@ -144,8 +145,12 @@ class SensedTrace(Trace):
         )
 
 
-def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
+def write_csv(
+    trace: Trace, path: Path, flight: int = 0, others: Mapping[str, FloatArray] | None = None
+) -> None:
     """Write one flight as CSV with the columns `CSV_COLUMNS` and, with sensors, `SEEN_COLUMNS`.
+
+    `others` are further columns (k,) by name.
 
     Every number is spelled so that it reads back to the same bits.
     """
@@ -157,6 +162,9 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
         place = names.index("target_vy_m_s") + 1
         names = names[:place] + HEIGHT_COLUMNS + names[place:]
     names += SEEN_COLUMNS if isinstance(trace, SensedTrace) else ()
+    if others:
+        names += tuple(others)
+        columns += [column.tolist() for column in others.values()]
     spelled = zip(*(map(repr, column) for column in columns), strict=True)
     lines = (",".join(names), *map(",".join, spelled), "")
     with path.open("w", newline="", encoding="utf-8") as file:

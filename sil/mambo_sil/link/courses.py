@@ -7,6 +7,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from mambo_codegen.port.taken import AHEAD_S
 from mambo_sil.api.states import TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Trajectory, vertical_of
@@ -51,10 +52,16 @@ class Along:
 
     def target(self, time_s: float) -> TargetState:
         """Return the target."""
+        position_m, velocity_m_s, acceleration_m_s2 = self._motion(time_s)
+        *_, ahead_m_s2 = self._motion(time_s + AHEAD_S)
+        return TargetState(position_m, velocity_m_s, acceleration_m_s2, ahead_m_s2=ahead_m_s2)
+
+    def _motion(self, time_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return position, velocity and acceleration (3,) at a time, z down."""
         clock_s, rate, change_1_s = _soft_clock(min(max(time_s, 0.0), self.duration_s), self.duration_s)
         first, now = self._curve(0.0), self._curve(clock_s)
         position_m = self.start_m + now[0] - first[0]
-        return TargetState(position_m, rate * now[1], rate * rate * now[2] + change_1_s * now[1])
+        return position_m, rate * now[1], rate * rate * now[2] + change_1_s * now[1]
 
     def _curve(self, clock_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and acceleration (3,), z down."""

@@ -15,6 +15,7 @@ from mambo_sil.model.identify.signals import (
     JUMPS,
     START_THRUST,
     TAKE_OVERS,
+    TARGET_KNOWN,
     THRUST,
     THRUST_COMMAND,
     UPDATE,
@@ -26,7 +27,14 @@ LOG: Final = "flight.csv"
 COLUMNS: Final = (
     *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),
     *("target_x_m", "target_y_m", "target_height_m", "target_vx_m_s", "target_vy_m_s", "target_climb_m_s"),
-    *("target_ax_m_s2", "target_ay_m_s2", "target_climb_acceleration_m_s2", "target_yaw_rad"),
+    *("target_ax_m_s2", "target_ay_m_s2", "target_climb_acceleration_m_s2"),
+    *(
+        "target_ahead_x_m_s2",
+        "target_ahead_y_m_s2",
+        "target_climb_ahead_m_s2",
+        TARGET_KNOWN,
+        "target_yaw_rad",
+    ),
     *("roll_command_rad", "pitch_command_rad", THRUST, THRUST_COMMAND, "status"),
     *(TAKE_OVERS, UPDATE, START_THRUST, JUMPS, *JUMP),
 )
@@ -157,11 +165,15 @@ def _logged(update: Update) -> list[float]:
     estimate, target = update.estimate, update.target
     x, y, z = target.position_m.tolist()
     vx, vy, vz = target.velocity_m_s.tolist()
-    ax, ay, az = (0.0, 0.0, 0.0) if target.acceleration_m_s2 is None else target.acceleration_m_s2.tolist()
+    (ax, ay, az), (later_x, later_y, later_z) = (
+        (0.0, 0.0, 0.0) if one is None else one.tolist()
+        for one in (target.acceleration_m_s2, target.ahead_m_s2)
+    )
     return [
         estimate.time_s,
         *(*estimate.position_m.tolist(), *estimate.velocity_m_s.tolist(), *estimate.attitude_rad.tolist()),
         *(x, y, -z, vx, vy, -vz, ax, ay, -az),
+        *(later_x, later_y, -later_z, float(target.known)),
         0.0 if target.yaw_rad is None else float(target.yaw_rad),
         *(*update.command_rad, update.thrust_m_s2, update.thrust, update.status),
         *(update.take_overs, update.number, update.start_thrust_m_s2, update.jumps),

@@ -103,12 +103,16 @@ class SteadyFrame:
 
     def moved(self, target: TargetState) -> TargetState:
         """Return a target as far off as the rest of the jumps; its heading is its own."""
-        acceleration_m_s2 = target.acceleration_m_s2
+        now_m_s2, ahead_m_s2 = (
+            None if one is None else one + self._offset_m_s2
+            for one in (target.acceleration_m_s2, target.ahead_m_s2)
+        )
         return TargetState(
             target.position_m + self._offset_m,
             target.velocity_m_s + self._offset_m_s,
-            None if acceleration_m_s2 is None else acceleration_m_s2 + self._offset_m_s2,
+            now_m_s2,
             target.yaw_rad,
+            ahead_m_s2=ahead_m_s2,
         )
 
     def _fade(self, passed_s: float) -> None:

@@ -151,7 +151,13 @@ class Steering:
         """
         moved = self.frame.moved(target)
         yaw_rad = self._heading_rad if moved.yaw_rad is None else moved.yaw_rad
-        return TargetState(moved.position_m, moved.velocity_m_s, moved.acceleration_m_s2, yaw_rad)
+        return TargetState(
+            moved.position_m,
+            moved.velocity_m_s,
+            moved.acceleration_m_s2,
+            yaw_rad,
+            ahead_m_s2=moved.ahead_m_s2,
+        )
 
     def _send(
         self, estimate: EstimatedState, target: TargetState, outcome: StepOutcome, passed_s: float

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, given_limit_m_s2
-from mambo_codegen.numbers.literals import SCALARS, Scalar
+from mambo_codegen.methods.shared.tracker_constants import target_limit_m_s2
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
     STATE,
@@ -25,13 +24,15 @@ from mambo_sil.verify.calls import ApiFunction, Outcomes, Tape, answers, api_of,
 from mambo_sil.verify.step_inputs import (
     POSITION,
     TILT,
-    VELOCITY,
     YAW,
     StepInputs,
     StepRows,
+    around,
     completed,
+    floating,
     random_steps,
 )
+from mambo_sil.verify.target_cases import observed_motion, target_motion
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -73,7 +74,8 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *(_zero_errors(settings) if method.iterates else []),
         *(_outages(settings, rng, method.outage_steps) if method.outage_steps is not None else []),
         *_largest_inputs(settings, rng),
-        *(_target_motion(settings, method.tracker) if method.tracker else []),
+        *(target_motion(settings, method.tracker) if method.tracker else []),
+        *(observed_motion(settings) if method.target_observer else []),
     )
     return tapes, tuple(answers(settings, tapes))
 
@@ -215,7 +217,7 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     for index, quantity in enumerate(rows.quantities):
         is_thrust = rows.thrust.start <= index < rows.thrust.stop
         least = ranges.thrust_acceleration_min_m_s2 if is_thrust else -largest[quantity]
-        for value in _around(settings, quantity, least, largest[quantity]):
+        for value in around(settings, quantity, least, largest[quantity]):
             good = _good_steps(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, ApiFunction.STEP, good)
@@ -236,7 +238,7 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     pairs.append((ApiFunction.SHIFT, method.shift, *_both(*ends)))
     for function, names, lows, highs in pairs:
         for index, name in enumerate(names):
-            for value in _around(settings, name, lows[index], highs[index]):
+            for value in around(settings, name, lows[index], highs[index]):
                 pair = np.full((1, len(names)), 0.1 * tilt)
                 pair[0, index] = value
                 yield _surround(settings, rng, calls(settings, function, pair))
@@ -258,7 +260,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
     """Yaw by eighths of a turn and neighbouring numbers, where the quadrant of the sine changes."""
-    scalar = _floating(settings)
+    scalar = floating(settings)
     eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
     yaws = [(eighths * (np.pi / 4)).astype(scalar)]
     for _ in range(3):
@@ -278,8 +280,8 @@ def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
 def _headings(settings: Settings) -> Iterator[Tape]:
     """Turn to the ends of the range and beside them, with every most change around 0 and around the turn."""
     ends, changes = (
-        _around(settings, "yaw", -YAW_LIMIT_RAD, YAW_LIMIT_RAD),
-        _around(settings, "yaw", 0.0, 0.25),
+        around(settings, "yaw", -YAW_LIMIT_RAD, YAW_LIMIT_RAD),
+        around(settings, "yaw", 0.0, 0.25),
     )
     for last in (YAW_LIMIT_RAD, -YAW_LIMIT_RAD):
         near = math.copysign(YAW_LIMIT_RAD - 0.25, last)
@@ -299,7 +301,7 @@ def _convergence(settings: Settings) -> list[Tape]:
     neighbours are the cases. In fixed point one unit of that weight changes the cost by many units, so
     bisection also finds the effort weight, whose unit is finer than the cost's.
     """
-    n, scalar, numbers = 16, _floating(settings), method_of(settings).numbers
+    n, scalar, numbers = 16, floating(settings), method_of(settings).numbers
     most_tracking, most_effort = method_of(settings).weight_limits
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
     steps = StepRows(method_of(settings)).hovering(n)
@@ -333,7 +335,7 @@ def _convergence(settings: Settings) -> list[Tape]:
 
 def _zero_errors(settings: Settings) -> Iterator[Tape]:
     """Let the predicted error be exactly 0 after one step, from both sides along both axes."""
-    scalar = _floating(settings)
+    scalar = floating(settings)
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):
         for way in (-1, 1):
@@ -392,53 +394,6 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
     yield from np.stack(columns, axis=1)
 
 
-def _target_motion(settings: Settings, tracker: TrackerConstants) -> Iterator[Tape]:
-    """Change the target's velocity by the tracker's limit and the numbers next to it, either way.
-
-    If the acceleration is given, set it to these. Then accelerate the target to and fro along both axes, so
-    that acceleration and jerk reach their limits, with a reset on the way, and with turns of the frame.
-    """
-    limit = tracker.input_limit
-    for value in _around(settings, tracker.input_quantity, -limit, limit):
-        if np.isfinite(value):
-            for columns in ([1, 0], [0, 1]):
-                yield _target_steps(settings, np.outer([0.0, value, value, 0.0], columns))
-    motion = limit * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
-    if not tracker.is_given:
-        motion = np.cumsum(motion)
-        yield from _jumps_at_the_ends(settings, 0.25 * limit)
-    both = motion[:, None] * [1.0, -0.7]
-    again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
-    yield np.concatenate([_target_steps(settings, both), again, _target_steps(settings, both[::-1])])
-    before, after = _target_steps(settings, both[:32]), _target_steps(settings, both[32:])
-    turned = np.zeros((1, len(method_of(settings).shift)))
-    for turn_rad in _around(settings, "yaw", 0.0, 0.3):
-        turned[:, -1] = turn_rad
-        yield np.concatenate([before, calls(settings, ApiFunction.SHIFT, turned), after])
-
-
-def _target_steps(settings: Settings, motion: Array) -> Tape:
-    """Return steps of targets with accelerations (n, 2), if these are given, or the drone's velocities."""
-    rows, most_m_s = StepRows(method_of(settings)), settings.ranges.velocity_m_s
-    made, first = rows.hovering(len(motion)), rows.target.start
-    if settings.target.gives_acceleration:
-        made[:, rows.acceleration] = motion
-    else:
-        made[:, VELOCITY] = made[:, first + 2 : first + 4] = np.clip(motion, -most_m_s, most_m_s)
-    made[:, 0] = 1e-3
-    return calls(settings, ApiFunction.STEP, made)
-
-
-def _jumps_at_the_ends(settings: Settings, change_m_s: float) -> Iterator[Tape]:
-    """Let the frame jump by twice a change of velocity, beyond the end of the range, where the target is."""
-    jump, axes = np.zeros((1, len(method_of(settings).shift))), len(method_of(settings).shift) // 2
-    speed_m_s = settings.ranges.velocity_m_s - change_m_s * np.array([3.0, 2.0, 1.0, 0.0, 0.0])
-    for way in (-1.0, 1.0):
-        steps = _target_steps(settings, np.outer(speed_m_s, [way, way]))
-        jump[:, axes : axes + 2] = 2.0 * way * change_m_s
-        yield np.concatenate([steps[:3], calls(settings, ApiFunction.SHIFT, jump), steps[3:]])
-
-
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
     """Put a call between good steps; the refused step after it shows the last command."""
     steps = calls(settings, ApiFunction.STEP, _good_steps(settings, rng, 4))
@@ -455,36 +410,16 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
     thrust = np.clip(rng.uniform(8, 12, n), low, high)
-    if settings.target.gives_acceleration:
-        accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * given_limit_m_s2(settings)
+    if settings.target.is_observed:
+        accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * target_limit_m_s2(settings)
         target = np.concatenate([target, accelerations], axis=1)
     if not method.has_height:
         state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
         return StepRows(method).join(StepInputs(state, target, thrust))
     own = rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
     goal = own + 0.1 * rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
-    climbs = rng.uniform(-1, 1, (n, int(settings.target.gives_acceleration)))
+    climbs = rng.uniform(-1, 1, (n, int(settings.target.is_observed)))
     state = np.concatenate([state, own, np.zeros((n, 1))], axis=1)
     target = np.concatenate([target, goal, climbs], axis=1)
     state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
     return StepRows(method).join(StepInputs(state, target, None))
-
-
-def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
-    """Return both limits of a range, their neighbours, NaN, infinities, zeros and the smallest numbers."""
-    scalar, numbers = _floating(settings), method_of(settings).numbers
-    ends = np.array([low, high], scalar)
-    beyond = np.array([-np.inf, np.inf], scalar)
-    neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
-    if numbers.bits is not None:
-        ends = numbers.to_si(numbers.quantize(ends[:, None], (quantity,)), quantity)[:, 0]
-        unit = np.ldexp([-1.0, 1.0], -numbers.bits[quantity])
-        neighbours = [ends + unit, ends - unit]
-    tiny = np.finfo(scalar).smallest_subnormal
-    odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
-    return np.concatenate([ends, *neighbours, odd]).astype(np.float64)
-
-
-def _floating(settings: Settings) -> Scalar:
-    """Return the scalar type, or float64 for fixed point; neighbours of a number are found in it."""
-    return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import TARGET
-from mambo_codegen.port.row import WHOLE
+from mambo_codegen.port.row import COUNT, WHOLE
+from mambo_codegen.port.taken import MOST_KNOWN
 from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -40,14 +42,12 @@ class StepInputs:
 class StepRows:
     """The inputs of a step as one row of numbers, as calls of the C interface have them.
 
-    The columns are state, target, thrust, and the accelerations of the target if they are given.
-
-    With a height: state and target, and no thrust.
+    The columns are state, target, thrust; with a height state and target, and no thrust.
 
     quantities:   of all columns.
     target:       columns of the target's position and velocity.
     thrust:       columns of the thrust, none with a height.
-    acceleration: columns of the target's acceleration, none if it is not given.
+    acceleration: columns of the target's acceleration, none if it cannot be known.
     """
 
     def __init__(self, method: Method) -> None:
@@ -112,16 +112,23 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
     method = method_of(settings)
-    level, climb = method.tracker, method.climb_tracker
-    if level and level.is_given:
-        target = np.concatenate([target, _accelerations(level.input_limit, high, (n, 2), rng)], axis=1)
+    level, climb = _known_limits(method)
+    if level:
+        target = np.concatenate([target, _accelerations(level, high, (n, 2), rng)], axis=1)
     if method.has_height:
         own, goal = _heights(settings, scale, rng)
         state, target = np.concatenate([state, own], axis=1), np.concatenate([target, goal], axis=1)
-        if climb and climb.is_given:
-            target = np.concatenate([target, _accelerations(climb.input_limit, high, (n, 1), rng)], axis=1)
+        if climb:
+            target = np.concatenate([target, _accelerations(climb, high, (n, 1), rng)], axis=1)
     state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)
     return StepInputs(state, target, None if method.has_height else thrust)
+
+
+def _known_limits(method: Method) -> list[float]:
+    """Return the limits of accelerations that targets know, along x and y and up, m/s^2; 0 without."""
+    if (observer := method.target_observer) is None:
+        return [0.0, 0.0]
+    return [*(one.acceleration / observer.update_s for one in observer.limits), 0.0][:2]
 
 
 def completed(method: Method, record: str, known: Array, rng: np.random.Generator) -> Array:
@@ -132,10 +139,12 @@ def completed(method: Method, record: str, known: Array, rng: np.random.Generato
     whole[:, there] = known
     for one in (one for one in numbers if one.row.member not in _DRAWN):
         if one.row.kind == WHOLE:
-            whole[:, one.column] = rng.integers(2, size=len(known))
+            most = MOST_KNOWN + 1 if one.row.draw is COUNT else 1
+            fractions = np.where(rng.random(len(known)) < 0.05, 0.5, 0.0)
+            whole[:, one.column] = rng.integers(most + 1, size=len(known)) + fractions
         else:
-            most = one.row.draw.largest if one.row.draw is not None else None
-            whole[:, one.column] = rng.uniform(-1, 1, len(known)) * (most or 1.0)
+            size = one.row.draw.largest if one.row.draw is not None else None
+            whole[:, one.column] = rng.uniform(-1, 1, len(known)) * (size or 1.0)
     return whole
 
 
@@ -158,7 +167,7 @@ def _accelerations(
     shape: tuple[int, int],
     rng: np.random.Generator,
 ) -> Array:
-    """Draw accelerations of targets, some beyond the tracker's limit or the range of the input."""
+    """Draw accelerations of targets, some beyond their limit or the range of the input."""
     drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, shape)
     is_special = rng.random(shape) < 0.05
     edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
@@ -168,14 +177,19 @@ def _accelerations(
 def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:
     """Draw the inputs of consecutive steps of n controllers, independent of each other.
 
-    For a tracker that measures it, two targets in three change their velocity little from step to step; one
-    in five of these changes is a jump.
+    For a tracker or an observer of targets, two targets in three change their velocity little from step to
+    step; one in five of these changes is a jump.
     """
     drawn = [random_inputs(settings, n, rng) for _ in range(steps)]
-    tracker = method_of(settings).tracker
-    if tracker is None or tracker.is_given:
+    method = method_of(settings)
+    tracker, observer = method.tracker, method.target_observer
+    if observer is not None:
+        change_m_s = 1.25 * observer.level.jump
+    elif tracker is not None:
+        change_m_s = tracker.tested_change_m_s
+    else:
         return drawn
-    limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_input
+    limit_m_s = settings.ranges.velocity_m_s
     with np.errstate(invalid="ignore"):
         for before, now in itertools.pairwise(drawn):
             moved = before.target[:, 2:4] + rng.uniform(-change_m_s, change_m_s, (n, 2))
@@ -217,3 +231,23 @@ def _make_special(
             thrust[0] = rng.choice([*NOT_IN_RANGE, 0.0, -0.0, -9.81, low, high])
         case _:  # errors below the smallest normal number
             target[:], state[:4] = 0, rng.normal(0, 1, 4) * 1e-40
+
+
+def around(settings: Settings, quantity: str, low: float, high: float) -> Array:
+    """Return both limits of a range, their neighbours, NaN, infinities, zeros and the smallest numbers."""
+    scalar, numbers = floating(settings), method_of(settings).numbers
+    ends = np.array([low, high], scalar)
+    beyond = np.array([-np.inf, np.inf], scalar)
+    neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
+    if numbers.bits is not None:
+        ends = numbers.to_si(numbers.quantize(ends[:, None], (quantity,)), quantity)[:, 0]
+        unit = np.ldexp([-1.0, 1.0], -numbers.bits[quantity])
+        neighbours = [ends + unit, ends - unit]
+    tiny = np.finfo(scalar).smallest_subnormal
+    odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
+    return np.concatenate([ends, *neighbours, odd]).astype(np.float64)
+
+
+def floating(settings: Settings) -> Scalar:
+    """Return the scalar type, or float64 for fixed point; neighbours of a number are found in it."""
+    return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]

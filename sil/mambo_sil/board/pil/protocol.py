@@ -13,7 +13,7 @@ from typing import Final, Self
 
 DELIMITER: Final = b"\0"
 CRC_BYTES: Final = 4
-LONGEST_PAYLOAD: Final = 192
+LONGEST_PAYLOAD: Final = 200
 """Of any firmware; most take 128 bytes."""
 LONGEST_STUFFED: Final = LONGEST_PAYLOAD + CRC_BYTES + 1
 """Shorter than 255 bytes, so that stuffing always adds one byte."""

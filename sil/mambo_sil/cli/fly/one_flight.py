@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -16,8 +17,10 @@ from mambo_codegen.settings.messages import degrees_hint
 from mambo_codegen.settings.model import Settings
 from mambo_sil.api.own_law import Law, OwnLaws, load_law, period_of
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
+from mambo_sil.cli.fly.target_columns import target_columns
 from mambo_sil.cli.options import load, load_drone, show_result
 from mambo_sil.cli.progress import progress_bar
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.gusts import LIGHT_M_S
 from mambo_sil.drone.plant.vehicle import LARGEST_LAG_S, Vehicle
@@ -82,7 +85,7 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         limited = Scenario() if flies_settings(runner.controller) else None
         fields |= judge(trace, settings, drone, limited) | {"same_bits_as_host": same_bits}
         summary = FlySummary(**fields)
-        write_flight(trace, summary, settings, output, folder)
+        write_flight(trace, summary, settings, output, folder, flight=flight)
         summary.write(folder)
     for failure in laws.failures.values() if laws else ():
         typer.echo(sentence(failure), err=True)
@@ -185,17 +188,20 @@ def written(output: Output) -> tuple[str, ...]:
     return TRACE_FILES if output.no_pictures else FLIGHT_FILES
 
 
-def write_flight(trace: Trace, summary: FlySummary, settings: Settings, output: Output, folder: Path) -> None:
+def write_flight(
+    trace: Trace, summary: FlySummary, settings: Settings, output: Output, folder: Path, *, flight: Flight
+) -> None:
     """Write the files of `written`."""
-    write_trace(trace, folder)
+    others = target_columns(flight, settings) if flies_settings(summary.controller) else {}
+    write_trace(trace, folder, others)
     if not output.no_pictures:
         limit_m_s = settings.limits.speed_m_s if flies_settings(summary.controller) else 0.0
         draw_flight(trace, summary.title, folder, walls_m(settings), limit_m_s)
 
 
-def write_trace(trace: Trace, folder: Path) -> None:
-    """Write `TRACE_FILES`."""
-    write_csv(trace, folder / "trace.csv")
+def write_trace(trace: Trace, folder: Path, others: Mapping[str, FloatArray]) -> None:
+    """Write `TRACE_FILES`; `others` are further columns."""
+    write_csv(trace, folder / "trace.csv", others=others)
     write_npz(trace, folder / "trace.npz")
 
 

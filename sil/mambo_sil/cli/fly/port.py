@@ -78,7 +78,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
                 "same_bits_as_host": not (first_difference or controller.different) and same_digest,
             }
         )
-        write_flight(trace, summary, settings, output, folder)
+        write_flight(trace, summary, settings, output, folder, flight=flight)
         summary.write(folder)
     finish(summary, output, written(output))
 

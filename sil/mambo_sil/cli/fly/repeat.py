@@ -6,6 +6,7 @@ from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
 from mambo_sil.cli.fly.fly_options import OtherFlight, Output
 from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
+from mambo_sil.cli.fly.target_columns import target_columns
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
@@ -39,7 +40,7 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
     with new_results(output.output, RepeatSummary.command, files) as folder:
         with progress_bar("repeating") as progress:
             trace = simulate(flight, controller, progress)
-        write_trace(trace, folder)
+        write_trace(trace, folder, target_columns(flight, record.settings))
         if not output.no_pictures:
             limits = record.settings.limits
             walls = walls_m(record.settings, record.scenario.fence_m)

@@ -12,9 +12,9 @@ from mambo_sil.drone.plant.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class ControllerInput:
-    """Inputs of one controller at one update: state (7,), target (6,), thrust over mass.
+    """Inputs of one controller at one update: state (7,), target (9,), thrust over mass.
 
-    Of a controller of the height: state (10,), target (9,), and the reported thrust.
+    Of a controller of the height: state (10,), target (13,), and the reported thrust.
     """
 
     state: FloatArray

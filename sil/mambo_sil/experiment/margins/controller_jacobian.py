@@ -13,6 +13,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.columns import LEVEL, SPACE, TARGET
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import adapted, numbers_of
 
@@ -82,14 +83,14 @@ def linear_controller(settings: Settings, load: float = 1.0) -> LinearController
 
 
 def _hover(settings: Settings) -> tuple[FloatArray, FloatArray]:
-    """Return state and target at rest at the origin; with a height (1, 10) and (1, 9), the target midway.
+    """Return state and target at rest at the origin; with a height the target lies midway.
 
     That is between floor and ceiling; `_learn` moves the state there.
     """
     if settings.height is None:
-        return np.zeros((1, 7)), np.zeros((1, 6))
-    state, target, fence = np.zeros((1, 10)), np.zeros((1, 9)), settings.limits.fence
-    target[:, 6] = (fence.floor_m + fence.ceiling_m) / 2.0
+        return np.zeros((1, LEVEL.state)), np.zeros((1, LEVEL.target))
+    state, target, fence = np.zeros((1, SPACE.state)), np.zeros((1, SPACE.target)), settings.limits.fence
+    target[:, TARGET["height_m"]] = (fence.floor_m + fence.ceiling_m) / 2.0
     return state, target
 
 
@@ -109,7 +110,8 @@ def _learn(
     lagged_share = 1.0 - math.exp(-period_s / height.lag_s)
     delayed_m_s2 = thrust_m_s2 = hover_thrust(settings)
     expected, seen = 1.0 / height.thrust_gain, state.copy()
-    height_m, climb_m_s, lift_m_s2 = float(target[0, 6]), 0.0, 0.0
+    goal_m = float(target[0, TARGET["height_m"].start])
+    height_m, climb_m_s, lift_m_s2 = goal_m, 0.0, 0.0
     updates_per_s, before = round(1.0 / period_s), np.zeros(0)
     for second in range(round(_LEARNING_S)):
         for update in range(updates_per_s):
@@ -126,7 +128,7 @@ def _learn(
         if second > _RAMP_S and np.abs(now - before).max() < _STILL:
             break
         before = now
-    off_m = abs(height_m - float(target[0, 6]))
+    off_m = abs(height_m - goal_m)
     if abs(lift_m_s2) > _STILL or (height.learn != "none" and off_m > _ON_TARGET_M):
         raise FlightError(
             f"height: a drone that hovers with {load * height.thrust_gain:.3g} times the expected thrust "

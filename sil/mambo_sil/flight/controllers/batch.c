@@ -14,10 +14,10 @@
     taken.member = *next; \
     next++;
 #define TAKE_WHOLE(member, column, quantity) \
-    taken.member = *next != (nmpc_real_t)0; \
+    taken.member = WHOLE_OF(*next); \
     next++;
 
-/* A state of its numbers in their order; an integer is 1 or 0. */
+/* A state of its numbers in their order. */
 static nmpc_state_t state_of(const nmpc_real_t *numbers)
 {
     const nmpc_real_t *next = numbers;

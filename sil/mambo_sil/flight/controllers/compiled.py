@@ -205,8 +205,6 @@ class CompiledController:
     ) -> Any:
         """Compute the next commands; the inputs are as of `ReferenceController.step`.
 
-        Only a controller that is given the acceleration of its target reads ax and ay, and needs them.
-
         Returns a step of the class `Method.step_type`.
         """
         inputs = as_arrays(self._method, self.n, state, target, thrust_acceleration_m_s2)

@@ -165,9 +165,9 @@ static nmpc_real_t number_of(double value, int bits)
 #endif
 
 #define MEASURE(member, column, quantity) measured.member = NUMBER(state[column], quantity);
-#define MEASURE_WHOLE(member, column, quantity) measured.member = state[column] != (double)0;
+#define MEASURE_WHOLE(member, column, quantity) measured.member = WHOLE_OF(state[column]);
 #define WANT(member, column, quantity) wanted.member = NUMBER(target[column], quantity);
-#define WANT_WHOLE(member, column, quantity) wanted.member = target[column] != (double)0;
+#define WANT_WHOLE(member, column, quantity) wanted.member = WHOLE_OF(target[column]);
 #define GIVE(member, column, quantity) command[column] = IN_SI(given.member, quantity);
 
 /* One step of one controller in SI units, for the engine of the simulation, with the columns of the closed loop. Of a

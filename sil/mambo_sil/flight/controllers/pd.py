@@ -110,7 +110,7 @@ class PdFeedForwardController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the commands for states (n, 7) and targets (n, 6), which end with accelerations, or more."""
+        """Return the commands for states (n, 7) and targets (n, 9), or with a height."""
         gains = self.gains
         sine, cosine = sine_cosine(state[:, 6])
         tilt_x, tilt_y = (
@@ -184,7 +184,7 @@ class PidFeedForwardController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the commands for states (n, 7) and targets (n, 6), which end with accelerations, or more."""
+        """Return the commands for states (n, 7) and targets (n, 9), or with a height."""
         sine, cosine = sine_cosine(state[:, 6])
         roll, pitch = state[:, 4], state[:, 5]
         measured_rad = np.stack([-(cosine * pitch + sine * roll), cosine * roll - sine * pitch], axis=-1)

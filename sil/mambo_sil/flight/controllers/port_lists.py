@@ -10,13 +10,20 @@ from mambo_sil.flight.columns import COMMAND, STATE, TARGET
 _PLACES: Final = {"state": STATE, "target": TARGET, "command": COMMAND}
 
 
+_WHOLE_OF: Final = (
+    "#define WHOLE_OF(number) "
+    "(((number) >= 0) && ((number) < 100) && !((number) > (int)(number)) ? (int)(number) : 100)"
+)
+"""An integer. A fraction, NaN, and what is less than 0 or large become 100, which no `known` is."""
+
+
 def port_lists() -> str:
     """Return macros STATE_REALS(EACH), STATE_WHOLES(EACH), and so on of target and command, and LIMITS_REALS.
 
     They expand to EACH(member, column in the closed loop, quantity) for each number of nmpc_state_t in its
     order, integers apart. NMPC_HAS_WHOLES is there where a state or a target has an integer.
     """
-    lines = list[str]()
+    lines = [_WHOLE_OF]
     for record in (*_PLACES, "limits"):
         for kind, is_whole in (("REALS", False), ("WHOLES", True)):
             rows = [row for row in TAKEN[record] if (row.kind == WHOLE) == is_whole]

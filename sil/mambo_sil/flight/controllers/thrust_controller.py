@@ -1,7 +1,7 @@
 """Controllers of the height, which command the thrust, as the closed loop calls them.
 
     state  [x, y, vx, vy, roll, pitch, yaw, height, climb, contact with the floor]   (n, 10)
-    target [x, y, vx, vy, ax, ay, height, climb, vertical acceleration]              (n, 9)
+    target the columns of `flight/columns.py`                                        (n, 13)
     thrust what the drones got in the last update period over the nominal mass       (n,)
 
 The thrust is NaN where it is what the controller had commanded.

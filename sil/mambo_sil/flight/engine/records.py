@@ -122,7 +122,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LE
 
 
 def flight_records(flight: Flight, first_target: FloatArray) -> Record:
-    """Return one engine_flight_t for each of n flights, whose first targets are (n, 6 or 9)."""
+    """Return one engine_flight_t for each of n flights, whose first targets are (n, 9 or 13)."""
     n, vehicle, disturbances = flight.flights, flight.vehicle, flight.disturbances
     airframe = vehicle.airframe
     start, step_s = start_state(flight, first_target), vehicle.drone.step_s

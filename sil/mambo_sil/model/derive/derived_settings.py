@@ -40,14 +40,14 @@ QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
 LEAST_TILT_RAD = 0.02
 """With less a controller can hardly brake: settings want 0.125 m/s^2."""
-TILT_SHARE, TOLD_TILT_SHARE = 0.5, 0.7
+TILT_SHARE, OBSERVED_TILT_SHARE = 0.5, 0.7
 """Tilt limit over the tilt at which the largest thrust still carries the weight: for a target that is
-tracked, and with the exact tilt for one that says its acceleration."""
+tracked, and with the exact tilt for one that is observed."""
 EXACT_THRUST: Final = 2.5
 """Largest thrust over the weight from which on a larger tilt is worth its trigonometry."""
 ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
     "tracked": "Removes most of the tracking error on curves",
-    "given": "By the program, which knows the curve",
+    "observed": "Each target says what it knows, and an observer finds the rest, with noise too",
 }
 """Why the settings take the target's acceleration from there."""
 
@@ -94,7 +94,7 @@ class Derived:
 
 
 def wants_exact(drone: VehicleFile, acceleration: TargetAcceleration = "tracked") -> bool:
-    """Return whether more tilt than small angles allow is of use, by the thrust or by what the target says.
+    """Return whether more tilt than small angles allow is of use, by the thrust or by what the target knows.
 
     Not without a height, nor behind the optical flow of a Mambo.
     """
@@ -103,7 +103,7 @@ def wants_exact(drone: VehicleFile, acceleration: TargetAcceleration = "tracked"
 
 
 def why_not_exact(drone: VehicleFile) -> str:
-    """Return why a larger tilt is of no use to a drone whose target says its acceleration."""
+    """Return why a larger tilt is of no use to a drone whose target is observed."""
     if isinstance(drone.sensors, MamboSensors):
         return "the optical flow drifts in larger tilts"
     return "the settings do not hold the height, which a larger tilt takes"
@@ -124,7 +124,7 @@ def derive(
     """
     attitude = list(_attitude(drone))
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
-    share = TILT_SHARE if acceleration == "tracked" or not exact else TOLD_TILT_SHARE
+    share = TILT_SHARE if acceleration == "tracked" or not exact else OBSERVED_TILT_SHARE
     tilt = _tilt_limit(drone, share, exact=exact)
     return [
         *_horizon(drone),
@@ -221,10 +221,8 @@ def _exact_tilt(drone: VehicleFile) -> Derived:
 
 
 def _target(acceleration: TargetAcceleration) -> Iterator[Derived]:
-    """Yield what is known of the target's acceleration; what is given is taken as it comes."""
+    """Yield what is known of the target's acceleration."""
     yield Derived("target", "acceleration", acceleration, ACCELERATIONS[acceleration])
-    if acceleration == "given":
-        yield Derived("target", "tracker_gain", 1.0, "What a curve says has no noise to be smoothed")
 
 
 def _response(slowness_s: float, *, firm: bool) -> Derived:

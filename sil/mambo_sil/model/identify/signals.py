@@ -27,6 +27,13 @@ THRUST_COMMAND: Final = "thrust_command"
 """The commanded thrust in any unit; where a log has none, its `THRUST` is taken."""
 TARGET: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
 TARGET_ACCELERATION: Final = ("target_ax_m_s2", "target_ay_m_s2")
+TARGET_AHEAD: Final = ("target_ahead_x_m_s2", "target_ahead_y_m_s2")
+TARGET_HEIGHT: Final = (
+    *("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2"),
+    "target_climb_ahead_m_s2",
+)
+TARGET_KNOWN: Final = "target_known"
+"""What the target of a step knows, 0 to 2."""
 TAKE_OVERS: Final = "take_overs"
 """How often the controller has begun anew, at the present attitude or its `START_TILTS`."""
 START_TILTS: Final = ("start_roll_rad", "start_pitch_rad")
@@ -65,6 +72,10 @@ OPTIONAL: Final = (
     *OF_HEIGHTS,
     JUMPS,
     *JUMP,
+    *TARGET_ACCELERATION,
+    *TARGET_AHEAD,
+    *TARGET_HEIGHT,
+    TARGET_KNOWN,
 )
 """Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
 pitch is positive with the nose up."""

@@ -84,6 +84,13 @@ _STEPS: Final[dict[str, tuple[str, float]]] = {
     **{f"{SHIFT}_{3 + k}": (f"velocity_shift[{k}]", 1.0) for k in range(3)},
     f"{SHIFT}_6": ("heading_shift", 1.0),
 }
+_OBSERVED: Final[dict[str, tuple[str, float]]] = {
+    "target_ahead_x_m_s2": ("target_ahead[0]", 1.0),
+    "target_ahead_y_m_s2": ("target_ahead[1]", 1.0),
+    "target_climb_ahead_m_s2": ("target_climb_ahead", 1.0),
+    "target_known": ("target_known", 1.0),
+}
+"""What a module with target.acceleration = "observed" logs beside."""
 _PARAMETERS: Final = "MC_NMPC_"
 """How the names of the module's parameters begin."""
 _DAMAGED: Final = "the log is damaged, or of another version; log another flight"
@@ -200,9 +207,10 @@ def _parameters(initial: Mapping[str, float], changes: Sequence[tuple[int, str, 
 def _steps(steps: Mapping[str, FloatArray], flies: NDArray[np.bool_]) -> dict[str, Signal]:
     """Return the signals of the steps that were flown, over the times of the estimates."""
     time_s = 1e-6 * steps["timestamp_sample"][flies]
+    logged = _STEPS | {signal: one for signal, one in _OBSERVED.items() if one[0] in steps}
     return {
         signal: Signal(time_s, sign * steps[field][flies], f"{STEPS}.{field}")
-        for signal, (field, sign) in _STEPS.items()
+        for signal, (field, sign) in logged.items()
     }
 
 

@@ -16,6 +16,9 @@ from mambo_sil.model.identify.signals import (
     TAKE_OVERS,
     TARGET,
     TARGET_ACCELERATION,
+    TARGET_AHEAD,
+    TARGET_HEIGHT,
+    TARGET_KNOWN,
     THRUST,
     TILTS,
     UPDATE,
@@ -25,7 +28,6 @@ from mambo_sil.model.identify.signals import (
 
 DOWNWARD: Final = (HEIGHT, "vz_m_s")
 """Signals of a state whose z points down; those of a target point up."""
-TARGET_HEIGHT: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
 _MEMBERS: Final = {
     "state": {
         "position_m": POSITION,
@@ -38,11 +40,12 @@ _MEMBERS: Final = {
         "position_m": TARGET[:2],
         "velocity_m_s": TARGET[2:],
         "acceleration_m_s2": TARGET_ACCELERATION,
+        "ahead_m_s2": TARGET_AHEAD,
         **{name.removeprefix("target_"): (name,) for name in TARGET_HEIGHT},
     },
 }
 """The signals of the members of a state and of a target; another one is read from the column of its name."""
-ASKED: Final = (*TARGET_ACCELERATION, *TARGET_HEIGHT, "vz_m_s")
+ASKED: Final = (*TARGET_ACCELERATION, *TARGET_AHEAD, *TARGET_HEIGHT, "vz_m_s")
 """Signals that are read only where the controller needs them."""
 APP_GROUP: Final = "nmpc."
 """The group of the app's logs, if the prefix of its names is that by default."""
@@ -73,6 +76,7 @@ _APP: Final = {
     START_THRUST: Column("nmpc.startThrust"),
     GROUNDED: Column("nmpc.grounded"),
     LEVELLED: Column("nmpc.level"),
+    TARGET_KNOWN: Column("nmpc.targetKnown"),
 }
 """What the app of the Crazyflie logs of each step."""
 _OTHER: Final[dict[str, tuple[Column, ...]]] = {
@@ -87,6 +91,8 @@ _OTHER: Final[dict[str, tuple[Column, ...]]] = {
     "target_height_m": (Column("target_height_m"), Column("ctrltarget.z")),
     "target_climb_m_s": (Column("target_climb_m_s"), Column("ctrltarget.vz")),
     "target_climb_acceleration_m_s2": (Column("target_climb_acceleration_m_s2"), Column("ctrltarget.az")),
+    "target_climb_ahead_m_s2": (Column("target_climb_ahead_m_s2"),),
+    **{name: (Column(name),) for name in (*TARGET_AHEAD, TARGET_KNOWN)},
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
     **{

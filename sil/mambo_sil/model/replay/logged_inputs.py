@@ -30,6 +30,11 @@ from mambo_sil.model.identify.signals import (
     START_THRUST,
     START_TILTS,
     TAKE_OVERS,
+    TARGET,
+    TARGET_ACCELERATION,
+    TARGET_AHEAD,
+    TARGET_HEIGHT,
+    TARGET_KNOWN,
     THRUST,
     UPDATE,
     VELOCITY,
@@ -50,6 +55,8 @@ from mambo_sil.model.replay.logged_columns import (
 from mambo_sil.model.replay.update_clock import UpdateClock, read_clock
 
 ULOG, _DATAFLASH = ".ulg", ".bin"
+_BY_KNOWN: Final = ((*TARGET_ACCELERATION, TARGET_HEIGHT[2]), (*TARGET_AHEAD, TARGET_HEIGHT[3]))
+"""The signals that a target has which knows its acceleration, and the one ahead."""
 LONGEST_FILLED_S: Final = 0.25
 """Longest gap of a log that is filled; behind a longer one the controller begins anew."""
 _FLOOR_M, _CLIMB_M = 0.05, 0.3
@@ -75,6 +82,8 @@ class LoggedInputs:
     state: FloatArray
     """Measured state (k, 7), or with a height (k, 10)."""
     target: FloatArray
+    known: FloatArray
+    """What each target knows (k, 1), 0 to 2; (k, 0) where the controller does not ask."""
     thrust_m_s2: FloatArray
     """Thrust over mass (k,): commanded with a height, else what the controller is given."""
     has_thrust: bool
@@ -131,7 +140,11 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     """
     port, commands_thrust = method_of(settings).port, settings.height is not None
     measured, wanted = signals_of(port, "state"), signals_of(port, "target")
-    log = _read(path, columns, (*measured, *wanted), settings.code.prefix)
+    optional = (*TARGET_ACCELERATION, *TARGET_AHEAD, *TARGET_HEIGHT[2:]) if port.wholes("target") else ()
+    log = _read(path, columns, (*measured, *wanted), optional, settings.code.prefix)
+    asks = bool(port.wholes("target"))
+    most_known, missing = _most_known(log, wanted)
+    log = _with_zeros(log, tuple(name for name in optional if name in wanted))
     period_s = settings.horizon.update_period_s
     clock = read_clock(log, period_s)
     time_s = clock.time_s
@@ -172,6 +185,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         is_logged=is_logged,
         state=state,
         target=target,
+        known=_known(log, time_s, most_known) if asks else np.zeros((len(time_s), 0)),
         thrust_m_s2=thrust_m_s2,
         has_thrust=has_thrust,
         start_rad=np.stack(starts, axis=1),
@@ -198,7 +212,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
         resolutions={
             name: signal.resolution for name, signal in log.signals.items() if signal.resolution is not None
         },
-        remarks=log.remarks,
+        remarks=(*log.remarks, *(missing if asks else ())),
     )
 
 
@@ -207,8 +221,46 @@ def _own(name: str, prefix: str) -> str:
     return f"{prefix}.{name.removeprefix(APP_GROUP)}" if name.startswith(APP_GROUP) else name
 
 
-def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], prefix: str) -> FlightLog:
-    """Return the log, which has the signals `wanted`; raises LogError."""
+def _most_known(log: FlightLog, wanted: tuple[str, ...]) -> tuple[int, tuple[str, ...]]:
+    """Return the most that targets can know by a log, and remarks on columns that it lacks beside others."""
+    groups = [[name for name in wanted if name in names] for names in _BY_KNOWN]
+    missing = [[name for name in names if name not in log.signals] for names in groups]
+    most = 2 if not any(missing) else int(not missing[0])
+    told = log.signals.get(TARGET_KNOWN)
+    claimed = 0.0 if told is None else np.nanmax(told.value, initial=0.0)
+    has = [len(lacking) < len(names) for lacking, names in zip(missing, groups, strict=True)]
+    return most, tuple(
+        f"no column {', '.join(lacking)}: targets count as `known` {most}"
+        for known, lacking in enumerate(missing, 1)
+        if lacking and most < known and (claimed >= known or any(has[known - 1 :]))
+    )
+
+
+def _known(log: FlightLog, time_s: FloatArray, most: int) -> FloatArray:
+    """Return what each target knows (k, 1), at most `most`; raises LogError if it is not 0, 1 or 2."""
+    told = _held_or(log, TARGET_KNOWN, time_s, float(most))
+    wrong = told[~np.isin(told, (0.0, 1.0, 2.0))]
+    if wrong.size:
+        raise LogError((f"{log.name}: {TARGET_KNOWN} = {wrong[0]:g} must be 0, 1 or 2",))
+    return np.minimum(told, most)[:, np.newaxis]
+
+
+def _with_zeros(log: FlightLog, optional: tuple[str, ...]) -> FlightLog:
+    """Return a log with zeros for the optional signals that it has not."""
+    like = log.signals[TARGET[0]]
+    zeros = replace(like, value=np.zeros_like(like.value), resolution=None)
+    missing = {name: zeros for name in optional if name not in log.signals}
+    return replace(log, signals={**log.signals, **missing})
+
+
+def _read(
+    path: Path,
+    columns: Mapping[str, Column],
+    wanted: tuple[str, ...],
+    optional: tuple[str, ...],
+    prefix: str,
+) -> FlightLog:
+    """Return the log, which has the signals `wanted` less the `optional` ones; raises LogError."""
     is_ulog = path.suffix.lower() == ULOG
     if is_ulog and columns:
         raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
@@ -226,7 +278,7 @@ def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...], pr
     }
     known |= {name: (Column(name),) for name in wanted if name not in SIGNALS}
     log = read_ulog(path) if is_ulog else read_csv(path, columns, known, binary=ULOG)
-    missing = [name for name in wanted if name not in log.signals]
+    missing = [name for name in wanted if name not in log.signals and name not in optional]
     if missing and is_ulog:
         raise LogError(
             (

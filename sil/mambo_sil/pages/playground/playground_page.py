@@ -9,8 +9,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.port.taken import AHEAD_S
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.columns import LEVEL, SPACE, TARGET
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.engine_library import ffi, record_type
 from mambo_sil.flight.engine.native import pd_function
@@ -34,6 +36,8 @@ _PD_HUES: Final = {"pd": 1, "pd-feedforward": 2, "pid-feedforward": 3}
 """Colours of the PDs on all pages."""
 _DASHES: Final = ((), (7, 3), (2, 3), (9, 3, 2, 3))
 """Lengths of dashes and gaps of each controller's line, in pixels, for whoever cannot tell colours."""
+_TRACED: Final = ("position_m", "velocity_m_s", "height_m", "climb_m_s")
+"""What a trace has of a target."""
 _CIRCLE: Final = (1.2, 0.8)
 """Radius in m and rate in rad/s."""
 
@@ -147,6 +151,13 @@ def _simulation(flight: Flight) -> dict[str, Any]:
     read = bit_proof.inputs(flight)
     return {
         "period_s": flight.update_period_s,
+        "ahead_s": AHEAD_S,
+        "columns": {
+            "level": LEVEL.target,
+            "target": SPACE.target,
+            "known": TARGET["known"].start,
+            "traced": [column for name in _TRACED for column in range(SPACE.target)[TARGET[name]]],
+        },
         "spatial": is_spatial(flight.trajectory),
         "height_m": HOVER_HEIGHT_M,
         "ticks": flight.ticks_per_update,
