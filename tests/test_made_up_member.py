@@ -15,10 +15,13 @@ from tests.support.tools import toolchain
 ROWS = """
 from mambo_codegen.port import taken
 from mambo_codegen.port.row import WHOLE, CHANCE, Draw, PortRow
-taken.TAKEN["target"] += (
+*numbers, known = taken.TAKEN["target"]
+taken.TAKEN["target"] = (
+    *numbers,
     PortRow("swirl_1_s", "factor", "made up", 2, draw=Draw("SWIRL_1_S", 0.5),
         told=(("swirl_x", "x"), ("swirl_y", "y"))),
-    PortRow("known", "whole", "made up", kind=WHOLE, draw=CHANCE),
+    known,
+    PortRow("flag", "whole", "made up", kind=WHOLE, draw=CHANCE),
 )
 """
 """Run before anything of ours is imported, so that no list is made without the rows."""
@@ -61,12 +64,12 @@ from tests.support.options import OPTIONS
 settings = OPTIONS[sys.argv[1]].settings
 method = method_of(settings)
 swirl = [one.column for one in method.port.numbers("target") if one.row.member == "swirl_1_s"]
-known = [one.column for one in method.port.numbers("target") if one.row.member == "known"]
-assert len(swirl) == 2 and len(known) == 1
+flag = [one.column for one in method.port.numbers("target") if one.row.member == "flag"]
+assert len(swirl) == 2 and len(flag) == 1
 
 # The self-test draws it, in NumPy and in C with the same bits; a range that the C lacks would show.
 drawn = np.concatenate([step[1] for step in episode_inputs(method, np.arange(40, dtype=np.uint32))])
-assert len(np.unique(drawn[:, swirl])) > 100 and set(np.unique(drawn[:, known])) == {0, 1}
+assert len(np.unique(drawn[:, swirl])) > 100 and set(np.unique(drawn[:, flag])) == {0, 1}
 library = build_library(settings, host_toolchain())
 assert digest_compiled(library, 20) == self_test_digest(method, 20)
 
@@ -107,13 +110,13 @@ def run(script: str, option: str) -> str:
     return made.stdout
 
 
-@pytest.mark.parametrize("option", ["height, given", "given", "learnt gain"])
+@pytest.mark.parametrize("option", ["height, observed", "observed", "learnt gain"])
 def test_a_member_more_flies_with_the_same_bits_everywhere(option: str) -> None:
     """In the self-test, the tapes, the engine, NumPy and behind a fault; a replay asks for its columns."""
     assert run(RUNS, option) == "ok\n"
 
 
-@pytest.mark.parametrize("option", ["height, given", "given"])
+@pytest.mark.parametrize("option", ["height, observed", "observed"])
 def test_a_member_more_is_in_all_that_a_bundle_has(option: str, tmp_path: Path) -> None:
     """Header, self-test, fuzz, proof, mock-up unit and frames name it or count it, and compile."""
     made = json.loads(run(BUNDLE, option))
@@ -121,9 +124,9 @@ def test_a_member_more_is_in_all_that_a_bundle_has(option: str, tmp_path: Path) 
     named = ("nmpc.h", "nmpc_self_test.c", "fuzz/nmpc_fuzz.c", "proof/nmpc_proof.c")
     for path in (*named, "fmu/sources/nmpc_fmu.c"):
         assert "swirl_1_s" in files[path], path
-        assert "known" in files[path], path
-    assert {"swirl_x", "swirl_y", "known"} <= set(variables)
-    assert "target.known = is_set(" in files["pil/pil.c"]
+        assert "flag" in files[path], path
+    assert {"swirl_x", "swirl_y", "flag"} <= set(variables)
+    assert "target.flag = whole(" in files["pil/pil.c"]
     for path, text in files.items():
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_text(text)

@@ -116,7 +116,6 @@ def test_wrong_arguments_are_refused() -> None:
     for wrong, message in (
         ({"action": "thrust"}, 'action = "thrust" must be "attitude" or "target"'),
         ({"height": "pid"}, 'height = "pid" must be left out'),
-        ({"acceleration": "given"}, 'acceleration = "given" must be "none" or "tracked"'),
         ({"reach_m": 0.0}, r"reach_m = 0\.0 must lie in 0\.1\.\.100"),
         ({"update_period_s": 1.0 / 240.0}, r"update_period_s = 0\.00416\d* must be a multiple of 0\.002"),
         ({"tilt_deg": 3.0}, 'option = "tilt_deg" must be'),

@@ -247,18 +247,16 @@ def test_wrong_arguments_of_a_step_are_refused_by_name() -> None:
 
 
 def test_a_target_may_tell_its_acceleration() -> None:
-    """Where the settings ask for it; without it they are refused, and others ignore it."""
-    settings = with_option(presets.load("crazyflie"), "target.acceleration", "given")
-    given, other = Controller(settings), CompiledController(settings)
+    """Where the settings observe it; others ignore it."""
+    settings = with_option(presets.load("crazyflie"), "target.acceleration", "observed")
+    observing, other = Controller(settings), CompiledController(settings)
     state = DroneState.in_frame("ENU", np.zeros(3), np.zeros(3), np.array([0.0, 0.0, np.pi / 2.0]))
     north = np.array([0.0, 1.0, 0.0])
     target = TargetState.in_frame("ENU", np.zeros(3), np.zeros(3), north)
-    command_rad = given.step(state, target).command_rad
-    told = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    command_rad = observing.step(state, target).command_rad
+    told = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]])
     assert command_rad[1] < 0.0
     assert (command_rad == other.step(np.zeros((1, 7)), told, np.array([9.81])).command_rad[0]).all()
-    with pytest.raises(ValueError, match="target: acceleration_m_s2 is missing"):
-        given.step(state, TargetState(np.zeros(2), np.zeros(2)))
     assert (Controller.from_preset("crazyflie").step(state, target).command_rad == 0.0).all()
     with pytest.raises(ValueError, match="acceleration_m_s2: has shape"):
         TargetState(np.zeros(2), np.zeros(2), np.zeros(4))

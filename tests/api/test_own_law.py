@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_nmpc import ArgumentError, DroneState, Flown, TargetState, Vehicle, fly
+from mambo_nmpc import ArgumentError, Controller, DroneState, Flown, TargetState, Vehicle, fly
 from mambo_sil.flight.engine.engine_library import VARIABLE
 
 CRAZYFLIE = Vehicle.from_preset("crazyflie")
@@ -113,6 +113,27 @@ def test_what_it_is_given_is_z_down() -> None:
     accelerations_m_s2 = np.array([one.acceleration_m_s2 for one in targets])
     mean_m_s2 = 0.5 * (accelerations_m_s2[1:] + accelerations_m_s2[:-1])
     np.testing.assert_allclose(np.diff(velocities_m_s, axis=0), 0.01 * mean_m_s2, atol=1e-5)
+    ahead_m_s2 = np.array([one.ahead_m_s2 for one in targets])
+    np.testing.assert_allclose(ahead_m_s2[:-5], accelerations_m_s2[5:], atol=1e-12)
+    assert {one.known for one in targets} == {2}
+
+
+def test_a_law_may_have_a_controller_of_its_own() -> None:
+    """One that observes its target: the flight is that of the controller itself, in every bit."""
+
+    class Ours:
+        def __init__(self, controller: Controller) -> None:
+            self.controller = controller
+
+        def __deepcopy__(self, memo: Any) -> "Ours":
+            return Ours(Controller(self.controller.settings))
+
+        def step(self, state: DroneState, target: TargetState) -> Any:
+            found = self.controller.step(state, target, 9.81)
+            return found.command_rad
+
+    controller = Controller.from_preset("crazyflie", acceleration="observed")
+    assert flown(Ours(controller)).trace.same_bits(flown(controller).trace)
 
 
 def test_its_period_is_its_own() -> None:

@@ -16,6 +16,7 @@ from benchmarks.gains.feedforward import (
 )
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw, pid_altitude_gains
+from mambo_sil.flight.columns import SPACE
 from mambo_sil.flight.controllers.pd import GAINS, PdGains, PidGains, pid_gains
 
 STOCK = FIRST["pd-feedforward"]
@@ -76,6 +77,8 @@ def test_the_flights_have_heights_and_the_shipped_gains_follow_closest() -> None
     """Drawn, with sensors; on the first six of each curve the errors fall from law to law."""
     flights = drawn_flights(altitude.CURVES, altitude.DURATION_S, count=6, vehicle="crazyflie")
     assert len(flights) == len(altitude.CURVES)
-    assert all(flight.sensors is not None and flight.given_targets.shape[2] == 9 for flight in flights)
+    assert all(
+        flight.sensors is not None and flight.given_targets.shape[2] == SPACE.target for flight in flights
+    )
     errors = [altitude.judge(flights, AltitudeLaw(name)).error for name in ("stock", "feedforward", "pid")]
     assert errors == sorted(errors, reverse=True)

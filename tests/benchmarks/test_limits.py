@@ -123,7 +123,7 @@ def test_with_the_1norm_a_circle_beyond_the_tilt_limit_is_no_orbit(
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("preset", QUADRATIC)
-@pytest.mark.parametrize("acceleration", ["none", "given"])
+@pytest.mark.parametrize("acceleration", ["none", "observed"])
 def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str, acceleration: str) -> None:
     """Unless it is tracked, as above: a step stops, since braking is fed forward where it can be."""
     settings = with_option(limited(preset, 5.0, 2.0), "target.acceleration", acceleration)

@@ -118,8 +118,8 @@ def test_to_stdout_it_prints_the_file_alone() -> None:
 
 def test_what_the_program_says_of_its_target_is_in_the_settings() -> None:
     """With the exact tilt where the thrust is known."""
-    run("design", "crazyflie", "--acceleration", "given")
-    assert load("controller.toml").target.acceleration == "given"
+    run("design", "crazyflie", "--acceleration", "observed")
+    assert load("controller.toml").target.acceleration == "observed"
     assert load("controller.toml").model.tilt == "exact"
 
 
@@ -182,7 +182,7 @@ def test_the_flight_of_the_app_is_the_verdict() -> None:
 )
 def test_a_wish_for_tilt_that_is_not_met_is_told(vehicle: str, why: str) -> None:
     """With the reason; not where nobody asked."""
-    _, said = run("design", vehicle, "--acceleration", "given")
+    _, said = run("design", vehicle, "--acceleration", "observed")
     assert f"tilt: small angles, since {why} largest horizontal" in unwrapped(said)
     if vehicle != "hummingbird":
         assert "small angles" not in run("design", vehicle, "--force")[1]

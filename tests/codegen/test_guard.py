@@ -66,7 +66,7 @@ def deviations(difference_m_s2: Any, steps: int) -> tuple[Tracker, Any]:
     """Track accelerations that differ from the predicted ones by so much; return the motion at the end."""
     method = Quadratic(GUARDED)
     tracker = method.reference_controller().parts.tracker
-    assert tracker is not None
+    assert isinstance(tracker, Tracker)
     motion = unknown_motion(np.zeros((1, 2), np.float32))
     velocity, signs = 0.0, np.resize(difference_m_s2, steps)
     for sign in signs:
@@ -92,7 +92,7 @@ def test_a_tracker_without_noise_tracks_as_one_without_a_guard() -> None:
     found = []
     for settings in (GUARDED, plain):
         tracker = Quadratic(settings).reference_controller().parts.tracker
-        assert tracker is not None
+        assert isinstance(tracker, Tracker)
         motion = unknown_motion(np.zeros((1, 2), np.float32))
         for velocity in velocities:
             motion = tracker.update(motion, velocity[np.newaxis])
@@ -166,21 +166,3 @@ def test_the_noise_of_a_target_has_these_constants() -> None:
     assert slowest.noise is not None
     assert slowest.noise.share == pytest.approx(0.2, rel=1e-12)
     assert (MOST_NOISE, LEAST_CHANGE, MOST_COUNTED) == (16, 0.25, 1 / 64)
-
-
-def test_a_given_acceleration_may_be_taken_as_it_comes() -> None:
-    """With a gain of 1 the estimates are the acceleration and its change; a jump is over in a step."""
-    settings = with_option(with_option(GUARDED, "target.acceleration", "given"), "target.tracker_gain", 1.0)
-    method = Quadratic(with_option(settings, "code.scalar", "float64"))
-    assert method.guard is not None
-    assert method.tracker is not None
-    assert method.tracker.noise is None
-    tracker, step_s = Tracker(method.tracker, method.reference_controller(1).parts.products), method.step_s
-    given = np.random.default_rng(5).uniform(-2.0, 2.0, (40, 1, 2))
-    motion = unknown_motion(given[0])
-    limit = method.tracker.jerk_limit_m_step2_update
-    for before, now in zip([given[0], *given[:-1]], given, strict=True):
-        motion = tracker.update(motion, now)
-        np.testing.assert_allclose(motion.acceleration_m_step2, now * step_s**2, rtol=1e-12)
-        change = np.clip((now - before) * step_s**2, -limit, limit)
-        np.testing.assert_allclose(motion.jerk_m_step2_update, change, atol=1e-12)

@@ -298,13 +298,14 @@ def test_limits_that_are_not_set_have_no_trace_in_the_digest(base: str) -> None:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
+@pytest.mark.parametrize("acceleration", ["none", "tracked", "observed"])
 def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
     """After outage_s without a state the model brakes to rest, and then the command is level."""
     settings = with_option(limited(), "target.acceleration", acceleration)
     controller: Any = method_of(settings).reference_controller(2)
     state = np.array([[0.0, 0, 2.0, 0, 0, 0, 0.3], [0.0, 0, 0, -1.5, 0, 0, 1.0]])
-    target = np.array([[5.0, 0, 0, 0, 0, 0], [0, -5.0, 0, 0, 0, 0]])
+    target = np.zeros((2, 9))
+    target[:, :2] = np.diag([5.0, -5.0])
     for _ in range(20):
         controller.step(state, target, np.full(2, 9.81))
     commands = [controller.step(np.full((2, 7), np.nan), target, np.full(2, 9.81)) for _ in range(600)]

@@ -116,8 +116,9 @@ def test_bounds_are_closed(key: Key) -> None:
         ("cost.effort_weight = false", "must be a number and lie in 0..1000000"),
         ('optimizer.variant = "rprop"', 'must be "rprop+" or "irprop-"'),
         (
-            'target.acceleration = "preview"',
-            'must be "none", "given" or "tracked": version 0.4 has no preview, and "given" is closer',
+            'target.acceleration = "given"',
+            'must be "none", "tracked" or "observed": since version 0.4 a target with "observed" says '
+            "what it knows of its acceleration, in its member `known` (quadratic cost)",
         ),
         ("optimizer.step_max_rad = 0.005", "must lie in 0.01..1 (at least optimizer.initial_step_rad)"),
         ("optimizer.step_min_rad = 0.02", "must lie in 1e-9..0.01 (at most optimizer.initial_step_rad)"),

@@ -118,6 +118,26 @@ def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:
     assert np.count_nonzero(free) > 50
 
 
+@pytest.mark.parametrize("known", [0, 1, 2])
+def test_a_known_acceleration_always_gets_a_tilt_of_its_own(known: int) -> None:
+    """0.36 rad by the vertical part of the thrust, where the target's velocities alone get 1.7 m/s^2."""
+    method = Quadratic(with_option(exact_settings(), "target.acceleration", "observed"))
+    controller = method.reference_controller(200)
+    height, step_s2 = controller.parts.height, method.step_s**2
+    target = np.zeros((200, 13))
+    target[:, -1] = known
+    controller.step(np.zeros((200, 10)), target)
+    vertical_m_s2 = np.linspace(0.0, 25.0, 200)
+    state = controller.memory.height
+    found = height.spare(state.__class__(**{**vars(state), "command": vertical_m_s2 * step_s2}))
+    assert found is not None
+    held = found[-60:] / step_s2
+    if known:
+        assert np.arctan(held / vertical_m_s2[-60:]) == pytest.approx(0.36, rel=1e-9)
+    else:
+        assert held == pytest.approx(LEAST_SPARE_M_S2)
+
+
 def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
     """The same far target sideways: level the tilt limit acts, with a target high above the thrust does."""
     settings = exact_settings(1.0)

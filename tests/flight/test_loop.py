@@ -12,6 +12,7 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.table2.table2 import CASES, PRINTED_PD
+from mambo_sil.flight.columns import LEVEL
 from mambo_sil.flight.controllers.pd import PdController, PdOutcome
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight, Offset, fly
@@ -35,7 +36,7 @@ class Lean:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> PdOutcome:
         """Return the same command for every flight."""
-        assert (state.shape[1], target.shape[1]) == (7, 6)
+        assert (state.shape[1], target.shape[1]) == (LEVEL.state, LEVEL.target)
         assert len(state) == len(target) == len(thrust_acceleration_m_s2)
         command_rad = np.tile([self.roll_rad, self.pitch_rad], (len(state), 1))
         return PdOutcome(command_rad, np.full(len(state), 3, dtype=np.int64))
@@ -118,8 +119,9 @@ def test_controller_receives_the_recorded_state_and_target() -> None:
     flight = Flight(FIGURE_OF_EIGHT, 3.0, yaw_rad=0.4, disturbances=Disturbances(push_m_s2=(0.5, 0.3)))
     trace = fly(flight, Recorder())
     state = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1)
-    acceleration = FIGURE_OF_EIGHT.acceleration(trace.time_s)[:, None]
-    target = np.concatenate([trace.target, acceleration], axis=-1)
+    now, ahead = (FIGURE_OF_EIGHT.acceleration(trace.time_s + later)[:, None] for later in (0.0, 0.05))
+    known = np.full((*trace.target.shape[:2], 1), 2.0)
+    target = np.concatenate([trace.target, now, ahead, known], axis=-1)
     expected = (state, target, trace.thrust_acceleration_m_s2)
     for values, recorded in zip(zip(*given, strict=True), expected, strict=True):
         np.testing.assert_array_equal(np.stack(values), recorded)

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.flight import columns
+from mambo_sil.flight.columns import LEVEL, TARGET
 from mambo_sil.flight.controllers.pd import PdController, pd_controller
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
@@ -102,15 +104,26 @@ def test_a_drone_that_cannot_carry_its_weight_crashes_on_the_ground() -> None:
 
 
 def test_targets_have_the_columns_of_their_courses() -> None:
-    """Six on level courses, nine where any has a height; those of a trace are four and six."""
+    """Those of the level axes, and those of the height where any has one; of a trace four and six."""
     level, space = Circle(1.0, 1.0), CURVES["helix"](1.0, 1.0)
-    for curve, given, traced in ((level, 6, 4), (space, 9, 6)):
+    for curve, given, traced in ((level, LEVEL.target, 4), (space, columns.SPACE.target, 6)):
         flight = Flight(curve, duration_s=0.1)
         assert flight.given_targets.shape[2] == given
         assert flight.traced_targets.shape == (11, 1, traced)
     both = Flight(Trajectories((level, space)), duration_s=0.1, flights=2)
-    np.testing.assert_array_equal(both.given_targets[:, 0, 6:], np.tile([HOVER_HEIGHT_M, 0.0, 0.0], (11, 1)))
-    np.testing.assert_array_equal(both.given_targets[:, 1, 6:], vertical_of(space, both.times_s()))
+    hover, climbing = both.given_targets[:, :, LEVEL.target :].swapaxes(0, 1)
+    np.testing.assert_array_equal(hover, np.tile([HOVER_HEIGHT_M, 0.0, 0.0, 0.0], (11, 1)))
+    np.testing.assert_array_equal(climbing[:, :3], vertical_of(space, both.times_s()))
+    np.testing.assert_array_equal(climbing[:, 3], vertical_of(space, both.times_s() + 0.05)[:, 2])
+
+
+def test_a_target_knows_its_acceleration_and_the_one_ahead() -> None:
+    """At each update, of the curve at that time and 0.05 s later."""
+    flight, curve = Flight(Circle(1.0, 2.0), duration_s=1.0), Circle(1.0, 2.0)
+    given = flight.given_targets[:, 0]
+    assert (given[:, TARGET["known"]] == 2).all()
+    for name, later_s in (("acceleration_m_s2", 0.0), ("ahead_m_s2", 0.05)):
+        np.testing.assert_array_equal(given[:, TARGET[name]], curve.acceleration(flight.times_s() + later_s))
 
 
 @pytest.mark.long

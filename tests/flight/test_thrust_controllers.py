@@ -11,6 +11,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight import loop
+from mambo_sil.flight.columns import SPACE, TARGET
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import ThrustController, ThrustDelivery
 from mambo_sil.flight.engine.adjusted import Adjustment
@@ -42,7 +43,7 @@ def assert_same(ours: Trace, theirs: Trace) -> None:
 
 @pytest.mark.first_is_quick
 @pytest.mark.sampled(6)
-@pytest.mark.parametrize("acceleration", ["tracked", "given"])
+@pytest.mark.parametrize("acceleration", ["tracked", "observed"])
 @pytest.mark.parametrize("scalar", ["float32", *SLOW])
 @pytest.mark.parametrize("batch", FLOWN)
 def test_engine_and_reference_have_the_bits_of_numpy(batch: str, scalar: str, acceleration: str) -> None:
@@ -63,7 +64,7 @@ def test_a_command_is_the_thrust_over_the_gain() -> None:
         for gain in (1.0, 0.5)
     )
     for step in range(60):
-        state, target = rng.normal(0.0, 0.3, (5, 10)), rng.normal(0.0, 0.3, (5, 9))
+        state, target = rng.normal(0.0, 0.3, (5, SPACE.state)), rng.normal(0.0, 0.3, (5, SPACE.target))
         state[:, 9] = step % 4 == 0
         one, other = plain.step(state, target, reported), halved.step(state, target, 2.0 * reported)
         assert (2.0 * one.thrust_m_s2).tobytes() == other.thrust_m_s2.tobytes()
@@ -123,7 +124,7 @@ def test_the_thrust_of_the_trace_is_the_commanded_one_and_reaches_the_rotors() -
         assert -trace.position_m[-1, 0, 2] == pytest.approx(1.1, abs=2e-3)
         recorder = Recorder.around(height_settings())
         assert_same(loop.fly(flight, recorder), trace)
-        assert recorder.targets[-1][0, 6:].tolist() == [1.1, 0.0, 0.0]
+        assert recorder.targets[-1][0, TARGET["height_m"].start :].tolist() == [1.1, 0.0, 0.0, 0.0]
         assert np.isnan(recorder.reported).all()
 
 

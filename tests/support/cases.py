@@ -82,7 +82,7 @@ def _random_settings(
         },
         "code": {"scalar": scalar},
     }
-    document["target"] = {"acceleration": str(rng.choice(["none", "tracked", "given"]))}
+    document["target"] = {"acceleration": str(rng.choice(["none", "tracked"]))}
     document["damping"] = {"roll_rate_feedback_s": float(rng.choice([0.0, 0.0, 0.0005, 0.02]))}
     if 0 < lags[0] < 0.001 + document["damping"]["roll_rate_feedback_s"]:
         document["damping"] = {}

@@ -181,7 +181,7 @@ class Fleet:
             app.modes("modeAbs")
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
-        """Run the ticks of an update; states (n, 7) and targets (n, 6) as in `PositionController`."""
+        """Run the ticks of an update; states (n, 7) and targets (n, 9) as in `PositionController`."""
         del thrust_acceleration_m_s2
         if self._updates % self._updates_per_setpoint == 0:
             for app, one in zip(self.apps, target, strict=True):

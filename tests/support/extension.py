@@ -30,7 +30,7 @@ typedef REAL nmpc_real_t;
 typedef SUM nmpc_sum_t;
 typedef int... nmpc_status_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
-typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; TARGET_ACCELERATION } nmpc_target_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 TRACKER_TYPE
 """
@@ -104,7 +104,7 @@ void attitude_turn(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t, int);
 nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
 """
 _TRACKER: Final = {
-    "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "
+    "TRACKER_TYPE": "typedef struct { nmpc_real_t velocity_m_s[2], acceleration_m_step2[2], "
     "jerk_m_step2_update[2]; ...; } nmpc_tracker_t;",
     "TRACKER_MEMBERS": "nmpc_tracker_t tracker; unsigned char has_target;",
     "TRACKER_FUNCTIONS": "void tracker_clear(nmpc_t *);\nvoid tracker_update(nmpc_t *, const nmpc_real_t *);",
@@ -128,11 +128,6 @@ def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     declarations = declarations.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
     for place_holder, text in _TRACKER.items():
         declarations = declarations.replace(place_holder, text if tracked else "")
-    given = "NMPC_HAS_TARGET_ACCELERATION" in files["nmpc.h"]
-    declarations = declarations.replace("TARGET_VELOCITY", "" if given else "nmpc_real_t velocity_m_s[2];")
-    declarations = declarations.replace(
-        "TARGET_ACCELERATION", "nmpc_real_t acceleration_m_s2[2];" if given else ""
-    )
     contents = (files, includes, declarations)
     name = f"_nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}"
     if name not in sys.modules:

@@ -33,7 +33,7 @@ EVERY_FUNCTION: Final = settings_of(
 """Settings of every function of nmpc.h; roll and pitch differ."""
 
 HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
-    CRAZYFLIE | {"target.acceleration": "given", "observer.age_s": 0.01, "observer.outage_s": 0.05},
+    CRAZYFLIE | {"target.acceleration": "observed", "observer.age_s": 0.01, "observer.outage_s": 0.05},
     CRAZYFLIE
     | {
         "target.acceleration": "tracked",
@@ -59,7 +59,7 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     },
     CRAZYFLIE
     | {
-        "target.acceleration": "given",
+        "target.acceleration": "observed",
         "limits.fence.x_min_m": -1.5,
         "limits.fence.x_max_m": 2.0,
         "damping.pitch_rate_feedback_s": 0.02,
@@ -104,9 +104,10 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     | {
         "model.tilt": "exact",
         "limits.tilt_rad": 0.7,
-        "target.acceleration": "given",
-        "target.tracker_gain": 1.0,
-        "limits.speed_m_s": 5.0,
+        "target.acceleration": "observed",
+        "model.drag_1_s": 0.244,
+        "limits.speed_m_s": 1.5,
+        "observer.outage_s": 0.05,
         "guard.tilt_rad_s": 8.4,
     },
 )

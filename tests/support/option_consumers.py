@@ -27,8 +27,12 @@ from tests.support.option_flights import OptionFlights, Update
 
 Consumer = Callable[[OptionFlights, Path], str]
 TARGET_COLUMNS: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
-GIVEN_COLUMNS: Final = ("target_ax_m_s2", "target_ay_m_s2")
-HEIGHT_COLUMNS: Final = ("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2")
+KNOWN_COLUMNS: Final = ("target_ax_m_s2", "target_ay_m_s2")
+AHEAD_COLUMNS: Final = ("target_ahead_x_m_s2", "target_ahead_y_m_s2", "target_known")
+HEIGHT_COLUMNS: Final = (
+    *("target_height_m", "target_climb_m_s", "target_climb_acceleration_m_s2"),
+    "target_climb_ahead_m_s2",
+)
 STATE_COLUMNS: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad", "z_m", "vz_m_s")
 COMMAND_COLUMNS: Final = ("roll_command_rad", "pitch_command_rad")
 
@@ -148,6 +152,11 @@ def written(flights: OptionFlights, folder: Path) -> Path:
 def _records(update: Update) -> tuple[DroneState, TargetState]:
     """Return the inputs of one drone as the Python API takes them, with all that a target can say."""
     state, target = update.state, update.target
+    upward = np.hstack([target, np.zeros((1, 4))])[:, 9:13] if target.shape[1] > 9 else np.zeros((1, 4))
+    *given, ahead = (
+        _down(np.column_stack([target[:, [2 * order, 2 * order + 1]], upward[:, order]]))
+        for order in range(4)
+    )
     heights, climbs = (state[:, 7:8], state[:, 8:9]) if state.shape[1] > 7 else np.ones((2, 1, 1))
     return (
         DroneState(
@@ -156,7 +165,7 @@ def _records(update: Update) -> tuple[DroneState, TargetState]:
             state[:, 4:7],
             state[:, 9] != 0.0 if state.shape[1] > 9 else False,
         ),
-        TargetState(*(_down(target[:, [axis, axis + 1, 6 + axis // 2]]) for axis in (0, 2, 4))),
+        TargetState(*given, ahead_m_s2=ahead),
     )
 
 
@@ -174,7 +183,9 @@ def _write_log(flights: OptionFlights, updates: list[Update], path: Path) -> Non
         if len(state) > 7:
             state = np.concatenate([state[:7], -state[7:9]])
         row |= dict(zip(STATE_COLUMNS, state, strict=False))
-        row |= dict(zip((*TARGET_COLUMNS, *GIVEN_COLUMNS, *HEIGHT_COLUMNS), target, strict=False))
+        row |= dict(
+            zip((*TARGET_COLUMNS, *KNOWN_COLUMNS, *AHEAD_COLUMNS, *HEIGHT_COLUMNS), target, strict=False)
+        )
         row |= dict(zip(COMMAND_COLUMNS, update.command[0], strict=False))
         if not flights.method.has_height:
             row["thrust_acceleration_m_s2"] = update.thrust_m_s2[0]

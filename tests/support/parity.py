@@ -80,11 +80,12 @@ def _fly_height(
     settings: Settings, inputs: StepInputs, calm: NDArray[np.bool_], scale: Any, rng: np.random.Generator
 ) -> None:
     """Let heights of flights differ little from those of their targets, which repeat those of y; in place."""
-    level = sum(not one.row.is_upward for one in method_of(settings).port.numbers("target"))
+    numbers = method_of(settings).port.numbers("target")
+    (first,) = (one.column for one in numbers if one.row.member == "height_m")
     limits = np.array([settings.ranges.position_m, settings.ranges.velocity_m_s])
     goal = np.clip(inputs.target[:, [1, 3]], -limits, limits)
     own = np.clip(goal + (scale * rng.normal(0, 1, goal.shape)), -limits, limits)
-    inputs.target[calm, level : level + 2] = goal[calm]
+    inputs.target[calm, first : first + 2] = goal[calm]
     inputs.state[calm, 7:9] = own[calm]
 
 

@@ -187,8 +187,7 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     },
     TWO_MOVES
     | {
-        "target.acceleration": "given",
-        "target.tracker_gain": 0.6,
+        "target.acceleration": "observed",
         "limits.speed_m_s": 1.5,
         "limits.fence.x_min_m": -1.5,
         "limits.fence.x_max_m": 2.0,
@@ -203,8 +202,17 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
         "guard.tilt_rad_s": 1.0,
         "guard.position_noise": 0.1,
     },
+    TWO_MOVES
+    | {
+        "target.acceleration": "observed",
+        "limits.speed_m_s": 1.5,
+        "model.drag_1_s": 0.2,
+        "observer.outage_s": 0.03,
+        "guard.tilt_rad_s": 8.0,
+    },
 )
-"""One move and two, attitude measured and predicted, with tracker, feedback, drag, age, trim and guard."""
+"""One move and two, attitude measured and predicted, with tracker, observer of the target, feedback, drag,
+age, trim and guard."""
 
 
 def quadratic_case(index: int, scalar: str) -> Settings:
@@ -227,7 +235,7 @@ def case_values(index: int) -> Values:
         "horizon.update_period_s": period_s,
         "horizon.ramp_s": float(rng.choice([0.0, max(0.02, 2 * period_s), 0.4, 1.0])),
         "limits.tilt_rad": tilt_rad,
-        "target.acceleration": str(rng.choice(["none", "tracked", "given"])),
+        "target.acceleration": str(rng.choice(["none", "tracked", "observed"])),
         "target.tracker_gain": float(rng.uniform(0.05, 1)),
         "model.attitude": str(rng.choice(["measured", "predicted"])),
         "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),

@@ -75,6 +75,7 @@ def valid_values(draw: st.DrawFn) -> Values:
             numbers("ranges.thrust_acceleration_max_m_s2", low=math.nextafter(thrust_min, math.inf))
         ),
         **draw(limits(tilt_rad, 9.81 * tilt_rad)),
+        "target.acceleration": draw(st.sampled_from(["none", "tracked"])),
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(prefixes()),
     }

@@ -41,10 +41,14 @@ LARGEST_STACK_BYTES = 480
 SUBJECTS = {
     "crazyflie": SETTINGS,
     "float64": with_option(SETTINGS, "code.scalar", "float64"),
-    "given": with_option(SETTINGS, "target.acceleration", "given"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
-    "height": height_settings(acceleration="given"),
+    "observed": with_option(SETTINGS, "target.acceleration", "observed"),
+    "observed fixed": with_option(
+        with_option(presets.preset("mambo"), "code.scalar", "fixed"), "target.acceleration", "observed"
+    ),
+    "height": height_settings(),
+    "observed height": height_settings(acceleration="observed"),
     "limits": with_option(SETTINGS, "limits.speed_m_s", 2.0),
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
 }

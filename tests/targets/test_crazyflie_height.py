@@ -14,7 +14,7 @@ from tests.support.height_settings import height_settings
 
 MOST_N = 0.48
 """Of the four motors, in the stubs."""
-SETTINGS = height_settings(acceleration="given")
+SETTINGS = height_settings(acceleration="observed")
 AXES = (("x", 1.0), ("y", -1.0), ("z", 1.0))
 
 
@@ -82,7 +82,9 @@ def test_a_step_has_the_bits_of_the_reference(lifting: Built) -> None:
             *(s * app.logged(n) for n, s in (("targetVx", 1), ("targetVy", -1))),
             *(s * app.logged(n) for n, s in (("targetAx", 1), ("targetAy", -1))),
             *(app.logged(n) for n in ("targetZ", "targetVz", "targetAz")),
+            *(0.0, 0.0, 0.0, app.logged("targetKnown")),  # no acceleration ahead
         ]
+        assert app.logged("targetKnown") == 1
         step: Any = reference.step([state], [aimed])
         assert step.status[0] == app.logged("status") == 0
         assert step.command_rad[0].tolist() == [app.logged("outRoll"), app.logged("outPitch")]

@@ -9,6 +9,7 @@ import pytest
 
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.thrust_controller import Applied
@@ -19,17 +20,17 @@ from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.bundles import write_target
 from tests.support.crazyflie import Built, Crazyflie, Fleet, build
 
-SETTINGS = with_option(presets.preset("crazyflie"), "target.acceleration", "given")
+SETTINGS = with_option(presets.preset("crazyflie"), "target.acceleration", "observed")
 LOGGED = (
     *("takeOvers", "x", "y", "vx", "vy", "inRoll", "inPitch", "inYaw", "targetX", "targetY", "targetVx"),
-    *("targetVy", "targetAx", "targetAy", "outRoll", "outPitch"),
+    *("targetVy", "targetAx", "targetAy", "outRoll", "outPitch", "targetKnown"),
 )
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """Return the target, compiled."""
-    return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+    """Return the app with an observer of the target, compiled."""
+    return build(write_target("crazyflie", SETTINGS, tmp_path_factory.mktemp("observed")))
 
 
 def filtered(app: Crazyflie, time_ms: int, delay_ms: int) -> None:
@@ -141,25 +142,25 @@ def test_a_jump_of_the_acceleration_is_no_jerk(app: Crazyflie) -> None:
 
 
 class Logging:
-    """A fleet of one app that keeps what it logs of every step."""
+    """A fleet of one app that keeps what it logs of every step; later its set-points have no acceleration."""
 
     def __init__(self, app: Crazyflie) -> None:
         self.fleet, self.app = Fleet([app], 3), app
         self.rows: list[list[float]] = []
 
-    def step(self, *inputs: np.ndarray) -> Applied:
+    def step(self, state: FloatArray, target: FloatArray, thrust_m_s2: FloatArray) -> Applied:
         """Make a step, and log it."""
+        aimed = target[:, :6] * [1.0, 1.0, 1.0, 1.0, *([float(len(self.rows) < 200)] * 2)]
         if len(self.rows) == 150:
             self.app.ticks += 10  # another controller flew
-        answer = self.fleet.step(*inputs)
+        answer = self.fleet.step(state, aimed, thrust_m_s2)
         self.rows.append([self.app.logged(name) for name in LOGGED])
         return answer
 
 
 def test_a_replay_of_the_app_s_log_is_equal_in_every_bit(built: Built, tmp_path: Path) -> None:
-    """Through a second take-over in the flight, with set-points that are carried on."""
-    app = built.app()
-    logging = Logging(app)
+    """Through a second take-over, with set-points that are carried on, at last without acceleration."""
+    logging = Logging(built.app())
     drone = Vehicle.of(vehicle_toml.load("crazyflie"))
     fly(Flight(Circle(1.0, 1.2), duration_s=3.0, flights=1, yaw_rad=0.8, vehicle=drone), logging)
     path = tmp_path / "flight.csv"
@@ -168,10 +169,42 @@ def test_a_replay_of_the_app_s_log_is_equal_in_every_bit(built: Built, tmp_path:
         writer.writerow(["Timestamp", *(f"nmpc.{name}" for name in LOGGED)])
         writer.writerows([[10 * k, *map(repr, row)] for k, row in enumerate(logging.rows)])
     replay = replay_log(path, {}, SETTINGS)
+    assert {row[-1] for row in logging.rows} == {0, 1}
     assert len(replay.time_s) == len(logging.rows) >= 300
     assert np.array_equal(replay.replayed_rad, replay.logged_rad)
     assert math.isfinite(replay.logged_rad.sum())
     assert np.ptp(replay.logged_rad, axis=0).min() > 0.1
+
+
+def test_the_acceleration_is_known_where_it_is_given_or_the_set_point_rests(built: Built) -> None:
+    """Else the controller observes it: the app's own estimate counts for nothing."""
+    app = built.app()
+    app.modes("modeAbs")
+    known = []
+    for speed, acceleration, updates in ((0.5, 0.2, 1), (0.5, 0.0, 49), (0.5, 0.0, 60), (0.0, 0.0, 1)):
+        app.aim(np.array([0.0, 0.0, speed, 0.0, acceleration, 0.0]))
+        for _ in range(updates):
+            app.update(np.zeros(7))
+        known.append((app.logged("targetKnown"), app.logged("targetVx") == 0.0))
+    assert known == [(1, False), (0, False), (1, True), (1, True)]
+
+
+def test_a_given_acceleration_does_not_jump_at_a_set_point(built: Built) -> None:
+    """At ten set-points a second it changes by little more than the circle's does."""
+    app, circle = built.app(), Circle(1.0, 1.5)
+    jumping = built.mutant("kink", "(a + (left * kink[k]))", "a")
+    largest = []
+    for one in (app, jumping):
+        one.modes("modeAbs")
+        found = []
+        for update in range(400):
+            if update % 10 == 0:
+                one.aim(np.concatenate([circle.target(0.01 * update), circle.acceleration(0.01 * update)]))
+            one.update(np.zeros(7))
+            found.append(one.logged("targetAx"))
+        largest.append(np.abs(np.diff(found[100:])).max())
+    assert largest[0] < 2.0 * 0.01 * 1.5**3
+    assert largest[1] > 2.0 * largest[0]
 
 
 @pytest.mark.parametrize("given", [True, False])

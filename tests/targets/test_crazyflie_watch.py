@@ -1,6 +1,7 @@
 """What fly.py watches in flight, the logs that it keeps, what the radio carries; and --simulate."""
 
 import math
+import re
 import shutil
 import tempfile
 from functools import partial
@@ -13,10 +14,11 @@ import pytest
 from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
-from tests.support.radio import LOG_BYTES, Drone, LogConfig
+from tests.support.radio import LOG_BYTES, Drone
 from tests.support.scripts import SETTINGS, at_call, modules_of, run, without
 
 LANDED, STOPPED = ["notify", "land", "stop", "close"], ["stop_setpoint", "notify", "stop", "close"]
+BYTES = {"LOG_UINT8": 1, "LOG_UINT16": 2, "LOG_UINT32": 4, "LOG_FLOAT": 4}
 TROUBLES: dict[str, tuple[dict[str, float], str, list[str]]] = {
     "position": ({"nmpc.lost": 1}, "The drone lands: no position is measured.\n", LANDED),
     "status": (
@@ -114,16 +116,18 @@ def test_a_figure_longer_than_a_battery_is_refused(
     assert not drone.calls
 
 
-@pytest.mark.parametrize("given", ["given", "tracked"])
-def test_log_blocks_fit_the_radio(given: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("acceleration", ["tracked", "observed"])
+def test_log_blocks_fit_the_radio(acceleration: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each a packet; at 2 and 1 Mbit/s every update is logged, at 250 kbit/s every second one."""
-    settings = with_option(height_settings(), "target.acceleration", given)
-    radio = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)["radio"]
+    settings = with_option(height_settings(), "target.acceleration", acceleration)
+    folder = write_target("crazyflie", settings, tmp_path)
+    radio = modules_of(folder, monkeypatch)["radio"]
+    text = (folder / "src" / "nmpc_app_log.c").read_text("utf-8")
+    kinds = {f"nmpc.{name}": kind for kind, name in re.findall(r"^LOG_ADD\((\w+), (\w+), ", text, re.M)}
     for names in radio.LOGGED:
-        block = LogConfig("block", 10)
-        for name in names:
-            block.add_variable(name)
-        assert sum(block.sizes) <= LOG_BYTES
+        assert sum(BYTES[kinds[name]] for name in names) <= LOG_BYTES
+    assert ("nmpc.targetKnown" in kinds) == (acceleration == "observed")
+    assert kinds.keys() >= {name for names in radio.LOGGED for name in names}
     count = len(radio.LOGGED)
     for rate, period_s in {"2M": 0.01, "1M": 0.01, "250K": 0.02}.items():
         uri = f"radio://0/80/{rate}/E7E7E7E7E7"

@@ -36,18 +36,17 @@ from tests.support.tools import require, require_module
 VERSIONS: Final = ("2", "3")
 STATUS, SATURATED = [100], [101]
 MEASURED = ("x", "y", "vx", "vy", "roll", "pitch", "yaw", "height", "climb", "grounded")
-AIMED = ("target_x", "target_y", "target_vx", "target_vy")
 COMMANDED = ("roll_command", "pitch_command")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "float64": with_option(presets.preset("mambo"), "code.scalar", "float64"),
-    "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
+    "observed": with_option(presets.preset("mambo"), "target.acceleration", "observed"),
     "1-norm": presets.preset("mambo-1norm"),
     "limits": with_option(presets.preset("mambo"), "limits.speed_m_s", 1.0),
-    "height": height_settings(acceleration="given"),
+    "height": height_settings(acceleration="observed"),
 }
-OTHERS = ("float64", "1-norm", "given", "limits", "height")
+OTHERS = ("float64", "1-norm", "observed", "limits", "height")
 """Subjects whose flights are left to the long tests."""
 
 
@@ -131,12 +130,10 @@ class Unit:
     ) -> Applied:
         """Set the inputs, make a step of an update period, and return the outputs."""
         places = dict(zip(MEASURED, state[0], strict=False))
-        given = ("target_ax", "target_ay") if "target_ax" in self.reference else ()
-        if thrust_acceleration_m_s2 is None:
-            heights = ("target_height", "target_climb", *(("target_az",) if given else ()))
-        else:
-            heights, places["thrust_acceleration"] = (), thrust_acceleration_m_s2[0]
-        self.write(**places, **dict(zip((*AIMED, *given, *heights), target[0], strict=False)))
+        if thrust_acceleration_m_s2 is not None:
+            places["thrust_acceleration"] = thrust_acceleration_m_s2[0]
+        aimed = [number.told[0] for number in method_of(self.settings).port.numbers("target")]
+        self.write(**places, **dict(zip(aimed, target[0], strict=False)))
         self.advance(self._period_s)
         status, command = np.array(self.get_status(STATUS)), np.array([self.read(*COMMANDED)])
         thrust = np.array(self.read("thrust_command")) if thrust_acceleration_m_s2 is None else None
@@ -266,7 +263,7 @@ def test_the_delivered_thrust_is_reported_once_in_a_communication_step(
     unit = Unit(unpacked("height", version), version, settings)
     alone, untold = CompiledController(settings), CompiledController(settings)
     period_s = settings.horizon.update_period_s
-    state, target = np.zeros((1, 10)), np.zeros((1, 9))
+    state, target = np.zeros((1, 10)), np.zeros((1, 13))
     assert unit.read("thrust_delivered") == [0.0]
     assert max(unit.reference.values()) == unit.reference["thrust_delivered"]
     unit.write(target_height=0.05)

@@ -50,8 +50,9 @@ SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "1-norm": presets.preset("mambo-1norm"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
-    "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
-    "height": height_settings(acceleration="given"),
+    "observed": with_option(presets.preset("mambo"), "target.acceleration", "observed"),
+    "height": height_settings(),
+    "observed height": height_settings(acceleration="observed"),
     "fixed height": height_settings("fixed"),
 }
 

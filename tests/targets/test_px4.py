@@ -238,16 +238,23 @@ def jump(desk: Px4Desk, kind: str, sign: float = 1.0) -> None:
         desk.set(f"px4.{name}", sign * value)
 
 
-@pytest.mark.parametrize(("kind", "within_ms"), [("position", 100), ("velocity", 12), ("heading", 100)])
-def test_a_jump_of_the_estimator_moves_target_and_controller(kind: str, within_ms: int, module: Path) -> None:
-    """An estimate that was wrong becomes right: the attitude does not jump with it; then the drone stops."""
+@pytest.mark.parametrize(
+    ("kind", "within_ms", "most_deg"), [("position", 100, 1.0), ("velocity", 12, 1.7), ("heading", 100, 1.0)]
+)
+def test_a_jump_of_the_estimator_moves_target_and_controller(
+    kind: str, within_ms: int, most_deg: float, module: Path
+) -> None:
+    """An estimate that was wrong becomes right: the attitude does not jump with it; then the drone stops.
+
+    A target whose velocity has jumped brakes: the controller follows its jerk from the first step on.
+    """
     for seed in SEEDS:
         desk = Px4Desk(module, seed, wind_m_s=(2.0, 1.0))
         jump(desk, kind, -1.0)
         desk.select(MPC, 3000)
         usual = bump_deg(desk, within_ms)
         jump(desk, kind)
-        assert bump_deg(desk, within_ms) < usual + 1.0
+        assert bump_deg(desk, within_ms) < usual + most_deg
         desk.run(4000)
         assert desk["mode"] == MPC
         assert np.abs(desk.state.velocity_m_s).max() < 0.05
@@ -338,13 +345,14 @@ def test_parameters_hold_each_by_itself(module: Path) -> None:
     desk.set("px4.X_MAX", 1.0)
     desk.set("px4.sticks", 1)
     desk.set("px4.pitch", 1.0)
-    fastest = 0.0
+    fastest = farthest = 0.0
     for _ in range(800):
         desk.run(10)
         fastest = max(fastest, float(desk.state.velocity_m_s[0]))
+        farthest = max(farthest, float(desk.state.position_m[0]))
     assert desk["s.bad_limits"] == 4.0
     assert fastest < 0.6
-    assert desk.state.position_m[0] < 1.0
+    assert farthest < 1.001
     assert int(desk["s.limits"]) & 4
 
 
@@ -401,17 +409,17 @@ def test_no_thrust_is_cut_in_the_air_however_strong_the_drone(hover: float, modu
         contacts += desk["contact"]
         assert desk["throttle"] > 0.25 * hover
         assert (desk["s.grounded"], desk["s.level"]) == (0.0, 0.0)
-    assert (contacts > 0.0) == (hover < 0.15)
+    assert (contacts > 0.0) == (hover < 0.2)
     desk.set("px4.throttle", -0.7)
     desk.run(20000)
     assert (desk["landed"], desk["throttle"], desk["mode"]) == (1.0, 0.0, MPC)
 
 
 @pytest.mark.usefixtures("in_an_empty_folder")
-def test_a_log_of_the_mode_is_repeated_bit_for_bit(module: Path) -> None:
-    """With two take-overs, sticks, jumps of the estimator and a landing."""
+def test_a_log_of_the_mode_is_repeated_bit_for_bit() -> None:
+    """With two take-overs, sticks, jumps of the estimator, set-points and a landing."""
     settings = px4_settings()
-    desk = Px4Desk(module, wind_m_s=(2.0, -1.0)).select(MPC, 0)
+    desk = Px4Desk(build_px4(settings), wind_m_s=(2.0, -1.0)).select(MPC, 0)
     rows: list[dict[str, float]] = []
 
     def fly(milliseconds: int) -> None:
@@ -430,6 +438,16 @@ def test_a_log_of_the_mode_is_repeated_bit_for_bit(module: Path) -> None:
         fly(300)
     desk.select(POSITION, 300).select(MPC, 0)
     desk.set("px4.pitch", 0.0)
+    fly(1500)
+    desk.set("px4.trajectory", 1)
+    for acceleration_m_s2 in (0.5, math.nan):
+        for k in range(100):
+            motion = np.zeros((3, 3))
+            motion[:, 0] = desk.state.position_m[0] + 0.005 * k, 0.5, acceleration_m_s2
+            motion[0, 1:] = desk.state.position_m[1:]
+            desk.full_state(motion)
+            fly(10)
+    desk.set("px4.trajectory", 0)
     fly(1500)
     desk.set("px4.throttle", -0.6)
     fly(4000)

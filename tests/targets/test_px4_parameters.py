@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 Change = tuple[int, str, float]
 """A row, a parameter without MC_NMPC_, and its value from then on."""
-TIGHT: Final = {"TILT": 0.2, "SPEED": 1.0, "X_MAX": 1.5}
+TIGHT: Final = {"TILT": 0.2, "SPEED": 1.0, "X_MAX": 0.8}
 CHANGES: Final = ((150, "SPEED", 0.4), (400, "TILT", 0.1), (401, "Z_MIN", 5000.0), (550, "SPEED", 0.0))
 """The third one is refused, and with the last one the settings say the speed."""
 LACKS: Final = "flight.ulg: has no parameters MC_NMPC_*: replayed with the limits of the settings"

@@ -238,7 +238,7 @@ def test_the_acceleration_is_found_kept_over_a_jump_and_bounded() -> None:
     assert np.array_equal(kept, found)
     assert list(self.tracker.jerk_m_step2_update) == [0.0, 0.0]
     for step in range(200):
-        fast = 0.999 * constants.input_limit * (abs(step % 60 - 30) - 15)
+        fast = 0.999 * constants.change_limit_m_s * (abs(step % 60 - 30) - 15)
         lib.tracker_update(self, [fast, -fast])
         assert max(map(abs, self.tracker.acceleration_m_step2)) <= constants.acceleration_bound_m_step2
 
@@ -311,9 +311,10 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
     rng = np.random.default_rng(index)
     kind = used.scalar
     tilt = kind(settings.limits.tilt_rad)
-    bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
-
-    target = np.append(bounds[:4], [ranges.thrust_acceleration_max_m_s2] * 2)
+    largest = {"position": ranges.position_m, "velocity": ranges.velocity_m_s, "angle": 3.25, "yaw": 1024.0}
+    largest |= {"thrust": ranges.thrust_acceleration_max_m_s2, "whole": 2.0}
+    method = method_of(settings)
+    state, target = (np.array([largest[one] for one in names]) for names in (method.state, method.target))
 
     def numbers(limits: Array) -> Array:
         shape = (n, len(limits))
@@ -327,6 +328,24 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
     for step in range(steps):
         if step % 40 == 39:
             used.set_command(rng.uniform(-3.25, 3.25, (n, 2)))
-        outcome = used.step(numbers(bounds), numbers(target), np.full(n, 9.81))
+        outcome = used.step(numbers(state), numbers(target), np.full(n, 9.81))
         assert np.all(np.abs(outcome.command_rad) <= tilt)
         assert np.all(np.isfinite(outcome.stored))
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+def test_a_number_in_the_place_of_an_integer_is_that_integer_or_none(scalar: str) -> None:
+    """A target knows 0, 1 or 2, anything else is refused; a drone touches the floor unless it is 0."""
+    settings = height_settings(scalar, "observed")
+    method, library = method_of(settings), build_library(settings, toolchain("gcc"))
+    values = [0.0, -0.0, 1.0, 2.0, 0.5, 1.5, 3.0, -1.0, 100.0, 1e9, np.nan, np.inf]
+    target, state = np.zeros((len(values), 13)), np.zeros((len(values), 10))
+    target[:, 12] = values
+    for controller in (CompiledController(settings, len(values), library), method.reference_controller(12)):
+        status = controller.step(state, target).status
+        assert status.tolist() == [Status.OK] * 4 + [Status.BAD_TARGET] * 8
+    state[:, 9], target[:, 12], target[:, 6] = values, 0.0, 0.5
+    for controller in (CompiledController(settings, len(values), library), method.reference_controller(12)):
+        outcome: Any = [controller.step(state, target) for _ in range(3)][-1]
+        assert (outcome.stored[2:] == outcome.stored[2]).all()
+        assert (outcome.stored[:2] != outcome.stored[2]).any(axis=1).all()

@@ -16,6 +16,7 @@ from mambo_sil.verify.calls import NULL_SELF, ApiFunction, Outcomes, Tape, answe
 from mambo_sil.verify.cases import random_tapes
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.step_inputs import StepRows
+from mambo_sil.verify.target_cases import observed_motion
 from tests.support import proven
 from tests.support.alarms import Alarm, Fault, harmed
 from tests.support.height import height_case
@@ -24,7 +25,8 @@ from tests.support.subjects import Harm, played_fault, subject
 from tests.support.tools import require
 
 CORNERS = {
-    name: height_case(index, "float32") for name, index in (("height", 1), ("thrust vector", 6), ("guard", 5))
+    name: height_case(index, "float32")
+    for name, index in (("height", 1), ("thrust vector", 6), ("guard", 5), ("observed", 8))
 }
 """Of `tests.support.height`; the samples leave out the guard, which the thrust vector has too."""
 LEARNING = {
@@ -73,6 +75,22 @@ FAULTS = {
         ),
         "what is not believed is not forgotten": Harm(
             "nmpc.c", r"square = doubt \* doubt", "square = doubt - doubt"
+        ),
+    },
+    "observed": {
+        "a wild set-point is believed": Harm("nmpc.c", r"if \(within\(innovation, trust\) == 0\)", "if (0)"),
+        "a jump is never believed": Harm("nmpc.c", r"judged = -1;", "judged = 0;"),
+        "noise lengthens no memory": Harm("nmpc.c", r"NMPC_MEMORY_PER_NOISE \* motion->noise", "0"),
+        "a memory does not fall": Harm("nmpc.c", r"\(shorter > wanted\) \? shorter : wanted", "longer"),
+        "what is ahead is not read": Harm(
+            "nmpc.c", r"motion_change\(point->ahead_m_s2, limits\) - motion->acceleration", "0"
+        ),
+        "a turn turns no acceleration": Harm("nmpc.c", r"    turn_components\(&x->acceleration[^;]*;\n", ""),
+        "the next velocity after a turn is fitted": Harm(
+            "nmpc.c", r"has_turned = motion->missed > \(nmpc_real_t\)1", "has_turned = 0"
+        ),
+        "another kind begins with the noise of the last": Harm(
+            "nmpc.c", r"motion->noise = \(known > 0\)[^;]*;", ""
         ),
     },
     "thrust vector": {
@@ -155,12 +173,15 @@ def unmoved(settings: Settings) -> Tape:
 
 @lru_cache(maxsize=1)
 def played(settings: Settings) -> tuple[Sequence[Tape], Sequence[Outcomes]]:
-    """Return few random tapes, one more for the faults of a learnt gain, and what the reference answers."""
+    """Return few random tapes, more for a learnt gain or an observed target, and the answers."""
     nothing = np.zeros((1, 1))
     tapes = [*random_tapes(settings, 60), calls(settings, ApiFunction.STEP, nothing, NULL_SELF)]
     expected = answers(settings, tapes)
-    if settings == CORNERS["learnt gain"]:
-        long = [unmoved(settings)]
+    more = {"learnt gain": lambda its: [unmoved(its)], "observed": observed_motion}
+    for name, made in more.items():
+        if settings != CORNERS[name]:
+            continue
+        long = [*made(settings)]
         tapes, expected = tapes + long, expected + answers(settings, long)
     return tapes, expected
 

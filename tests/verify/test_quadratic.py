@@ -113,11 +113,11 @@ class Options(NamedTuple):
 
 
 OTHERS = [
-    Options("float32", 0.0, "measured", "given"),
+    Options("float32", 0.0, "measured", "observed"),
     Options("float64", 0.0, "predicted", "none"),
     Options("float64", 0.0, "measured", "tracked"),
     Options("float64", 0.4, "measured", "none"),
-    Options("float32", 0.4, "predicted", "given"),
+    Options("float32", 0.4, "predicted", "observed"),
 ]
 
 

@@ -89,3 +89,17 @@ def test_an_absurd_mass_changes_nothing(written: float | str, app: Path) -> None
     trace = fly_events(app, flown)
     assert broken(measure(trace, flown), flown) == []
     assert "mass refused: it is in kg" in trace.console
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in events_file.EVENTS.names() if name not in (*FLOW, *HEADING, "noise-4-mm")]
+)
+def test_an_observed_target_keeps_the_bounds(name: str, observing_app: Path) -> None:
+    """With the exact tilt of `design crazyflie --acceleration observed`, packets in disorder too."""
+    assert breaks(observing_app, name) == []
+
+
+def test_an_observed_target_of_much_noise_loses_little_height(observing_app: Path) -> None:
+    """4 mm in each position from which the velocities come: 2 mm more than the bound; it stays nearer."""
+    lost = breaks(observing_app, "noise-4-mm")
+    assert all(one.startswith("lowest_m = 0.89") for one in lost)

@@ -87,9 +87,9 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
     ("board", "scalar", "acceleration"),
     [
         ("host", "float32", "tracked"),
-        pytest.param("host", "float64", "given", marks=pytest.mark.long),
-        pytest.param("host", "fixed", "given", marks=pytest.mark.long),
-        pytest.param("crazyflie", "float32", "given", marks=pytest.mark.long),
+        pytest.param("host", "float64", "observed", marks=pytest.mark.long),
+        pytest.param("host", "fixed", "observed", marks=pytest.mark.long),
+        pytest.param("crazyflie", "float32", "observed", marks=pytest.mark.long),
         pytest.param("mega", "fixed", "tracked", marks=pytest.mark.long),
     ],
 )
@@ -107,7 +107,7 @@ def test_a_height_flies_bit_for_bit(board: str, scalar: str, acceleration: str, 
 @pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
 def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path: Path) -> None:
     """It changes the next step, on the board as on the desk; without one the command stands."""
-    settings = height_settings(scalar, "given")
+    settings = height_settings(scalar, "observed")
     replies = []
     for reported in (False, True):
         draw = np.random.default_rng(3)
@@ -117,8 +117,8 @@ def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path
         ):
             controller = BoardController(settings, board)
             for step in range(20):
-                state, target = draw.normal(0.0, 0.3, (1, 10)), draw.normal(0.0, 0.3, (1, 9))
-                state[0, 9] = step % 2
+                state, target = draw.normal(0.0, 0.3, (1, 10)), draw.normal(0.0, 0.3, (1, 13))
+                state[0, 9], target[0, 12] = step % 2, step % 3
                 if reported and step == 10:
                     controller.set_thrust([4.0])
                 controller.step(state, target)

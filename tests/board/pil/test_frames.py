@@ -68,7 +68,7 @@ def test_endless_noise_is_not_kept() -> None:
 
 def test_a_payload_that_is_too_long_is_a_mistake() -> None:
     """The buffers on the board are not longer."""
-    with pytest.raises(ValueError, match="at most 192 bytes, not 193"):
+    with pytest.raises(ValueError, match=f"at most {LONGEST_PAYLOAD} bytes, not {LONGEST_PAYLOAD + 1}"):
         encode(bytes(LONGEST_PAYLOAD + 1))
 
 

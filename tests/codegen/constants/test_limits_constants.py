@@ -192,7 +192,7 @@ def desired_m_s(settings: Settings, distance_m: Any) -> tuple[Any, Any]:
     return velocity[:, 0], active
 
 
-@pytest.mark.parametrize("acceleration", ["tracked", "given", "none"])
+@pytest.mark.parametrize("acceleration", ["tracked", "observed", "none"])
 def test_braking_begins_and_ends_where_its_curve_touches_the_line(acceleration: str) -> None:
     """The line v = k d touches v^2 = 2 A (d - d_0) at the knee; fed forward it ends nearer."""
     braking_m_s2 = 1.3
@@ -227,8 +227,8 @@ def test_braking_begins_and_ends_where_its_curve_touches_the_line(acceleration: 
 
 
 def test_the_rate_of_updates_makes_changes_of_the_desired_velocity_accelerations() -> None:
-    """What stands for a given acceleration is a difference of desired velocities over the update period."""
-    settings = limited({"target.acceleration": "given", "horizon.update_period_s": 0.02})
+    """What stands for a known acceleration is a difference of desired velocities over the update period."""
+    settings = limited({"target.acceleration": "observed", "horizon.update_period_s": 0.02})
     method = method_of(settings)
     law, memory = LimitsLaw(method, constants_of(settings)), controller(settings).memory.limits
     far, nearer = np.array([[50.0, 0, 0, 0, 0, 0]]), np.array([[0.9, 0, 0, 0, 0, 0]])

@@ -40,20 +40,22 @@ def statuses(settings: Settings, state: Any, target: Any, thrust_m_s2: Any) -> l
 
 
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-@pytest.mark.parametrize("acceleration", ["none", "given"])
+@pytest.mark.parametrize("acceleration", ["none", "observed"])
 @pytest.mark.parametrize("height", [False, True])
 def test_each_number_is_taken_up_to_its_range(scalar: str, acceleration: str, height: bool) -> None:
     """Either way to 1 in a thousand; the first number out of range names the status."""
     settings = settings_with(scalar, acceleration, height=height)
-    given = acceleration == "given"
+    observed = acceleration == "observed"
     state = [REACH_M] * 2 + [FAST_M_S] * 2 + [STEEP_RAD] * 2 + [TURN_RAD]
     state += [REACH_M, FAST_M_S] * height
-    target = [REACH_M] * 2 + [FAST_M_S] * 2 + [STRONG_M_S2] * 2 * given
-    target += [REACH_M, FAST_M_S] * height + [STRONG_M_S2] * (height and given)
+    target = [REACH_M] * 2 + [FAST_M_S] * 2 + [STRONG_M_S2] * 2 * observed
+    target += [REACH_M, FAST_M_S] * height + [STRONG_M_S2] * (height and observed)
+    target += [STRONG_M_S2] * (2 + height) * observed
     rows = len(state) + len(target)
     largest = np.concatenate([np.diag(state + target), -np.diag(state + target)])
     for factor, bad in ((0.999, False), (1.001, True)):
         states, targets = np.split(factor * largest, [len(state)], axis=1)
+        targets = np.column_stack([targets, *[np.zeros(len(states))] * observed])
         if height:
             states = np.column_stack([states, np.zeros(len(states))])
         expected = [Status.BAD_STATE if bad else Status.OK] * len(state)
@@ -106,15 +108,14 @@ LIMITED = {"limits.speed_m_s": 1.5, "limits.fence.x_min_m": -1.0, "limits.fence.
 ONE_NORM = with_option(presets.preset("mambo-1norm"), "limits.speed_m_s", 1.5)
 CASES = {
     "feedback, tracked": with_option(EVERYTHING, "limits.speed_m_s", 5.0),
-    "given": settings_of(TWO_MOVES | LIMITED | {"target.acceleration": "given"}),
+    "observed": settings_of(TWO_MOVES | LIMITED | {"target.acceleration": "observed"}),
     "limits": settings_of(TWO_MOVES | LIMITED),
     "height, tracked": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "tracked"}),
-    "height, given": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "given"}),
+    "height, observed": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "observed"}),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
     "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
     "height, guard": settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "guard.tilt_rad_s": 1.0}),
     "1-norm": ONE_NORM,
-    "1-norm, given": with_option(ONE_NORM, "target.acceleration", "given"),
     "1-norm, no tracker": with_option(ONE_NORM, "target.acceleration", "none"),
 }
 
@@ -128,9 +129,11 @@ def stored(settings: Settings, scalar: str) -> Any:
         time_s, rattle_m_s = 0.01 * step, 0.01 * (step % 2)
         state = [0.4 + 0.3 * time_s, -0.2, 0.3, -0.4, 0.05, -0.03 + 0.1 * time_s, 0.7]
         target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
-        target += [0.3, -0.2] * settings.target.gives_acceleration
+        target += [0.3, -0.2] * settings.target.is_observed
         target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
         target += [0.1] * (len(method.target) - len(target))
+        if settings.target.is_observed:
+            target[-1] = 2.0
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)
         given = () if heights else ([9.9],)
         outcome = controller.step([state], [target], *given)

@@ -8,7 +8,12 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import linprog
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.methods.shared.tracker_constants import JERK_SHARE, JUMP_MARGIN, TrackerConstants
+from mambo_codegen.methods.shared.tracker_constants import (
+    JERK_SHARE,
+    JUMP_MARGIN,
+    TrackerConstants,
+    target_limit_m_s2,
+)
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -33,35 +38,11 @@ def tracker_of(settings: Settings, *, climb: bool = False) -> TrackerConstants:
     return found
 
 
-@pytest.mark.parametrize(
-    ("changed", "doubted"),
-    [
-        ({}, True),
-        ({"target.tracker_gain": 1.0}, True),
-        ({"target.acceleration": "given"}, True),
-        ({"target.acceleration": "given", "target.tracker_gain": 1.0}, False),
-        ({"guard": None}, False),
-    ],
-)
-def test_what_is_given_as_it_comes_is_not_doubted(changed: dict[str, Any], doubted: bool) -> None:
-    """All else is, with a guard."""
-    settings = presets.preset("crazyflie")
-    settings = with_option(
-        with_option(settings, "target.acceleration", "tracked"), "target.tracker_gain", 0.5
-    )
-    for name, value in changed.items():
-        if name == "guard":
-            settings = settings.model_copy(update={"guard": None})
-        else:
-            settings = with_option(settings, name, value)
-    assert (tracker_of(settings).noise is not None) == doubted
-
-
-def given(settings: Settings, **changed: float) -> Settings:
-    """Return settings whose targets have their acceleration, and a range of thrusts."""
-    for name, value in changed.items():
-        settings = with_option(settings, f"ranges.{name}", value)
-    return with_option(settings, "target.acceleration", "given")
+def test_what_is_new_of_a_target_is_doubted_with_a_guard() -> None:
+    """Without one it is believed as it comes, whatever the gain."""
+    settings = with_option(presets.preset("crazyflie"), "target.tracker_gain", 1.0)
+    assert tracker_of(settings).noise is not None
+    assert tracker_of(settings.model_copy(update={"guard": None})).noise is None
 
 
 @pytest.mark.parametrize("settings", [QUADRATIC, ONE_NORM], ids=["quadratic", "1-norm"])
@@ -72,9 +53,7 @@ def test_the_factor_makes_what_is_read_an_acceleration_per_step(settings: Settin
     places_m = 0.5 * acceleration_m_s2 * (step_s * np.arange(3)) ** 2
     (difference_m,) = np.diff(places_m, n=2)
     change_m_s = acceleration_m_s2 * update_s
-    assert tracker_of(settings).factor * change_m_s == pytest.approx(difference_m, rel=1e-12)
-    assert tracker_of(given(settings)).factor * acceleration_m_s2 == pytest.approx(difference_m, rel=1e-12)
-    assert (tracker_of(settings).is_given, tracker_of(given(settings)).is_given) == (False, True)
+    assert tracker_of(settings).factor_s * change_m_s == pytest.approx(difference_m, rel=1e-12)
 
 
 def largest_m_s2(settings: Settings, *, climb: bool) -> float:
@@ -94,25 +73,28 @@ def test_a_target_that_a_drone_cannot_follow_has_jumped(settings: Settings, clim
     """From 1.5 times what the drone can: of the height the larger of what it can upwards and downwards."""
     most_m_s2, update_s = 1.5 * largest_m_s2(settings, climb=climb), settings.horizon.update_period_s
     assert JUMP_MARGIN == 1.5
-    read, told = tracker_of(settings, climb=climb), tracker_of(given(settings), climb=climb)
-    assert read.input_limit == pytest.approx(most_m_s2 * update_s, rel=1e-12)
-    assert told.input_limit == pytest.approx(most_m_s2, rel=1e-12)
-    step2_s2 = method_of(settings).step_s ** 2
-    for one in (read, told):
-        assert one.acceleration_limit_m_step2 == pytest.approx(step2_s2 * most_m_s2, rel=1e-12)
-        beyond = 1 - one.input_limit / one.tested_input
-        assert beyond == pytest.approx(1 / 5), "of inputs drawn evenly"
+    found, step_s = tracker_of(settings, climb=climb), method_of(settings).step_s
+    assert found.change_limit_m_s == pytest.approx(most_m_s2 * update_s, rel=1e-12)
+    assert found.acceleration_limit_m_step2 == pytest.approx(step_s**2 * most_m_s2, rel=1e-12)
+    beyond = 1 - found.change_limit_m_s / found.tested_change_m_s
+    assert beyond == pytest.approx(1 / 5), "of inputs drawn evenly"
     assert method_of(QUADRATIC).climb_tracker is None, "without a height"
-    assert (read.input_quantity, told.input_quantity) == ("velocity", "thrust")
 
 
 def test_no_input_within_its_range_is_beyond_the_limit_of_a_jump() -> None:
     """The largest change of a velocity leads from one end of its range to the other."""
     slow = with_option(with_option(QUADRATIC, "ranges.velocity_m_s", 0.1), "horizon.update_period_s", 0.1)
     ends_m_s = 0.1 * np.array([-1, 1])
-    assert tracker_of(slow).input_limit == pytest.approx(np.max(np.diff(ends_m_s)), rel=1e-12)
-    weak = given(QUADRATIC, thrust_acceleration_max_m_s2=6.0, thrust_acceleration_min_m_s2=1.0)
-    assert tracker_of(weak).input_limit == 6.0
+    assert tracker_of(slow).change_limit_m_s == pytest.approx(np.max(np.diff(ends_m_s)), rel=1e-12)
+
+
+def test_the_limit_of_a_target_within_limits_is_what_the_drone_follows_or_the_range() -> None:
+    """1.5 times what the tilt limit gives; or the largest thrust over mass that is accepted."""
+    assert target_limit_m_s2(QUADRATIC) == pytest.approx(
+        1.5 * largest_m_s2(QUADRATIC, climb=False), rel=1e-12
+    )
+    weak = with_option(QUADRATIC, "ranges.thrust_acceleration_min_m_s2", 1.0)
+    assert target_limit_m_s2(with_option(weak, "ranges.thrust_acceleration_max_m_s2", 6.0)) == 6.0
 
 
 @pytest.mark.parametrize("gain", [0.1, 0.3, 0.8])

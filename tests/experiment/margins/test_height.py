@@ -16,6 +16,7 @@ from mambo_sil.errors import FlightError
 from mambo_sil.experiment.margins.controller_jacobian import linear_controller
 from mambo_sil.experiment.margins.corners import intervals, uncertain
 from mambo_sil.experiment.margins.loop_margins import open_loop, sensitivity
+from mambo_sil.flight.columns import SPACE
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.thrust_controller import ThrustController, numbers_of
 from tests.support.command import run
@@ -105,7 +106,7 @@ def test_linear_controller_commands_what_the_c_commands() -> None:
     """In 100 steps of small random states commands differ from those at rest as the linear system says."""
     settings = height_settings("float64")
     system, controller = linear_controller(settings), ThrustController(CompiledController(settings, 2))
-    memory, target, reported = np.zeros(len(system.a)), np.zeros((2, 9)), np.full(2, np.nan)
+    memory, target, reported = np.zeros(len(system.a)), np.zeros((2, SPACE.target)), np.full(2, np.nan)
     states = 1e-6 * np.random.default_rng(5).standard_normal((100, 10))
     states[:, [6, 9]] = 0.0
     controller.step(np.zeros((2, 10)), target, reported)

@@ -256,21 +256,20 @@ def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
     assert wants_exact(known) is found
     mambo = vehicle_toml.preset("mambo")
     flowing = changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n})
-    assert wants_exact(known, "given")
-    assert not wants_exact(strong(ratio), "given")
-    assert not wants_exact(flowing, "given")
+    assert wants_exact(known, "observed")
+    assert not wants_exact(strong(ratio), "observed")
+    assert not wants_exact(flowing, "observed")
     assert not wants_exact(strong(ratio))
     assert not wants_exact(flowing)
 
 
 def test_a_target_that_says_more_has_more_of_the_possible_tilt() -> None:
-    """0.7 of it with the exact tilt, and half with small angles; what is given is not smoothed."""
+    """0.7 of it with the exact tilt, and half with small angles."""
     drone = strong(1.6, thrust={"lag_s": 0.05})
-    exact, small = (settings_for(drone, exact=exact, acceleration="given") for exact in (True, False))
-    assert exact.target.acceleration == small.target.acceleration == "given"
+    exact, small = (settings_for(drone, exact=exact, acceleration="observed") for exact in (True, False))
+    assert exact.target.acceleration == small.target.acceleration == "observed"
     assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 1.6), rel=ROUNDED)
     assert small.limits.tilt_rad == pytest.approx(0.5 * math.acos(1.0 / 1.6), rel=ROUNDED)
-    assert exact.target.tracker_gain == 1.0
 
 
 @pytest.mark.parametrize("ratio", [2.6, 4.0, 10.0])

@@ -88,7 +88,7 @@ def test_a_push_is_borne_nearly_as_far_as_the_tilt_limit_holds(
 ) -> None:
     """Flown here once more: what is borne is held within 2 cm, with a smaller limit it is not."""
     drone = vehicle_toml.preset(name)
-    settings = settings_for(drone, exact=exact, acceleration="given" if exact else "tracked")
+    settings = settings_for(drone, exact=exact, acceleration="observed" if exact else "tracked")
     found = fly_pushed(settings, drone)
     assert found.good
     assert found.words == f"bears a steady push of {borne_m_s2:g} m/s^2 from every side"
@@ -167,7 +167,9 @@ def test_a_drone_with_less_thrust_keeps_small_angles(name: str) -> None:
 @pytest.mark.parametrize(("name", "tilt_rad"), [("crazyflie", 0.638), ("x500", 0.733)])
 def test_a_drone_whose_target_says_its_acceleration_flies_with_more_tilt(name: str, tilt_rad: float) -> None:
     """It survives the quick circle of that tilt."""
-    chosen = controller_toml.parse(chosen_text(vehicle_toml.preset(name), name, acceleration="given"), name)
+    chosen = controller_toml.parse(
+        chosen_text(vehicle_toml.preset(name), name, acceleration="observed"), name
+    )
     assert (chosen.model.tilt, chosen.limits.tilt_rad) == ("exact", tilt_rad)
 
 

@@ -24,14 +24,18 @@ TRIMMED = {
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("name", "attitude", "acceleration"),
-    [("generic", TRIMMED, "tracked"), ("crazyflie", {}, "tracked"), ("crazyflie", {}, "given")],
+    [
+        ("generic", TRIMMED, "tracked"),
+        ("crazyflie", {}, "tracked"),
+        ("crazyflie", {}, "observed"),
+    ],
 )
 def test_a_far_target_is_flown_to_with_it(
     name: str, attitude: dict[str, object], acceleration: TargetAcceleration
 ) -> None:
     """By the weaker of roll and pitch, forward, back, left and right; without drag, below the speed limit."""
     drone = changed(vehicle_toml.preset(name), attitude=attitude, body={"drag_1_s": 0.0})
-    settings = settings_for(drone, exact=acceleration == "given", acceleration=acceleration)
+    settings = settings_for(drone, exact=acceleration != "tracked", acceleration=acceleration)
     scenarios = [
         Scenario(
             vehicle=drone,

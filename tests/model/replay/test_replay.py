@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_sil.flight import loop
 from mambo_sil.flight.trajectories import Bernoulli
 from mambo_sil.model.identify.signals import TARGET, TARGET_ACCELERATION
 from tests.support.command import run
@@ -147,11 +148,12 @@ def trace_columns() -> dict[str, NDArray[np.float64]]:
 
 
 @pytest.mark.parametrize(
-    ("source", "target"), [("mambo", TARGET), ("given.toml", (*TARGET, *TARGET_ACCELERATION))]
+    ("source", "target"), [("mambo", TARGET), ("observed.toml", (*TARGET, *TARGET_ACCELERATION))]
 )
-def test_a_ulog_is_replayed(source: str, target: tuple[str, ...]) -> None:
-    """Single precision and a quaternion cost the last digits; an acceleration is read if it is given."""
-    write_given()
+def test_a_ulog_is_replayed(source: str, target: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quaternion costs the last digits; a target's acceleration is known if the log has it."""
+    write_observed()
+    monkeypatch.setattr(loop, "MOST_KNOWN", 1)
     run(*FLOWN, source, "--push", "0.3,0.2")
     Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
     summary = replayed("flight.ulg", source)
@@ -159,18 +161,61 @@ def test_a_ulog_is_replayed(source: str, target: tuple[str, ...]) -> None:
     assert max(summary["rms"]) < 1e-6
 
 
-def test_a_given_acceleration_is_read_from_a_table() -> None:
-    """In the columns that no trace has; without them the log is refused."""
-    write_given()
-    run(*FLOWN, "given.toml")
+def write_columns(names: Sequence[str], path: str) -> None:
+    """Write these columns of the last flight."""
     columns = trace_columns()
-    rows = np.stack(list(columns.values()), axis=1).tolist()
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    Path("flight.csv").write_text("\n".join(lines), "utf-8")
-    summary = replayed("flight.csv", "given.toml")
+    rows = np.stack([columns[name] for name in names], axis=1).tolist()
+    Path(path).write_text("\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]), "utf-8")
+
+
+def test_what_a_target_knows_is_read_from_a_trace() -> None:
+    """Bit for bit; a log without the accelerations is one of targets that know less, and other commands."""
+    write_observed()
+    run(*FLOWN, "observed.toml")
+    summary = replayed("flight/trace.csv", "observed.toml")
     assert summary["equal_steps"] == summary["steps"] == 401
-    message = "has no column for target_ax_m_s2 (target_ax_m_s2, nmpc.targetAx, ctrltarget.ax); name it"
-    assert message in run("replay", "flight/trace.csv", "given.toml", code=2)[1]
+    names = list(trace_rows()[0])
+    told = [name for name in names if name.startswith("target_a") or name == "target_known"]
+    assert len(told) == 5
+    for left_out in (("target_known",), (*told[2:],), (*told,)):
+        write_columns([name for name in names if name not in left_out], "flight.csv")
+        summary = replayed("flight.csv", "observed.toml", code=0 if left_out == ("target_known",) else 1)
+        assert (summary["equal_steps"] == 401) == (left_out == ("target_known",))
+        assert max(summary["rms"]) < 0.05
+
+
+@pytest.mark.parametrize("known", ["3", "1.5", "-1"])
+def test_what_a_target_cannot_know_is_refused(known: str) -> None:
+    """With its value."""
+    write_observed()
+    run(*FLOWN, "observed.toml")
+    names = [*trace_rows()[0]]
+    write_columns(names, "flight.csv")
+    text = Path("flight.csv").read_text("utf-8").splitlines()
+    row, column = text[40].split(","), names.index("target_known")
+    text[40] = ",".join([*row[:column], known, *row[column + 1 :]])
+    Path("flight.csv").write_text("\n".join(text), "utf-8")
+    assert (
+        f"target_known = {known} must be 0, 1 or 2" in run("replay", "flight.csv", "observed.toml", code=2)[1]
+    )
+
+
+@pytest.mark.parametrize(
+    ("left_out", "words"),
+    [
+        (("target_ahead_x_m_s2",), "no column target_ahead_x_m_s2: targets count as `known` 1"),
+        (
+            (*TARGET_ACCELERATION, "target_known"),
+            "no column target_ax_m_s2, target_ay_m_s2: targets count as `known` 0",
+        ),
+    ],
+)
+def test_columns_that_a_log_lacks_are_named(left_out: tuple[str, ...], words: str) -> None:
+    """Beside those that it has: the targets then knew more than the replay."""
+    write_observed()
+    run(*FLOWN, "observed.toml")
+    write_columns([name for name in trace_rows()[0] if name not in left_out], "flight.csv")
+    assert words in " ".join(run("replay", "flight.csv", "observed.toml", code=1)[0].split())
 
 
 def test_a_ulog_without_the_target_is_refused() -> None:
@@ -184,11 +229,11 @@ def test_a_ulog_without_the_target_is_refused() -> None:
     assert "a ULog needs none" in run("replay", "flight.ulg", "--columns", "x_m=x", code=2)[1]
 
 
-def write_given() -> None:
-    """Write preset mambo with the target's acceleration given to given.toml."""
-    run("init", "-o", "given.toml")
-    text = Path("given.toml").read_text("utf-8")
-    Path("given.toml").write_text(text.replace('= "tracked"', '= "given"'), "utf-8")
+def write_observed() -> None:
+    """Write preset mambo with an observed target to observed.toml."""
+    run("init", "-o", "observed.toml")
+    text = Path("observed.toml").read_text("utf-8")
+    Path("observed.toml").write_text(text.replace('= "tracked"', '= "observed"'), "utf-8")
 
 
 def test_a_log_of_another_rate_is_interpolated() -> None:

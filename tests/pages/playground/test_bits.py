@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.port.taken import AHEAD_S
 from mambo_sil.drone.plant import elementary
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw
+from mambo_sil.flight.columns import LEVEL
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import Swing
 from mambo_sil.flight.loop import Flight
@@ -169,14 +171,24 @@ def test_a_curve_is_hastened_from_where_the_target_is(page: Page) -> None:
 
 
 def test_the_curves_are_those_of_the_simulation(page: Page) -> None:
-    """Eight, circle and swing have the bits of the simulation's, velocity and acceleration included."""
+    """Eight, circle and swing have the bits of the simulation's: velocity, acceleration, the one ahead."""
     times = [0.0, 0.01, 1.0, 3.14, 12.5, 1000.01]
+    later = [time_s + AHEAD_S for time_s in times]
+
+    def swing(size_m: float) -> Any:
+        heights = Swing(size_m, 1.5)
+        return np.concatenate([heights.vertical(times), heights.vertical(later)[:, 2:]], axis=-1)
+
     for kind, curve in (("eight", Bernoulli(2.0, 0.5)), ("circle", Circle(1.2, 0.8))):
         page.find(f'page.world.target.kind = "{kind}"')
         found = page.find(f"{times}.map((time) => [...page.world.target.at(time)])")
-        swing = Swing(0.0, 1.5).vertical(times)
-        expected = np.concatenate([curve.target(times), curve.acceleration(times), swing], axis=-1)
-        assert found == expected.tolist()
+        level = [
+            curve.target(times),
+            curve.acceleration(times),
+            curve.acceleration(later),
+            np.full((6, 1), 2),
+        ]
+        assert found == np.concatenate([*level, swing(0.0)], axis=-1).tolist()
     page.find("page.world.target.swing = 0.3")
-    heights = page.find(f"{times}.map((time) => [...page.world.target.at(time).slice(6)])")
-    assert heights == Swing(0.3, 1.5).vertical(times).tolist()
+    heights = page.find(f"{times}.map((time) => [...page.world.target.at(time).slice({LEVEL.target})])")
+    assert heights == swing(0.3).tolist()

@@ -10,6 +10,7 @@ from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.presets import preset
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.columns import LEVEL, TARGET
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.engine_library import SOURCES
 from mambo_sil.flight.engine.records import flight_records
@@ -57,10 +58,10 @@ def test_the_page_holds_everything_and_says_what_it_flies() -> None:
 def test_the_height_of_the_proof_swings_where_a_controller_commands_the_thrust() -> None:
     """For all controllers of a page, some of which follow it by a tuned loop; else the flight is level."""
     level = proof_flight(MAMBO, PDS)
-    assert (level.given_targets.shape[2], level.altitude.name) == (6, "stock")
+    assert (level.given_targets.shape[2], level.altitude.name) == (LEVEL.target, "stock")
     command.run("design", "crazyflie", "-o", "height.toml")
     spatial = proof_flight(CRAZYFLIE, page_controllers(["pd", "height.toml"]))
-    assert np.ptp(spatial.given_targets[:, 0, 6]) == pytest.approx(0.6, abs=1e-3)
+    assert np.ptp(spatial.given_targets[:, 0, TARGET["height_m"]]) == pytest.approx(0.6, abs=1e-3)
     assert spatial.altitude.name == "pid"
     assert next(one for one in target_dials(spatial=True) if one.key == "swing").start == 0
 

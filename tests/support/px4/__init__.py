@@ -34,8 +34,8 @@ _TYPES: Final = {"bool": "bool", "uint": "uint{}_t", "float": "float"}
 _LOGGED: Final = {"bool": "uint8_t", "uint8_t": "uint8_t", "uint16_t": "uint16_t", "float": "float"}
 
 
-def px4_settings(acceleration: str = "given") -> Settings:
-    """Return the settings that `design crazyflie` writes, with the target's acceleration given or tracked."""
+def px4_settings(acceleration: str = "observed") -> Settings:
+    """Return the settings that `design crazyflie` writes, with the target observed or tracked."""
     text = controller_text(vehicle_toml.load("crazyflie"), "crazyflie")
     found = text.replace('acceleration = "tracked"', f'acceleration = "{acceleration}"')
     return parse(found, "controller.toml")
