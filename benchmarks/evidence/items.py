@@ -233,7 +233,7 @@ ITEMS: Final = (
     Item(
         name="fast",
         commands=(f"python -m benchmarks.flights.fast {RESULTS}/fast/pictures",),
-        controllers=("design crazyflie", "design crazyflie --acceleration given"),
+        controllers=("design crazyflie", "design crazyflie --acceleration observed"),
         paths=(*_FLIGHT, "benchmarks/flights/fast.py", _STYLE),
         read=read_printed,
         tables={"fast": printed},
@@ -316,7 +316,7 @@ ITEMS: Final = (
     Item(
         name="link",
         commands=(f"python -m benchmarks.flights.link {RESULTS}/link/link",),
-        controllers=(f"design {_HERE}/link-drone.toml",),
+        controllers=(f"design {_HERE}/link-drone.toml --acceleration observed",),
         paths=(
             *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/link", "sil/mambo_sil/model/derive"),
             *("benchmarks/flights/link.py", "benchmarks/flights/wire.py", f"{_HERE}/link-drone.toml"),
@@ -370,7 +370,7 @@ ITEMS: Final = (
         controllers=tuple(
             f"design {drone}{words}"
             for drone in ("crazyflie-l250", "crazyflie-brushless", "x500", "hummingbird")
-            for words in ("", " --acceleration given")
+            for words in ("", " --acceleration observed")
         ),
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
         read=read_figures("quick"),

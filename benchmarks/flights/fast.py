@@ -1,12 +1,16 @@
-"""What the thrust vector is worth on quick curves: a Crazyflie through motion capture, with and without it.
+"""What it is worth on quick curves to know more of a target, and what noise in it costs.
 
-Prints a table in Markdown and draws the eight at 1.2 rad/s into the folder that is given. Random drones with
-wind: mass 0.97 to 1.12, inertia 0.85 to 1.15, rotor lag 0.8 to 1.2, drag 0.5 to 1.5 times that of the file.
+A Crazyflie through motion capture. Prints a table in Markdown and draws the eight at 1.2 rad/s into the
+folder that is named. Random drones with wind: mass 0.97 to 1.12, inertia 0.85 to 1.15, rotor lag 0.8 to 1.2,
+drag 0.5 to 1.5 times that of the file. A program sends what its column says of a target: position and
+velocity, with them the acceleration, and with that the one 0.05 s later. Noise is white: in the velocities
+along x, y and the height, with a tenth of it in m in the positions; and in the accelerations.
 """
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +20,9 @@ from matplotlib.figure import Figure
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.columns import TARGET
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
@@ -24,10 +30,10 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import height_error_m, measure
 from mambo_sil.flight.names import CurveName, TargetAcceleration
 from mambo_sil.flight.scenario import Scenario, flight_of
-from mambo_sil.flight.traces import Trace
 from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.results.pictures import save
-from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
+from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, VERMILION, style
+from mambo_sil.results.style import TARGET as TARGET_COLOUR
 
 DRONE: Final = vehicle_toml.load("crazyflie")
 SEEDS: Final = (101, 102, 103)
@@ -60,20 +66,68 @@ CASES: Final = (
 )
 
 
+@dataclass(frozen=True)
+class Sender:
+    """What flies: the name of settings, and what the program knows of its targets."""
+
+    words: str
+    settings: str
+    known: int
+
+
+SENDERS: Final = (
+    Sender("tracked", "tracked", 0),
+    Sender("tracked, exact tilt", "tracked, exact tilt", 0),
+    Sender("observed: velocity", "observed", 0),
+    Sender("observed: acceleration", "observed", 1),
+    Sender("observed: one ahead", "observed", 2),
+)
+NOISES_M_S: Final = (0.01, 0.04)
+ACCELERATION_NOISE_M_S2: Final = 0.1
+NOISY: Final = (CASES[1], CASES[3])
+"""The curves that are flown with noise too."""
+_OF_SPEED: Final = ("velocity_m_s", "climb_m_s")
+_OF_PLACE: Final = ("position_m", "height_m")
+_OF_ACCELERATION: Final = ("acceleration_m_s2", "ahead_m_s2", "climb_acceleration_m_s2", "climb_ahead_m_s2")
+
+
+@dataclass(frozen=True)
+class Sent(Flight):
+    """Flights whose program knows this much of its targets, and says it with noise."""
+
+    known: int = 2
+    noise_m_s: float = 0.0
+    noise_m_s2: float = 0.0
+
+    @cached_property
+    def targets_in_space(self) -> FloatArray:
+        """The targets (k, n, 13) as they are sent."""
+        sent = np.array(super().targets_in_space)
+        random = np.random.default_rng(0)
+        sizes = {
+            _OF_SPEED: self.noise_m_s,
+            _OF_PLACE: self.noise_m_s / 10,
+            _OF_ACCELERATION: self.noise_m_s2,
+        }
+        for names, size in sizes.items():
+            for name in names:
+                sent[..., TARGET[name]] += size * random.standard_normal(sent[..., TARGET[name]].shape)
+        sent[..., TARGET["known"]] = self.known
+        return sent
+
+
 def settings() -> dict[str, Settings]:
-    """Return what is compared, by the words of the table."""
+    """Return the settings that are compared: those of `design`, and tracked with the exact tilt, by name."""
 
     def derived(acceleration: TargetAcceleration) -> Settings:
         text = chosen_text(DRONE, "crazyflie", acceleration=acceleration)
         return controller_toml.parse(text, "derived")
 
-    given = derived("given")
+    observed = derived("observed")
     return {
-        "tracked: small angles": derived("tracked"),
-        "tracked: thrust vector": controller_toml.with_option(
-            controller_toml.with_option(given, "target.acceleration", "tracked"), "target.tracker_gain", 0.3
-        ),
-        "given": given,
+        "tracked": derived("tracked"),
+        "tracked, exact tilt": controller_toml.with_option(observed, "target.acceleration", "tracked"),
+        "observed": observed,
     }
 
 
@@ -106,50 +160,61 @@ def drawn(case: QuickFlight, seed: int) -> Flight:
     return flight_of(flights, 0.01)
 
 
-def flown(case: QuickFlight, chosen: Settings, seed: int) -> Trace:
-    """Return the flights of a case with settings."""
-    return fly(drawn(case, seed), CompiledController(chosen, DRONES))
+def cell(case: QuickFlight, chosen: Settings, known: int, noise: tuple[float, float]) -> str:
+    """Return IAE, median and 95 %, in m s; change of the commands, in rad; height, in m; and crashes.
 
-
-def cell(case: QuickFlight, chosen: Settings) -> str:
-    """Return IAE, median and 95 %, in m s, 95 % of the largest errors of the height, in m, and crashes."""
-    iae, height, crashes = [], [], 0
+    The change is the mean sum of roll and pitch from step to step, the height 95 % of its largest errors.
+    """
+    iae, change, lost, crashes = [], [], [], 0
     for seed in SEEDS:
-        trace = flown(case, chosen, seed)
+        flight = drawn(case, seed)
+        values = {field.name: getattr(flight, field.name) for field in fields(flight)}
+        sent = Sent(**values, known=known, noise_m_s=noise[0], noise_m_s2=noise[1])
+        trace = replace(fly(sent, CompiledController(chosen, DRONES)), target=flight.traced_targets)
         crashed = detect_crashes(trace, DRONE)
         crashes += int(crashed.sum())
         iae.append(np.where(crashed, np.inf, measure(trace).iae_m_s))
-        height.append(np.max(np.abs(height_error_m(trace)), axis=0))
+        change.append(np.abs(np.diff(trace.command_rad, axis=0)).sum(axis=2).mean(axis=0))
+        lost.append(np.max(np.abs(height_error_m(trace)), axis=0))
     found = np.concatenate(iae)
     high = np.quantile(found, 0.95, method="higher")
-    largest = np.quantile(np.concatenate(height), 0.95)
-    lost = f", {crashes} crash" if crashes else ""
-    return f"{np.median(found):.3g}, {high:.3g}; {largest:.2g}{lost}"
+    words = f"{np.median(found):.3g}, {high:.3g} ({np.median(np.concatenate(change)):.2g})"
+    height = np.quantile(np.concatenate(lost), 0.95)
+    return f"{words}; {height:.2g}" + (f", {crashes} crash" if crashes else "")
 
 
 def rows() -> Iterator[dict[str, str]]:
-    """Fly everything and yield the rows of the table."""
-    compared = settings()
-    for case in CASES:
+    """Fly everything and yield the rows of the table, those with noise last."""
+    compared, acceleration = settings(), f"{ACCELERATION_NOISE_M_S2:g} m/s² in the acceleration"
+    noisy = [(f"{1e3 * size:g} mm/s", (size, 0.0)) for size in NOISES_M_S]
+    noisy += [(acceleration, (0.0, ACCELERATION_NOISE_M_S2))]
+    flown = [(case, case.words, (0.0, 0.0)) for case in CASES]
+    flown += [(case, f"{case.words}, {words}", noise) for case in NOISY for words, noise in noisy]
+    for case, words, noise in flown:
         yield {
-            "flight": case.words,
-            **{words: cell(case, chosen) for words, chosen in compared.items()},
+            "flight": words,
+            **{
+                one.words: "-"
+                if noise[1] and not one.known
+                else cell(case, compared[one.settings], one.known, noise)
+                for one in SENDERS
+            },
         }
 
 
 def draw_eight(stem: Path) -> None:
-    """Draw the eight at 1.2 rad/s as flown with and without the thrust vector."""
-    compared, case = settings(), CASES[2]
+    """Draw the eight at 1.2 rad/s as flown with settings for a tracked target and for an observed one."""
+    compared, flight = settings(), drawn(CASES[2], SEEDS[0])
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 2.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, words, colour in zip(panels, list(compared)[::2], (VERMILION, BLUE), strict=True):
-            trace = flown(case, compared[words], SEEDS[0])
+        for axes, name, colour in zip(panels, ("tracked", "observed"), (VERMILION, BLUE), strict=True):
+            trace = fly(flight, CompiledController(compared[name], DRONES))
             late = trace.time_s > DURATION_S / 2.0
             target = trace.target[late, 0]
-            axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=BROAD, label="target")
+            axes.plot(target[:, 0], target[:, 1], color=TARGET_COLOUR, linewidth=BROAD, label="target")
             axes.plot(*trace.position_m[late, 0, :2].T, color=colour, label="drone")
-            axes.set(xlabel="x, m", aspect="equal", title=words)
+            axes.set(xlabel="x, m", aspect="equal", title=name)
         panels[0].set_ylabel("y, m")
         save(figure, stem)
 

@@ -4,7 +4,7 @@
 
 writes figures.json. Each flight is flown by both autopilots at several headings; a figure is the worst of
 them. The drone is `link-drone.toml`, whose state the autopilot knows without noise; its settings are those
-that `design` derives, with the target's acceleration given.
+that `design --acceleration observed` derives.
 """
 
 import json
@@ -30,7 +30,7 @@ from mambo_sil.link.records import STACKS, EstimatedState
 from mambo_sil.link.simulated import Condition
 from mambo_sil.link.steady_frame import SteadyFrame
 from mambo_sil.link.steering import Update
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 
 DRONE: Final = Path(__file__).parents[1] / "evidence" / "link-drone.toml"
 HEADINGS_RAD: Final = (0.0, 1.3, 2.9, -1.9)
@@ -104,8 +104,8 @@ def fly(
     frame: SteadyFrame | None = None,
 ) -> WiredFlight:
     """Fly a course from the ground to the ground; `happens` is called with the time since the take-over."""
-    settings = controller_toml.parse(controller_text(vehicle_toml.read(DRONE), DRONE.name), DRONE.name)
-    settings = controller_toml.with_option(settings, "target.acceleration", "given", "acceleration")
+    text = chosen_text(vehicle_toml.read(DRONE), DRONE.name, acceleration="observed")
+    settings = controller_toml.parse(text, DRONE.name)
     flown, begun_s = WiredFlight(), math.inf
     link = WiredLink(stack, drone, Condition(yaw_rad=heading_rad))
 

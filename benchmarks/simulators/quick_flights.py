@@ -60,4 +60,4 @@ def _hummingbird(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[st
 
 
 def _ours(drone: VehicleFile) -> dict[str, Challenger]:
-    return {"ours, by the page": Designed(drone), "ours, acceleration given": Designed(drone, "given")}
+    return {"ours, by the page": Designed(drone), "ours, target observed": Designed(drone, "observed")}
