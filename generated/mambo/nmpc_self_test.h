@@ -9,7 +9,7 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x0D5751AAUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -19,7 +19,7 @@
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, computed by the reference. */
-#define NMPC_SELF_TEST_DIGEST 0xEC735E5AUL
+#define NMPC_SELF_TEST_DIGEST 0x0318C75FUL
 
 #ifdef __cplusplus
 extern "C" {

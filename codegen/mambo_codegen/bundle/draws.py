@@ -100,7 +100,7 @@ def _own_scales(method: Method, *records: str) -> dict[str, tuple[float, str]]:
 
 
 def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, str]]:
-    """Return the scales of what observer or trackers read: known accelerations, and changes of velocity.
+    """Return the scales of what observer or tracker read: known accelerations, and changes of velocity.
 
     They are the least of what these are tested with and of what the range admits.
     """
@@ -111,9 +111,8 @@ def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, 
             given_m_s2 = min(1.25 * limits.acceleration / observer.update_s, most_m_s2)
             found[f"{name or 'TARGET_'}M_S2"] = (given_m_s2, "thrust")
             found[f"{name}CHANGE_M_S"] = (min(1.25 * limits.jump, change_m_s), "velocity")
-    for tracker, name in ((method.tracker, ""), (method.climb_tracker, "CLIMB_")):
-        if tracker is not None:
-            found[f"{name}CHANGE_M_S"] = (min(tracker.tested_change_m_s, change_m_s), "velocity")
+    elif method.tracker is not None:
+        found["CHANGE_M_S"] = (min(method.tracker.tested_change_m_s, change_m_s), "velocity")
     return found
 
 

@@ -108,7 +108,7 @@ def null_calls(method: Method) -> int:
 
 def target_moves(method: Method) -> bool:
     """Return whether targets change their velocity from step to step: of interest where that is measured."""
-    return "target_motion" in method.parts
+    return bool({"tracker", "target_observer"} & method.parts)
 
 
 class Episodes:

@@ -17,7 +17,7 @@ _NAMES: Final = (
     *("factor_product", "factor_to_sine", "feedback_product", "gain_correction", "gain_product"),
     *("gravity_product", "half_change", "halved", "initial_error", "knee_product", "learning_product"),
     *("move_acceleration", "noise_product", "per_step2_product", "per_step_product", "position_change"),
-    *("position_correction", "rate_product", "ratio_product", "reach_product", "row_sum"),
+    *("position_correction", "ratio_product", "reach_product", "row_sum"),
     *("scaled_velocity", "share_product", "sine_difference", "sine_product", "sine_sum", "sine_to_angle"),
     *("slope_acceleration", "speed_product", "speed_ratio", "squared", "step2_product", "step_product"),
     *("target_product", "thrust_product", "tilt_product", "to_factor", "to_move", "tracker_product"),

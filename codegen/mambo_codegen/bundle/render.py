@@ -187,7 +187,7 @@ def template_context(settings: Settings, *, with_digest: bool) -> dict[str, obje
     numbers = method.numbers
     scalar = settings.code.scalar
     return (
-        {"height": None, "guard": None, "doubts": False, "vector": None}
+        {"height": None, "guard": None, "vector": None}
         | method.context
         | {f"WITH_{name.upper()}": is_there for name, is_there in method.presence.items()}
         | {

@@ -14,13 +14,6 @@ BOUNDS: Final = (
     PortRow("braking_m_s2", "braking", "2 A"),
     PortRow("tilt_rad", "angle", "the tilt limit"),
     PortRow("command_m_step2", "move", "the largest |u| at that limit, right and forward", 2, ("quadratic",)),
-    PortRow(
-        "velocity_m_s",
-        "velocity",
-        "what stood for the target's velocity in the last step",
-        2,
-        ("target_observer",),
-    ),
     PortRow("target_m_s", "velocity", "the target's velocity in the last step", 2, ("turning",)),
     PortRow("turn_m2_s2", "velocity", "mean vector product of successive ones", when=("turning",)),
     PortRow("floor_m", "position", when=("height",)),
@@ -52,14 +45,7 @@ TILT_GAIN: Final = (
     PortRow("gain", "factor", "k", 2),
 )
 
-NOISE: Final = (
-    PortRow("deviation", "factor", "d"),
-    PortRow("reversal", "factor", "r"),
-    PortRow("doubt", "factor", "1 - s"),
-)
-
 TRACKER: Final = (
-    PortRow("velocity_m_s", "velocity", "Tv_k: of the last step", 2, ("tracker",)),
     PortRow("acceleration_m_step2", "acceleration", "A_T: the target's acceleration", 2),
     PortRow(
         "jerk_m_step2_update",
@@ -67,8 +53,10 @@ TRACKER: Final = (
         "J_T: change of A_T from one control step to the next",
         2,
     ),
-    PortRow("noise", count=2, when=("doubts",), kind="noise"),
-    PortRow("axis", count=2, when=("target_observer",), kind="motion"),
+    PortRow("axis", count=2, kind="motion"),
+    PortRow("desired_m_s", "velocity", "v_d: while limits act, that of the last step", 2),
+    PortRow("desired_acceleration", "velocity", "d, in m/s per step", 2),
+    PortRow("desired_jerk", "velocity", "e, in m/s per step^2", 2),
 )
 
 MOTION: Final = (
@@ -94,25 +82,23 @@ HEIGHT: Final = (
     PortRow("thrust_m_s2", "thrust", "the last command, thrust over mass"),
     PortRow("commanded_m_s2", "thrust", "the same, whatever the motors were given", when=("guard",)),
     PortRow("budget_m_s2", "thrust", "b", when=("guard",)),
-    PortRow("target_velocity_m_s", "velocity", "of the last step", when=("tracker",)),
-    PortRow("target_acceleration_m_step2", "acceleration", when=("target_motion",)),
-    PortRow("target_jerk_m_step2_update", "acceleration", when=("target_motion",)),
-    PortRow("target_noise", when=("doubts",), kind="noise"),
-    PortRow("target", when=("target_observer",), kind="motion"),
+    PortRow("target_acceleration_m_step2", "acceleration"),
+    PortRow("target_jerk_m_step2_update", "acceleration"),
+    PortRow("target", kind="motion"),
 )
 
 QUADRATIC: Final = (
     PortRow("observer", kind="observer"),
     PortRow("attitude", kind="attitude"),
     PortRow("tilt_gain", when=("tilt_gain",), kind="tilt_gain"),
-    PortRow("tracker", when=("target_motion",), kind="tracker"),
+    PortRow("tracker", kind="tracker"),
     PortRow("height", when=("height",), kind="height"),
     PortRow("bounds", kind="bounds"),
     PortRow("tilt_rad", "angle", "roll and pitch of the last good state", "NMPC_ANGLES", ("feedback",)),
     PortRow("budget_rad", "angle", "b of roll and pitch", "NMPC_ANGLES", ("guard",)),
     PortRow("command_rad", "angle", "the last command", "NMPC_ANGLES"),
     PortRow("missed", words="control steps since the last good state", kind=BYTE),
-    PortRow("has_target", words="1 once there was a target", when=("target_motion",), kind=BYTE),
+    PortRow("has_target", words="1 once there was a target", kind=BYTE),
     PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
     PortRow("is_coarse", words="1 while no position is measured", when=("guard",), kind=BYTE),
 )
@@ -133,7 +119,7 @@ ROLLOUT: Final = (
 STEP_TRACKER: Final = (
     PortRow("velocity_m_s", "velocity", "Tv_k: of the last good step", 2, ("tracker",)),
     PortRow("acceleration_m_step2", "acceleration", "A_T: tau^2 times the target's acceleration", 2),
-    TRACKER[2],
+    TRACKER[1],
 )
 """The tracker in prediction steps."""
 
@@ -196,7 +182,6 @@ KEPT: Final[dict[str, Table]] = {
         "observer": OBSERVER,
         "attitude": ATTITUDE,
         "tilt_gain": TILT_GAIN,
-        "noise": NOISE,
         "motion": MOTION,
         "tracker": TRACKER,
         "height": HEIGHT,
@@ -218,7 +203,6 @@ WORDS: Final = {
     "attitude": "The attitude model of nmpc.c along right and forward, the axes of the heading.",
     "tilt_gain": "The gain of the tilt, of roll and pitch, by the chapter of nmpc.c.",
     "motion": "The target's motion along an axis, by its observer in nmpc.c.",
-    "noise": "Noise of the target's motion along an axis, by the tracker of nmpc.c.",
     "tracker": "The target's motion along x and y, by its chapter of nmpc.c.",
     "height": "The height, by the chapter of nmpc.c.",
     "bounds": "What follows from the limits, for the law in nmpc.c.",

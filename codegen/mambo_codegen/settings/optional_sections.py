@@ -126,13 +126,6 @@ class Guard(SettingsSection):
         le=100000,
         description="How much it may vary for long, in metres per second cubed.",
     )
-    target_noise_m_s2: Number = Field(
-        0.3,
-        ge=0.01,
-        le=10,
-        description="Noise of the target's acceleration, in metres per second squared, at which the tracker "
-        "believes half of what is new: noise reverses its sign, a corner of the path does not.",
-    )
     position_noise: Number = Field(
         0.03,
         ge=1e-5,

@@ -182,16 +182,14 @@ class Model(SettingsSection):
 
 
 class Target(SettingsSection):
-    """What the controller knows of the target's motion beyond its position and velocity."""
+    """What the 1-norm knows of the target's motion beyond its position and velocity."""
 
-    acceleration: Literal["none", "tracked", "observed"] = Field(
+    acceleration: Annotated[Literal["none", "tracked"], ONE_NORM] = Field(
         "none",
         description='Acceleration of the target in the prediction: "none" predicts a target of constant '
         'velocity, as the paper does (eq 11); "tracked" estimates it from the velocities of successive '
-        'steps, which must then be those of the target\'s motion, without noise; "observed" does so with '
-        "noise too, and takes the acceleration, and the one 0.05 s ahead, of each target that says it knows "
-        "them (quadratic cost). Held over the horizon, it removes most of the tracking error on curved "
-        "paths.",
+        "steps, which must then be those of the target's motion, without noise. Held over the horizon, it "
+        "removes most of the tracking error on curved paths.",
     )
 
     @field_validator("acceleration", mode="before")
@@ -200,17 +198,12 @@ class Target(SettingsSection):
         if acceleration in ("given", "preview"):
             raise PydanticCustomError(
                 "removed",
-                'must be "none", "tracked" or "observed": since version 0.4 a target with "observed" says '
-                "what it knows of its acceleration, in its member `known` (quadratic cost)",
+                'must be "none" or "tracked"; with a quadratic cost leave it out: since version 0.4 each '
+                "target says what it knows of its acceleration, in its member `known`",
             )
         return acceleration
 
-    @property
-    def is_observed(self) -> bool:
-        """Whether each target says what it knows, and an observer finds the rest."""
-        return self.acceleration == "observed"
-
-    tracker_gain: Number = Field(
+    tracker_gain: Annotated[Number, ONE_NORM] = Field(
         0.3,
         ge=0.01,
         le=1,

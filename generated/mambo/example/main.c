@@ -8,7 +8,7 @@
 #include "nmpc.h"
 #include "nmpc_self_test.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x0D5751AAUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -39,7 +39,7 @@ static void fly(nmpc_state_t *state, const nmpc_command_t *command)
 int main(void)
 {
     nmpc_state_t state = { { 0, 0 }, { 0, 0 }, 0, 0, 0 };
-    nmpc_target_t target = { { 1.0f, 1.0f }, { 0.2f, 0 } };
+    nmpc_target_t target = { { 1.0f, 1.0f }, { 0.2f, 0 }, { 0, 0 }, { 0, 0 }, 0 };
     nmpc_command_t command = { 0, 0 };
     const int first_difference = nmpc_self_test(&controller);
     unsigned long digest = 0UL;

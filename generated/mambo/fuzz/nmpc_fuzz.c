@@ -20,13 +20,13 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x0D5751AAUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
 /* A call is one byte and NMPC_FUZZ_REALS numbers of the host's format. Bits 0 and 1 of the byte choose the
  * function; each of the bits 2 to 5 makes a pointer argument null, the first argument's first. */
-#define NMPC_FUZZ_REALS 12
+#define NMPC_FUZZ_REALS 17
 #define NMPC_FUZZ_BYTES (1U + (NMPC_FUZZ_REALS * sizeof(nmpc_real_t)))
 #define NMPC_FUZZ_STEP 0U
 #define NMPC_FUZZ_RESET 1U
@@ -64,6 +64,14 @@ typedef struct {
     nmpc_limits_t limits;
 } nmpc_fuzz_call_t;
 
+/* A whole number. A fraction, NaN, and what is less than 0 or large become 100, which no `known` is. */
+static int nmpc_fuzz_whole(nmpc_real_t number)
+{
+    const int found = ((number >= (nmpc_real_t)0) && (number < (nmpc_real_t)100)) ? (int)number : 100;
+
+    return (number > (nmpc_real_t)found) ? 100 : found;
+}
+
 static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
 {
     nmpc_real_t values[NMPC_FUZZ_REALS];
@@ -83,6 +91,11 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.target.position_m[1] = values[8];
     call.target.velocity_m_s[0] = values[9];
     call.target.velocity_m_s[1] = values[10];
+    call.target.acceleration_m_s2[0] = values[12];
+    call.target.acceleration_m_s2[1] = values[13];
+    call.target.ahead_m_s2[0] = values[14];
+    call.target.ahead_m_s2[1] = values[15];
+    call.target.known = nmpc_fuzz_whole(values[16]);
     call.thrust_acceleration_m_s2 = values[11];
     call.start.roll_rad = values[0];
     call.start.pitch_rad = values[1];
@@ -180,6 +193,11 @@ static int nmpc_fuzz_is_good_target(const nmpc_target_t *target)
     good = good && nmpc_fuzz_is_within(target->position_m[1], NMPC_POSITION_RANGE_M);
     good = good && nmpc_fuzz_is_within(target->velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S);
     good = good && nmpc_fuzz_is_within(target->velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
+    good = good && nmpc_fuzz_is_within(target->acceleration_m_s2[0], NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    good = good && nmpc_fuzz_is_within(target->acceleration_m_s2[1], NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    good = good && nmpc_fuzz_is_within(target->ahead_m_s2[0], NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    good = good && nmpc_fuzz_is_within(target->ahead_m_s2[1], NMPC_THRUST_ACCELERATION_MAX_M_S2);
+    good = good && (target->known >= 0) && (target->known <= NMPC_MOST_KNOWN);
     return good;
 }
 

@@ -72,7 +72,7 @@ class OneNormFormats:
     factor:             eta+ and eta-.
     tracker:            tau^2 over the update period, s; 0 without a tracker.
     feedback:           rate feedback in steps; 0 without.
-    braking, approach, knee, slope, rate: of the limits, see `limits_bits`; 0 without.
+    braking, approach, knee, slope: of the limits, see `limits_bits`; 0 without.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
     error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
     tracking_limit, effort_limit: largest weights, integers of their formats.
@@ -100,7 +100,6 @@ class OneNormFormats:
     approach: int
     knee: int
     slope: int
-    rate: int
     cost: int
     gradient: int
     error_limit: int

@@ -58,9 +58,6 @@ class OneNorm(OneNormConstants, Method):
     def refusals(self) -> list[Refusal]:
         """Return why a controller with the 1-norm cannot have the settings."""
         settings = self.settings
-        if settings.target.is_observed:
-            rule = 'must be "none" or "tracked" with cost.norm = "1-norm"'
-            return [Refusal("target", "acceleration", rule)]
         refused = lag_refusals(settings, needs_lag=False) or limits_refusals(
             settings, ONE_NORM_TILT, is_limited=has_limits(settings)
         )

@@ -19,7 +19,6 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
 from mambo_codegen.methods.quadratic.tilt_gain_constants import TiltGainConstants, tilt_gain_constants
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.limits_constants import LimitsConstants
-from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
 from mambo_codegen.port.row import NUMBER
 
 
@@ -66,14 +65,9 @@ class QuadraticConstants(Constants):
         """The constants of the guard, in float64; None without it."""
         return guard_constants(self.settings)
 
-    @property
-    def climb_tracker(self) -> TrackerConstants | None:
-        """The constants of the tracker of the target's height; None without one."""
-        return self.height.tracker if self.height else None
-
     @cached_property
-    def target_observer(self) -> TargetObserverConstants | None:
-        """The constants of the target's observer, in float64; None without one."""
+    def target_observer(self) -> TargetObserverConstants:
+        """The constants of the target's observer, in float64."""
         return target_observer_constants(self.settings)
 
     @cached_property
@@ -102,8 +96,7 @@ class QuadraticConstants(Constants):
             "roll_trim": model.roll_trim_rad != 0,
             "shift": True,
             "thrust_gain": self.height is not None and self.height.learns_gain,
-            "target_motion": self.settings.target.acceleration != "none",
-            "target_observer": self.target_observer is not None,
+            "target_observer": True,
             "tilt_gain": self.tilt_gain is not None,
             "two_moves": self.law.moves == 2,
         }

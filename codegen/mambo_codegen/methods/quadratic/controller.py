@@ -122,7 +122,7 @@ class QuadraticController:
         kept = memory.limits
         limited = replace(
             memory,
-            limits=replace(new, velocity_m_s=kept.velocity_m_s, active=kept.active),
+            limits=replace(new, active=kept.active),
             command_rad=clamp(memory.command_rad, new.bounds.tilt_rad[:, None]),
             height_bounds=self._height.bounds(vertical),
         )
@@ -233,7 +233,7 @@ class QuadraticController:
                 *(attitude.tilt, attitude.integral, attitude.lagged, attitude.command),
                 *(attitude.sine[:, None], attitude.cosine[:, None]),
             ],
-            "tracker": self.parts.tracker.stored(memory.target) if self.parts.tracker else [],
+            "tracker": self.parts.target_observer.stored(memory.target),
             "height": self._height.stored(memory.height),
             "bounds": [self.stored_limits],
         }

@@ -42,7 +42,6 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import (
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_constants
 from mambo_codegen.methods.shared.limits_constants import limits_bits
 from mambo_codegen.methods.shared.rate_feedback import feedback_bits, feedback_steps
-from mambo_codegen.methods.shared.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import FACTOR_BITS, SINE_BITS, fractional_bits
 from mambo_codegen.numbers.representation import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.key import Refusal
@@ -104,7 +103,6 @@ def formats(settings: Sections) -> QuadraticFormats:
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, height = law_constants(settings), height_constants(settings)
     vector = thrust_vector_constants(settings, attitude.gain_m_step2_rad)
-    tracker = tracker_constants(settings, settings.horizon.update_period_s)
     target = target_observer_constants(settings)
     learnt = tilt_gain_constants(settings)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
@@ -130,7 +128,7 @@ def formats(settings: Sections) -> QuadraticFormats:
     speed, position = min(speed, acceleration - 1), min(position, speed - 1)
     bits = {
         "position": position,
-        "velocity": fractional_bits(2 * ranges.velocity_m_s, *(largest_velocities(target) if target else [])),
+        "velocity": fractional_bits(2 * ranges.velocity_m_s, *largest_velocities(target)),
         "angle": fractional_bits(bounds.angle * (learnt.inverse.most if learnt else 1.0)),
         "yaw": fractional_bits(YAW_LIMIT_RAD),
         "thrust": fractional_bits(bounds.thrust_m_s2),
@@ -139,7 +137,7 @@ def formats(settings: Sections) -> QuadraticFormats:
         "move": min(fractional_bits(4 * bounds.move), acceleration),
         "disturbance": fractional_bits(bounds.learnt_m_s2),
         "step": fractional_bits(period_s),
-        "tracker": _tracker_bits(settings, tracker, target),
+        "tracker": _tracker_bits(settings, target),
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
         "command": fractional_bits(*attitude.command_rad_step2_m, vector.slope_step2_m if vector else 0.0),
         "feedback": feedback_bits(feedback_steps(settings)),
@@ -148,12 +146,8 @@ def formats(settings: Sections) -> QuadraticFormats:
         "ratio": fractional_bits(*ratios) if law.moves == 2 else 0,
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
-        "per_noise": fractional_bits(target.fade)
-        if target
-        else fractional_bits(tracker.noise.steps2_per_m)
-        if tracker and tracker.noise
-        else 0,
-        "per_count": fractional_bits(target.known_slope, *target.memory_slopes) if target else 0,
+        "per_noise": fractional_bits(target.fade),
+        "per_count": fractional_bits(target.known_slope, *target.memory_slopes),
         "learning": fractional_bits(learnt.rate_step2_m) if learnt else 0,
         "factor": FACTOR_BITS,
     }
@@ -236,7 +230,6 @@ def _level_bounds(settings: Sections) -> _Bounds:
     """Return the bounds along right and forward, and of what the axes share."""
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, guard = law_constants(settings), guard_constants(settings)
-    tracker = tracker_constants(settings, settings.horizon.update_period_s)
     reach_m, speed, limit = settings.ranges.position_m, observer.velocity_limit_m_step, attitude.limit_m_step2
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
     if has_thrust_vector(settings):
@@ -244,10 +237,7 @@ def _level_bounds(settings: Sections) -> _Bounds:
     tilted *= MOST_WEIGHT if settings.height else 1.0
     tilted, turned = max(tilted, limit), _TURN * limit
     observed = target_observer_constants(settings)
-    target = tracker.acceleration_bound_m_step2 if tracker else 0.0
-    jerk = tracker.jerk_limit_m_step2_update if tracker else 0.0
-    if observed:
-        target, jerk = (observed.update_s * one for one in (observed.level.acceleration, observed.level.jerk))
+    target, jerk = (observed.update_s * one for one in (observed.level.acceleration, observed.level.jerk))
     innovation = (2 * reach_m) + (observer.age_steps * speed)
     explained = (_TURN * tilted) + observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
     innovation_step = (2 * speed) + (observer.age_steps * explained)
@@ -302,12 +292,8 @@ def _level_bounds(settings: Sections) -> _Bounds:
     )
 
 
-def _tracker_bits(
-    settings: Sections, tracker: TrackerConstants | None, target: TargetObserverConstants | None
-) -> int:
-    """Return the bits of what makes an acceleration in m/step^2 of what a tracker or an observer reads."""
-    if target is None:
-        return fractional_bits(tracker.factor_s) if tracker else 0
+def _tracker_bits(settings: Sections, target: TargetObserverConstants) -> int:
+    """Return the bits of what makes an acceleration in m/step^2 of what the target's observer reads."""
     height = height_constants(settings)
     snaps_s = [*law_constants(settings).snap_s, *([height.snap_s] if height else [])]
     return fractional_bits(target.update_s, target.half_ahead_s, *snaps_s)

@@ -18,11 +18,14 @@ from mambo_codegen.methods.quadratic.height_constants import (
     LEAST_WEIGHT,
     HeightConstants,
 )
-from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, TargetObserver, climb_observer
+from mambo_codegen.methods.quadratic.target_observer import (
+    ObservedMotion,
+    climb_observer,
+    unknown_target,
+)
 from mambo_codegen.methods.quadratic.thrust_vector import inverse, inverse_line
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.math import Real, clamp, confine
-from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 
@@ -45,7 +48,7 @@ class HeightState:
     thrust: Real
     lagged: Real
     command: Real
-    target: Any
+    target: ObservedMotion
     share: Real
     thrust_m_s2: Real
     commanded_m_s2: Real
@@ -81,7 +84,7 @@ class Lift:
 
 def unknown_height(like: Real) -> HeightState:
     """Return zeros for the height of controllers, with the shape (n,) and the type of `like`."""
-    no, still = np.zeros_like(like), unknown_motion(like[:, None])
+    no, still = np.zeros_like(like), unknown_target(like[:, None])
     return HeightState(no, no, no, no, no, no, no, still, no, no, no, no)
 
 
@@ -117,9 +120,7 @@ class HeightAxis:
         self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
-        self._tracker: Tracker | TargetObserver | None = climb_observer(constants, products)
-        if found.tracker:
-            self._tracker = Tracker(found.tracker, products)
+        self._target_observer = climb_observer(constants, products, found)
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
             self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
@@ -164,8 +165,6 @@ class HeightAxis:
     def steady(self, thrust_m_s2: Real, share: Real) -> HeightState:
         """Return the height of drones with a steady thrust (n, 1), of which `share` (n,) acts vertically."""
         unknown = unknown_height(thrust_m_s2[:, 0])
-        if self._tracker is not None:
-            unknown = replace(unknown, target=self._tracker.unknown(unknown.target.velocity_m_s))
         command = self._vertical(share, thrust_m_s2[:, 0])
         if self._budget is not None:
             full = np.full_like(command, self._budget.full)
@@ -240,15 +239,13 @@ class HeightAxis:
         """
         products, motion = self._products, state.target
         goal = np.where(follows, target[:, 0], state.height_m)
-        climb = np.where(follows, products.speed_product(target[:, 1]), np.zeros_like(goal))
-        disturbance, jerk = state.disturbance_m_step2, np.zeros_like(goal)
-        if self._tracker is not None:
-            found, fitted = self._follow(motion, target)
-            motion = choose(follows, found, motion)
-            climb = np.where(follows, products.speed_product(fitted), climb)
-            acceleration = motion.acceleration_m_step2[:, 0]
-            disturbance = np.where(follows, disturbance - acceleration, disturbance)
-            jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], jerk)
+        never = np.zeros(len(target), np.bool_)
+        found, aim = self._target_observer.follow(motion, target, target[:, :2], never)
+        motion = choose(follows, found, motion)
+        climb = np.where(follows, products.speed_product(aim[:, 1]), np.zeros_like(goal))
+        disturbance, acceleration = state.disturbance_m_step2, motion.acceleration_m_step2[:, 0]
+        disturbance = np.where(follows, disturbance - acceleration, disturbance)
+        jerk = np.where(follows, motion.jerk_m_step2_update[:, 0], np.zeros_like(goal))
         error = state.height_m - goal
         lead = products.reach_product(self._reach, climb)
         up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
@@ -276,15 +273,6 @@ class HeightAxis:
         command = self._vertical(state.share, thrust)
         return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
-    def _follow(self, motion: Any, target: Real) -> tuple[Any, Real]:
-        """Return the motions after targets (n, 2 or more), and the climbs (n,) that stand for theirs."""
-        if isinstance(self._tracker, TargetObserver):
-            never = np.zeros(len(target), np.bool_)
-            found, aim = self._tracker.follow(motion, target, target[:, :2], (never, never))
-            return found, aim[:, 1]
-        assert self._tracker is not None, "asked for with one only"
-        return self._tracker.update(motion, target[:, 1:2]), target[:, 1]
-
     def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
         acceleration = np.where(on_ground, 0, self._acceleration(state))
@@ -297,20 +285,16 @@ class HeightAxis:
         motion = state.height_m, state.velocity_m_step
         height_m, velocity = self._axis.shift(motion, jump.position_m[:, 2], change)
         moved = replace(state, height_m=height_m, velocity_m_step=velocity)
-        if self._tracker is None:
-            return moved
-        return replace(moved, target=self._tracker.shift(state.target, jump.velocity_m_s[:, 2:]))
+        return replace(moved, target=self._target_observer.shift(state.target, jump.velocity_m_s[:, 2:]))
 
     def turn(self, state: HeightState) -> HeightState:
         """Return the heights after turns of the frame, of which the target's next velocity is the first."""
-        if self._tracker is None:
-            return state
-        return replace(state, target=self._tracker.begin_again(state.target))
+        return replace(state, target=self._target_observer.begin_again(state.target))
 
     def clear_target(self, state: HeightState, cleared: Rows) -> HeightState:
         """Forget the targets of some controllers (n,)."""
-        unknown = self._tracker.unknown if self._tracker else unknown_motion
-        return replace(state, target=choose(cleared, unknown(state.target.velocity_m_s), state.target))
+        unknown = unknown_target(state.target.velocity_m_s)
+        return replace(state, target=choose(cleared, unknown, state.target))
 
     def weight(self, acceleration: Real) -> Real:
         """Return (g + acceleration)/g (n,), by which the tilt of a climbing drone counts, within limits."""
@@ -347,9 +331,8 @@ class HeightAxis:
         found = lines[0]
         for line in lines[1:]:
             found = np.where(line < found, line, found)
-        if isinstance(state.target, ObservedMotion):
-            always = np.where(state.target.memory[:, 0] > 0, found, product(vertical, known))
-            found = np.where(found < always, always, found)
+        always = np.where(state.target.memory[:, 0] > 0, found, product(vertical, known))
+        found = np.where(found < always, always, found)
         limited: Real = np.where(found < least, least, found)
         return limited
 
@@ -411,7 +394,7 @@ class HeightAxis:
         columns += [state.thrust, state.lagged, state.command, state.share, state.thrust_m_s2]
         columns += [] if self._budget is None else [state.commanded_m_s2, state.budget_m_s2]
         stored = [column[:, None] for column in columns]
-        return stored if self._tracker is None else [*stored, *self._tracker.stored(state.target)]
+        return [*stored, *self._target_observer.stored(state.target)]
 
     def estimate(self, state: HeightState) -> list[NDArray[Any]]:
         """Return the columns (n, 1) of nmpc_estimate_t: height, climb, and what is learnt of the thrust."""

@@ -18,7 +18,7 @@ from mambo_codegen.methods.quadratic.law import STATES, LawSolution, axis_law
 from mambo_codegen.methods.quadratic.observer_constants import observer_gain
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, never_too_small, reciprocal
 from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, has_thrust_vector
-from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN, TrackerConstants, tracker_constants
+from mambo_codegen.methods.shared.tracker_constants import JUMP_MARGIN
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.optional_sections import Height
@@ -69,7 +69,6 @@ class HeightConstants:
     least_share:   the thrust is compensated for the tilt as if cos roll cos pitch were at least this.
     thrust_inverse, weight_inverse: of the thrust's factors, and of (g + u)/g; the latter is never too small.
     snap_s:        as in `LawConstants`.
-    tracker:       of the target's height; None without.
     """
 
     thrust_row: NDArray[np.float64]
@@ -96,7 +95,6 @@ class HeightConstants:
     thrust_inverse: Reciprocal
     weight_inverse: Reciprocal
     snap_s: float
-    tracker: TrackerConstants | None
 
     @property
     def learns_gain(self) -> bool:
@@ -149,7 +147,6 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         thrust_inverse=reciprocal(least_share * (1 - deviation), 1 + deviation),
         weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
         snap_s=_solution(settings, height).snap_s,
-        tracker=tracker_constants(settings, step_s, jump_m_s2(height)),
     )
 
 

@@ -40,17 +40,15 @@ def vertical_bounds(
     observer: ObserverConstants,
     attitude: AttitudeConstants,
     ranges: Ranges,
-    observed: TargetObserverConstants | None,
+    observed: TargetObserverConstants,
 ) -> VerticalBounds:
     """Return the bounds of the height for inputs within `ranges`."""
     reach_m = ranges.position_m
     limit, speed, gravity = height.limit_m_step2, observer.velocity_limit_m_step, height.gravity_m_step2
     learnt = height.learn_limit if height.learns_acceleration else 0.0
     deviation = height.learn_limit if height.learns_gain else 0.0
-    target = height.tracker.acceleration_bound_m_step2 if height.tracker else 0.0
-    jerk = height.tracker.jerk_limit_m_step2_update if height.tracker else 0.0
-    if observed and observed.climb:
-        target, jerk = (observed.update_s * one for one in (observed.climb.acceleration, observed.climb.jerk))
+    assert observed.climb is not None, "with a height"
+    target, jerk = (observed.update_s * one for one in (observed.climb.acceleration, observed.climb.jerk))
     innovation = (2 * reach_m) + (observer.age_steps * speed)
     innovation_step = (2 * speed) + (observer.age_steps * (limit + learnt))
     corrections = np.abs(height.gain) @ [innovation, innovation_step]

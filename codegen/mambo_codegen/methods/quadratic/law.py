@@ -2,20 +2,21 @@
 
 Along right and forward the drone's error obeys, in seconds and metres,
 
-    e' = v,  v' = a + w,  w' = -j,  j' = -j / 1 s
+    e' = v,  v' = a + w
 
-with a from `attitude_constants.py`, w the disturbance less the target's acceleration, and j
-the target's jerk. The cost is the sum over all control steps of
+with a from `attitude_constants.py`, and w the disturbance less the target's acceleration. The cost is the
+sum over all control steps of
 
     e^2 + (weight v)^2 + (response^3 (u_k - u_k-1) / T_s)^2
 
 without end: behind the free moves the Riccati equation gives the cost to go. The first free move is the
 command of this control step; the second, if there is one, is reached by a ramp. Their minimum is linear in
-the state, [e, v, w, j, a, i, c, u_k-1]; the limits of the command cut it off.
+the state, [e, v, w, a, i, c, u_k-1]; the limits of the command cut it off. A row also takes of the target's
+jerk j what follows a steady jerk without a distance.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -38,9 +39,6 @@ from mambo_codegen.settings.sections import Sections
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
 MOVED: Final = ("e", "v", "a", "i", "c", "u")
 """The states that the command moves."""
-SECOND_SHARE: Final = 1 / 3
-"""With an observer of the target the second free move looks ahead by so much of the ramp beyond the first."""
-_JERK: Final = STATES.index("j")
 MOST_OUTAGE_STEPS: Final = 250
 """The controller counts the control steps of an outage in one byte."""
 
@@ -53,7 +51,7 @@ class LawConstants:
     rows:           (2, moves, 8) the unlimited minimum, the free moves in m/step^2, from the state,
                     `STATES`; axis 0 is right (roll), axis 1 forward (pitch).
     snap_s:         (2,) what the first move takes of the derivative of the target's jerk, over what it
-                    takes of the jerk; 0 without an observer of the target.
+                    takes of the jerk.
     ratios:         (2,) H12/H11 of the second derivatives H of the cost by two moves: by how much the best
                     first move falls when the second rises; 0 for one move.
     spectral_radius: (2,) of the closed loop without limits.
@@ -80,7 +78,7 @@ class LawSolution:
     ratio: float
     curvature: list[list[float]] | None
     closed_loop: list[list[float]]
-    snap_s: float = 0.0
+    snap_s: float
 
     @property
     def spectral_radius(self) -> float:
@@ -136,23 +134,7 @@ def axis_law(
 
         return solve_law(*inputs)
 
-    found = LawSolution(**keep("law", inputs, solve))
-    if not settings.target.is_observed:
-        return found
-    ahead_s = horizon.ramp_s, SECOND_SHARE * horizon.ramp_s
-    second = horizon.update_period_s, ahead_s, response_time_s, velocity_weight_s, loop
-
-    def solve_jerk() -> dict[str, Any]:
-        from mambo_codegen.methods.quadratic.solutions import solve_following  # noqa: PLC0415 - as above
-
-        return solve_following(*second)
-
-    following = keep("following", second, solve_jerk)
-    rows = [
-        [*row[:_JERK], jerk, *row[_JERK + 1 :]]
-        for row, jerk in zip(found.rows, following["jerk"], strict=True)
-    ]
-    return replace(found, rows=rows, snap_s=following["snap_s"])
+    return LawSolution(**keep("law", inputs, solve))
 
 
 def limits(settings: Sections) -> LimitsConstants:

@@ -23,7 +23,6 @@ from mambo_codegen.methods.quadratic.thrust_vector_constants import thrust_vecto
 from mambo_codegen.methods.quadratic.tilt_gain_constants import tilt_gain_context
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.shared.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
-from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.key import Refusal
 
@@ -45,7 +44,6 @@ class Quadratic(QuadraticConstants, Method):
         "tilt_gain": "how much it tilts, over what the model says",
         "axis": "what x, y and the height have in common",
         "observer": "position, velocity and disturbance",
-        "tracker": "acceleration of the target",
         "target_observer": "motion of the target, by set-points that say what they know",
         "optimizer": "the minimum of the cost",
         "guard": "how much the commands may vary",
@@ -95,9 +93,9 @@ class Quadratic(QuadraticConstants, Method):
 
     @property
     def proofs(self) -> Mapping[str, tuple[str, ...]]:
-        """The options of the proofs; with an observer of the target its rows have a contract."""
+        """The options of the proofs; the rows of the target's observer have a contract."""
         found = super().proofs
-        if self.target_observer is None or "refuse_nan" not in found:
+        if "refuse_nan" not in found:
             return found
         *others, specs = found["refuse_nan"]
         return {**found, "refuse_nan": (*others, f"{specs},motion_row")}
@@ -162,10 +160,6 @@ class Quadratic(QuadraticConstants, Method):
             **_target_context(self),
             "gain_change": GAIN_CHANGE,
             "guard": self.guard,
-            "doubts": self.tracker is not None and self.tracker.noise is not None,
-            "least_change": LEAST_CHANGE,
-            "most_counted": MOST_COUNTED,
-            "most_noise": MOST_NOISE,
             "stored_numbers": len(self.stored),
             "row_quantities": ROW_QUANTITIES,
             "height_quantities": [name for name in ROW_QUANTITIES if name != "row_i"],
@@ -187,11 +181,8 @@ class Quadratic(QuadraticConstants, Method):
 
 def _target_context(constants: QuadraticConstants) -> dict[str, object]:
     """Return what the template of the target's observer inserts."""
-    found = constants.target_observer
-    if found is None:
-        return {}
     return {
-        "observer_of_target": found,
+        "observer_of_target": constants.target_observer,
         "memory_fall": FALL,
         "level_snap_s": float(np.mean(constants.law.snap_s)),
         "climb_snap_s": constants.height.snap_s if constants.height else None,
@@ -214,7 +205,7 @@ def _number_macro(shift: int) -> str:
 
 def _stored_limits(constants: QuadraticConstants) -> list[float]:
     """Return bounds of what a controller stores, as numbers of the C, in ascending order."""
-    tracker, limit = constants.tracker, constants.attitude.limit_m_step2
+    observed, limit = constants.target_observer, constants.attitude.limit_m_step2
     bounds = [
         (constants.settings.ranges.position_m, "position"),
         (constants.observer.velocity_limit_m_step, "speed"),
@@ -222,28 +213,19 @@ def _stored_limits(constants: QuadraticConstants) -> list[float]:
         (limit, "acceleration"),
         (formats.LAGGED * limit, "acceleration"),
         (constants.settings.limits.tilt_rad, "angle"),
+        (observed.update_s * observed.level.acceleration, "acceleration"),
+        (observed.update_s * observed.level.jerk, "acceleration"),
+        (observed.velocity_range, "velocity"),
+        (observed.most_noise, "velocity"),
+        (observed.longest, "whole"),
+        *((one, "velocity") for limits in observed.limits for one in limits.row),
     ]
-    if observed := constants.target_observer:
-        bounds += [
-            (observed.update_s * observed.level.acceleration, "acceleration"),
-            (observed.update_s * observed.level.jerk, "acceleration"),
-            (observed.velocity_range, "velocity"),
-            (observed.most_noise, "velocity"),
-            (observed.longest, "whole"),
-            *((one, "velocity") for limits in observed.limits for one in limits.row),
-        ]
-    if tracker:
-        bounds += [
-            (tracker.acceleration_bound_m_step2, "acceleration"),
-            (tracker.jerk_limit_m_step2_update, "acceleration"),
-        ]
     return sorted(constants.numbers.constant(*bound) for bound in bounds)
 
 
 def _plain_products(constants: QuadraticConstants) -> list[str]:
     """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
-    tells_noise = constants.tracker is not None and constants.tracker.noise is not None
-    learns, observes = constants.tilt_gain is not None, constants.target_observer is not None
+    learns = constants.tilt_gain is not None
     wanted = {
         "speed_product": True,
         **dict.fromkeys(("tilt_product", "command_product"), constants.thrust_vector is None),
@@ -259,12 +241,10 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
             ("reach_product", "gravity_product", "step2_product", "thrust_product"),
             constants.has_height,
         ),
-        "factor_product": constants.has_height or tells_noise or learns or observes,
+        "factor_product": True,
         "learning_product": learns,
-        "noise_product": tells_noise or observes,
-        "target_product": constants.tracker is not None or observes,
-        "tracker_product": constants.tracker is not None or observes,
-        "change_product": observes,
-        "count_product": observes,
+        **dict.fromkeys(
+            ("noise_product", "target_product", "tracker_product", "change_product", "count_product"), True
+        ),
     }
     return [name for name, is_wanted in wanted.items() if is_wanted]

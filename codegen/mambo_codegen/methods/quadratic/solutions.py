@@ -12,10 +12,14 @@ Rows = list[list[float]]
 LoopValues = tuple[float, float, float, float]
 """The arguments of `_Loop`."""
 
-_COMMAND: Final = 7
-_MOVED: Final = (0, 1, 4, 5, 6, 7)
-"""Indices of the command and of the states `MOVED` among `law.STATES`."""
-_JERK_POLE_1_S: Final = 1
+_INNER: Final = (3, 4, 5)
+_COMMAND: Final = 6
+_MOVED: Final = (0, 1, *_INNER, _COMMAND)
+"""Indices of the attitude loop's states, of the command and of `MOVED` among `law.STATES` less the jerk."""
+_JERK: Final = 3
+"""Index of the jerk in a row."""
+SECOND_SHARE: Final = 1 / 3
+"""The second free move looks ahead by so much of the ramp beyond the first."""
 _DISTURBANCE_POLE_1_S: Final = "0.001"
 _LEAK_1_S: Final = "0.001"
 """The integral part decays at this rate, so that a loop that never answers has a bounded model."""
@@ -60,9 +64,16 @@ def solve_law(
     law = _Law(mp.mpf(update_period_s), response_time_s, velocity_weight_s, _Loop(*loop))
     ramp = round(ramp_s / update_period_s)
     rows, curvature = law.two_moves(ramp) if ramp else (law.one_move(), None)
-    scale = law.scale()
+    jerks, snap_s = law.following(rows, mp.mpf(SECOND_SHARE * ramp_s))
+    scaled = [
+        [float(rows[move, k] * scale) for k, scale in enumerate(law.scale())] for move in range(rows.rows)
+    ]
     return {
-        "rows": [[float(rows[move, k] * scale[k]) for k in range(rows.cols)] for move in range(rows.rows)],
+        "rows": [
+            [*row[:_JERK], float(jerk / law.period_s), *row[_JERK:]]
+            for row, jerk in zip(scaled, jerks, strict=True)
+        ],
+        "snap_s": snap_s,
         "ratio": 0.0 if curvature is None else float(curvature[0, 1] / curvature[0, 0]),
         "curvature": None if curvature is None else _floats(curvature),
         "closed_loop": _floats(law.closed_loop(rows)),
@@ -75,7 +86,7 @@ class _Law:
     def __init__(self, period_s: Any, response_time_s: float, velocity_weight_s: float, loop: _Loop) -> None:
         self.period_s, self._loop = period_s, loop
         self._transition, self._input = _model(loop, period_s)
-        self._state_cost = mp.zeros(8)
+        self._state_cost = mp.zeros(7)
         self._state_cost[0, 0] = mp.mpf(1)
         self._state_cost[1, 1] = mp.mpf(velocity_weight_s) ** 2
         self._input_cost = mp.matrix([[(mp.mpf(response_time_s) ** 3 / period_s) ** 2]])
@@ -92,24 +103,24 @@ class _Law:
 
         Sums the cost over both moves as a quadratic form of state and moves, and minimises it.
         """
-        form = mp.zeros(10)
-        form[:8, :8] = self._to_go
-        first, second = mp.zeros(1, 10), mp.zeros(1, 10)
-        first[8], first[_COMMAND] = mp.mpf(1), mp.mpf(-1)
-        second[9], second[8] = mp.mpf(1) / ramp, mp.mpf(-1) / ramp
+        form = mp.zeros(9)
+        form[:7, :7] = self._to_go
+        first, second = mp.zeros(1, 9), mp.zeros(1, 9)
+        first[7], first[_COMMAND] = mp.mpf(1), mp.mpf(-1)
+        second[8], second[7] = mp.mpf(1) / ramp, mp.mpf(-1) / ramp
         for change, steps in ((second, ramp), (first, 1)):
-            transition, cost = mp.eye(10), mp.zeros(10)
-            transition[:8, :8] = self._transition
-            transition[:8, :] += self._input * change
-            cost[:8, :8] = self._state_cost
+            transition, cost = mp.eye(9), mp.zeros(9)
+            transition[:7, :7] = self._transition
+            transition[:7, :] += self._input * change
+            cost[:7, :7] = self._state_cost
             cost += self._input_cost[0] * (change.T * change)
             form = sum_costs(transition, cost, form, steps)
-        curvature = form[8:, 8:]
-        return -(mp.inverse(curvature) * form[8:, :8]), curvature
+        curvature = form[7:, 7:]
+        return -(mp.inverse(curvature) * form[7:, :7]), curvature
 
     def closed_loop(self, rows: Matrix) -> Matrix:
         """Return the transition of the states `MOVED`, without the limits of the command."""
-        change = rows[0, :8].copy()
+        change = rows[0, :7].copy()
         change[_COMMAND] -= 1
         loop = self._transition + (self._input * change)
         return mp.matrix([[loop[row, column] for column in _MOVED] for row in _MOVED])
@@ -121,10 +132,10 @@ class _Law:
         `_COMMAND`; the last one stands beside it. Exact at the control steps: the change of the velocity in
         each is the target's, so state and command are polynomials of the step's number.
         """
-        inner, period_s = [4, 5, 6], self.period_s
+        period_s = self.period_s
         system, right = mp.zeros(4), mp.zeros(4, degree + 1)
-        for i, row in enumerate([*inner, 1]):
-            for j, column in enumerate([*inner, _COMMAND]):
+        for i, row in enumerate([*_INNER, 1]):
+            for j, column in enumerate([*_INNER, _COMMAND]):
                 system[i, j] = self._input[row] if column == _COMMAND else self._transition[row, column]
         for i in range(3):
             system[i, i] -= 1
@@ -139,77 +150,54 @@ class _Law:
                 for i in range(3):
                     wanted[i] += mp.binomial(higher, power) * found[i, higher]
             found[:, power] = mp.lu_solve(system, wanted)
-        state = [mp.mpf(0)] * 8
-        for i, column in enumerate([*inner, _COMMAND]):
+        state = [mp.mpf(0)] * 7
+        for i, column in enumerate([*_INNER, _COMMAND]):
             state[column] = found[i, 0]
-        drift = sum(self._transition[0, column] * state[column] for column in inner)
+        drift = sum(self._transition[0, column] * state[column] for column in _INNER)
         drift += self._input[0] * state[_COMMAND]
         state[1] = (period_s ** (degree + 2) / mp.factorial(degree + 2) - drift) / period_s
         before = sum(found[3, power] * (-1) ** power for power in range(degree + 1))
         return state, before
 
-    def following(self, rows: Matrix) -> tuple[Any, Any]:
-        """Return what the first move must take of the target's jerk, and of its next derivative."""
-        found = []
-        for degree in (1, 2):
-            state, before = self.steady(degree)
-            others = sum(rows[0, k] * state[k] for k in _MOVED if k != _COMMAND)
-            found.append(state[_COMMAND] - others - rows[0, _COMMAND] * before)
-        return found[0], found[1]
+    def following(self, rows: Matrix, second_s: Any) -> tuple[list[Any], float]:
+        """Return what the moves must take of the target's jerk to follow it without a distance, in SI units.
+
+        And what the first one must take of the jerk's derivative, over that, in s. The second one looks
+        further ahead than the first by `second_s`.
+        """
+        jerk, snap = (self._missing(rows[0, :], degree) for degree in (1, 2))
+        jerks = [jerk]
+        if rows.rows > 1:
+            jerks.append(self._missing(rows[1, :], 1) + second_s)
+        return jerks, float(min(max(snap / jerk, 0), _MOST_SNAP_S)) if jerk > 0 else 0.0
+
+    def _missing(self, row: Matrix, degree: int) -> Any:
+        """Return by how much the row of a move falls short of the command of a drone in steady motion."""
+        state, before = self.steady(degree)
+        others = sum(row[k] * state[k] for k in _MOVED if k != _COMMAND)
+        return state[_COMMAND] - others - row[_COMMAND] * before
 
     def scale(self) -> list[Any]:
-        """Return the factors from rows for SI units to rows for steps.
+        """Return the factors from rows for SI units, less the jerk, to rows for steps.
 
-        Moves are in m/step^2, the jerk in m/step^3; the integral part counts as an acceleration.
+        Moves are in m/step^2; the integral part counts as an acceleration.
         """
         share, period_s = self._loop.integral_1_s, self.period_s
         integral = 1 / share if share else mp.mpf(0)
         one = mp.mpf(1)
-        return [period_s**2, period_s, one, 1 / period_s, one, integral, one, one]
-
-
-def solve_following(
-    update_period_s: float,
-    horizon_s: tuple[float, float],
-    response_time_s: float,
-    velocity_weight_s: float,
-    loop: LoopValues,
-) -> dict[str, Any]:
-    """Return what the free moves must take of the target's jerk to follow it without a distance.
-
-    `horizon_s` is the ramp, and by how much the second move looks further ahead than the first.
-    "jerk": of each move, in steps.
-    "snap_s": what the first move must take of the target's next derivative, over that, in s.
-    """
-    ramp_s, second_s = horizon_s
-    law = _Law(mp.mpf(update_period_s), response_time_s, velocity_weight_s, _Loop(*loop))
-    ramp = round(ramp_s / update_period_s)
-    rows = law.two_moves(ramp)[0] if ramp else law.one_move()
-    jerk, snap = law.following(rows)
-    found = [jerk]
-    if ramp:
-        first, before = law.steady(1)
-        ahead = first[_COMMAND] + mp.mpf(second_s)
-        others = sum(rows[1, k] * first[k] for k in _MOVED if k != _COMMAND)
-        found.append(ahead - others - rows[1, _COMMAND] * before)
-    return {
-        "jerk": [float(one / law.period_s) for one in found],
-        "snap_s": float(min(max(snap / jerk, 0), _MOST_SNAP_S)) if jerk > 0 else 0.0,
-    }
+        return [period_s**2, period_s, one, one, integral, one, one]
 
 
 def _model(loop: _Loop, period_s: Any) -> tuple[Matrix, Matrix]:
-    """Return how the state answers a change of the command, (8, 8) and (8, 1)."""
-    rates, inputs = mp.zeros(7), mp.zeros(7, 1)
-    rates[0, 1] = rates[1, 2] = rates[1, 4] = mp.mpf(1)
+    """Return how the state answers a change of the command, (7, 7) and (7, 1)."""
+    rates, inputs = mp.zeros(6), mp.zeros(6, 1)
+    rates[0, 1] = rates[1, 2] = rates[1, 3] = mp.mpf(1)
     rates[2, 2] = -mp.mpf(_DISTURBANCE_POLE_1_S)
-    rates[2, 3] = mp.mpf(-1)
-    rates[3, 3] = mp.mpf(-_JERK_POLE_1_S)
-    rates[4:, 4:], inputs[4:, 0] = loop.rates(period_s)
+    rates[3:, 3:], inputs[3:, 0] = loop.rates(period_s)
     transition, command = hold(rates, inputs, period_s)
-    joint, change = mp.eye(8), mp.zeros(8, 1)
-    joint[:7, :7], joint[:7, 7] = transition, command
-    change[:7, 0], change[7] = command, mp.mpf(1)
+    joint, change = mp.eye(7), mp.zeros(7, 1)
+    joint[:6, :6], joint[:6, 6] = transition, command
+    change[:6, 0], change[6] = command, mp.mpf(1)
     return joint, change
 
 

@@ -15,12 +15,11 @@ from mambo_codegen.methods.quadratic.height import HeightAxis, HeightBounds, Hei
 from mambo_codegen.methods.quadratic.no_height import NoHeight
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
-from mambo_codegen.methods.quadratic.target_observer import TargetObserver, level_observer
+from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, level_observer, unknown_target
 from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState, unknown_gain
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory
 from mambo_codegen.methods.shared.math import Real, clamp
-from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
 
 _GROUNDED: Final = 9
 """The column of a state that says whether the drone touches the floor, if there is a height."""
@@ -66,6 +65,10 @@ class CheckedInputs:
     has_state: Rows
     target: Real
     allows_command: Rows
+
+
+_OF_HEIGHT: Final = ActiveLimit.HEIGHT | ActiveLimit.THRUST
+"""Limits that do not change the target along x and y."""
 
 
 @dataclass(frozen=True)
@@ -130,9 +133,7 @@ class ControlStep:
         self.observer = KalmanObserver(constants, products)
         self.model = AttitudeModel(constants, products)
         self.optimizer = QuadraticOptimizer(constants, products, self.model.command_limit)
-        alpha_beta = Tracker(constants.tracker, products) if constants.tracker else None
-        self.tracker: Tracker | TargetObserver | None = alpha_beta or level_observer(constants, products)
-        self._no_motion = self.tracker.unknown if self.tracker else unknown_motion
+        self.target_observer = level_observer(constants, products)
         self.limits = LimitsLaw(constants, constants.limiting)
         self.height: HeightAxis | NoHeight = NoHeight(constants)
         if constants.height:
@@ -174,7 +175,7 @@ class ControlStep:
         return QuadraticMemory(
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self.model.steady(command_rad, self.height.command_weight(height)),
-            target=self._no_motion(zeros),
+            target=unknown_target(zeros),
             limits=replace(limits, active=np.zeros_like(limits.active)),
             tilt_rad=zeros,
             command_rad=command_rad,
@@ -213,7 +214,7 @@ class ControlStep:
         moved = replace(
             memory,
             estimate=self.observer.shift(memory.estimate, jump),
-            target=self.tracker.shift(memory.target, jump.velocity_m_s) if self.tracker else memory.target,
+            target=self.target_observer.shift(memory.target, jump.velocity_m_s),
             limits=self.limits.shift(memory.limits, jump.velocity_m_s),
             height=self.height.shift(memory.height, jump),
         )
@@ -223,7 +224,7 @@ class ControlStep:
             estimate=self.observer.turn(moved.estimate, sine, cosine),
             attitude=self.model.shift(moved.attitude, sine, cosine),
             height=self.height.turn(moved.height),
-            target=self.tracker.turn(moved.target, sine, cosine) if self.tracker else moved.target,
+            target=self.target_observer.turn(moved.target, sine, cosine),
         )
         return choose(jump.heading_rad != 0, turned, moved)
 
@@ -323,23 +324,26 @@ class ControlStep:
             seen.lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
         weight = self.height.command_weight(height)
-        limits, motion, target = self.limits.aim(
+        limits, _, within = self.limits.aim(
             memory.limits, memory.target, seen.estimate.position_m, level, follows
         )
-        motion, target = self._track_target(motion, level, target, (limits, memory.limits), follows)
+        motion, target = self._track_target(memory, level, within, limits, follows)
         aim = _Aim(
             target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
         )
         return self._end_outage(aim, seen.estimate)
 
     def _track_target(
-        self, motion: Any, program: Real, aim: Real, limits: tuple[LimitsMemory, LimitsMemory], follows: Rows
-    ) -> tuple[Any, Real]:
+        self, memory: QuadraticMemory, program: Real, aim: Real, limits: LimitsMemory, follows: Rows
+    ) -> tuple[ObservedMotion, Real]:
         """Return how the programs' targets move that are followed (n,), and the aims (n, 4 or more)."""
-        if self.tracker is None:
-            return motion, aim
-        now, before = (one.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST) != 0 for one in limits)
-        found, fitted = self.tracker.follow(motion, program, aim, (now, before))
+        motion = memory.target
+        was_active, active = (one.active & ~_OF_HEIGHT for one in (memory.limits, limits))
+        found, fitted = self.target_observer.follow(motion, program, aim, active != 0)
+        was_limited = (was_active != 0) & motion.is_known
+        by_limits = (active & ActiveLimit.FENCE != 0) | self.limits.is_slow(limits.bounds, program)
+        within = self.target_observer.follow_limits(found, aim[:, 2:4], was_limited, by_limits)
+        found = choose(active != 0, within, found)
         return choose(follows, found, motion), np.where(follows[:, None], fitted, aim)
 
     def _end_outage(self, aim: _Aim, estimate: Estimate) -> _Aim:
@@ -352,7 +356,7 @@ class ControlStep:
         return replace(
             aim,
             target=np.where(brakes[:, None], stopped, aim.target),
-            motion=choose(overdue, self._no_motion(aim.motion.velocity_m_s), aim.motion),
+            motion=choose(overdue, unknown_target(aim.motion.velocity_m_s), aim.motion),
             limits=replace(aim.limits, active=active),
             height=self.height.clear_target(aim.height, overdue),
             missed=np.where(rests, self.at_rest, aim.missed),
@@ -380,10 +384,7 @@ class ControlStep:
         And whether what the thrust leaves limits one of them (n,).
         """
         attitude, estimate = seen.attitude, seen.estimate
-        disturbance, jerk = self.observer.disturbance(estimate), np.zeros_like(seen.tilt)
-        if self.tracker is not None:
-            disturbance = disturbance - aim.motion.acceleration_m_step2
-            jerk = self.model.turn_to_heading(attitude, aim.motion.jerk_m_step2_update)
+        disturbance = self.observer.disturbance(estimate) - aim.motion.acceleration_m_step2
         errors = (
             estimate.position_m - aim.target[:, 0:2],
             estimate.velocity_m_step - self.products.speed_product(aim.target[:, 2:4]),
@@ -391,7 +392,7 @@ class ControlStep:
         )
         state = [
             *(self.model.turn_to_heading(attitude, error) for error in errors),
-            jerk,
+            self.model.turn_to_heading(attitude, aim.motion.jerk_m_step2_update),
             attitude.tilt if self._is_predicted else seen.tilt,
             attitude.integral,
             attitude.lagged,
@@ -471,7 +472,7 @@ class ControlStep:
         """Return the limits with those of the thrust, which limits the last moves or not (n,)."""
         kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
         thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
-        others = aim.limits.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)
+        others = aim.limits.active & ~_OF_HEIGHT
         height = np.where(aim.limit_active, ActiveLimit.HEIGHT, 0)
         return replace(aim.limits, active=others + height + thrust)
 

@@ -1,12 +1,13 @@
 """Target observer: velocity, acceleration, jerk and snap of a target, from its set-points, noisy or not."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.height_constants import HeightConstants
 from mambo_codegen.methods.quadratic.target_observer_constants import (
     FALL,
     MotionLimits,
@@ -29,6 +30,8 @@ class ObservedMotion:
     noise:      mean change of that from set-point to set-point.
     memory:     velocities that the fit counts; 0 with known accelerations.
     missed:     1 if the last set-point was rejected, 2 after a turn of the frame, else 0.
+    desired_m_s, desired_acceleration, desired_jerk: while limits act, the velocity within them, its change
+                and the change of that, in m/s per step^i; of no use for a height.
     is_known:   (n,) whether there was a set-point.
     """
 
@@ -42,7 +45,17 @@ class ObservedMotion:
     noise: Real
     memory: Real
     missed: Real
+    desired_m_s: Real
+    desired_acceleration: Real
+    desired_jerk: Real
     is_known: Rows
+
+
+def unknown_target(like: Real) -> ObservedMotion:
+    """Return the motion before the first step, with the shape (n, axes) and the type of `like`."""
+    zeros, known = np.zeros_like(like), np.zeros(len(like), np.bool_)
+    values = {field.name: zeros for field in fields(ObservedMotion) if field.name != "is_known"}
+    return ObservedMotion(**values, is_known=known)
 
 
 class TargetObserver:
@@ -92,12 +105,8 @@ class TargetObserver:
         self._velocity_range = constant(constants.velocity_range, "velocity")
         self._bound = products.target_product(self._step, self._acceleration)
         self._jerk_limit = products.target_product(self._step, self._jerk)
-
-    def unknown(self, like: Real) -> ObservedMotion:
-        """Return the motion before the first step, with the type and the length of `like` (n, ...)."""
-        zeros = np.zeros((len(like), self._axes), like.dtype)
-        known = np.zeros(len(like), np.bool_)
-        return ObservedMotion(zeros, zeros, zeros, zeros, zeros, zeros, zeros, zeros, zeros, zeros, known)
+        self._desired_gain = constant(constants.desired_gain, "sine")
+        self._desired_jerk_gain = constant(constants.desired_jerk_gain, "sine")
 
     def stored(self, motion: ObservedMotion) -> list[Real]:
         """Return the columns (n, k) that nmpc_t stores of motions, in their order."""
@@ -109,33 +118,64 @@ class TargetObserver:
             axis=2,
         )
         fed = [motion.acceleration_m_step2, motion.jerk_m_step2_update]
-        return [*fed, axes.reshape(len(axes), -1)]
+        desired = [motion.desired_m_s, motion.desired_acceleration, motion.desired_jerk]
+        return [*fed, axes.reshape(len(axes), -1), *(desired if self._axes > 1 else [])]
 
     def follow(
-        self, motion: ObservedMotion, program: Real, aim: Real, limited: tuple[Rows, Rows]
-    ) -> tuple[Any, Real]:
+        self, motion: ObservedMotion, program: Real, aim: Real, limited: Rows
+    ) -> tuple[ObservedMotion, Real]:
         """Return the motions after a set-point, and what is aimed at, whose velocity is the fit's.
 
-        program (n, k) are the program's targets, aim (n, 2 or more axes) these within the limits,
-        limited (n,) whether a limit has changed them, now and in the step before: then the aim's
-        acceleration counts.
+        program (n, k) are the program's targets, aim (n, 2 or 3 axes) these within the limits, limited (n,)
+        whether a limit has changed them.
         """
         velocity, told, ahead = (program[:, k * self._axes : (k + 1) * self._axes] for k in (1, 2, 3))
         known = program[:, -1].astype(np.int64)[:, None]
-        found = self._observe(motion, velocity, told, ahead, known)
-        own = self._feed(found, known)
-        if aim.shape[1] >= 3 * self._axes:
-            held = self._feed_limited(found, aim, motion.acceleration_m_step2, limited[1])
-            own = choose(limited[0], held, own)
+        found = self._feed(self._observe(motion, velocity, told, ahead, known), known)
         fitted = np.where(
-            (known == 0) & ~limited[0][:, None], found.velocity_m_s, aim[:, self._axes : 2 * self._axes]
+            (known == 0) & ~limited[:, None], found.velocity_m_s, aim[:, self._axes : 2 * self._axes]
         )
-        return own, np.concatenate([aim[:, : self._axes], fitted, aim[:, 2 * self._axes :]], axis=1)
+        return found, np.concatenate([aim[:, : self._axes], fitted, aim[:, 2 * self._axes :]], axis=1)
+
+    def follow_limits(
+        self, motion: ObservedMotion, desired: Real, was_limited: Rows, by_limits: Rows
+    ) -> ObservedMotion:
+        """Return the motions with desired velocities (n, 2) within limits, which act.
+
+        was_limited (n,): whether there was one in the step before; by_limits (n,): whether A_T and J_T are
+        those of the desired velocity.
+        """
+        products, product = self._products, self._products.tracker_product
+        change = desired - motion.desired_m_s
+        predicted = motion.desired_acceleration + motion.desired_jerk
+        difference, zeros = change - predicted, np.zeros_like(desired)
+        steady = np.abs(change) <= self._acceleration
+        difference = np.where(steady, difference, zeros)
+        acceleration = clamp(predicted + product(self._desired_gain, difference), self._acceleration)
+        jerk = clamp(motion.desired_jerk + product(self._desired_jerk_gain, difference), self._jerk)
+        begins = ~was_limited[:, None]
+        moved = replace(
+            motion,
+            desired_m_s=desired,
+            desired_acceleration=np.where(
+                begins, motion.acceleration, np.where(steady, acceleration, motion.desired_acceleration)
+            ),
+            desired_jerk=np.where(begins | ~steady, zeros, jerk),
+        )
+        fed = self._fed(
+            moved,
+            products.target_product(self._step, moved.desired_acceleration),
+            products.target_product(self._step, moved.desired_jerk),
+        )
+        return choose(by_limits, fed, moved)
 
     def shift(self, motion: ObservedMotion, change_m_s: Real) -> ObservedMotion:
         """Change the targets' velocities by the first columns of `change_m_s`, which is no acceleration."""
-        moved = motion.velocity_m_s + change_m_s[:, : self._axes]
-        return replace(motion, velocity_m_s=clamp(moved, self._velocity_range))
+        moved, desired = (
+            clamp(one + change_m_s[:, : self._axes], self._velocity_range)
+            for one in (motion.velocity_m_s, motion.desired_m_s)
+        )
+        return replace(motion, velocity_m_s=moved, desired_m_s=desired)
 
     def turn(self, motion: ObservedMotion, sine: Real, cosine: Real) -> ObservedMotion:
         """Turn the motions (n, 2) by the angles of sine and cosine (n,), but for the velocity.
@@ -153,6 +193,9 @@ class TargetObserver:
             acceleration=turned(motion.acceleration, self._acceleration),
             jerk=turned(motion.jerk, self._jerk),
             snap=turned(motion.snap, self._known_snap),
+            desired_m_s=turned(motion.desired_m_s, self._velocity_range),
+            desired_acceleration=turned(motion.desired_acceleration, self._acceleration),
+            desired_jerk=turned(motion.desired_jerk, self._jerk),
             innovation=np.zeros_like(motion.innovation),
             missed=np.full_like(motion.missed, _HAS_TURNED),
         )
@@ -311,38 +354,30 @@ class TargetObserver:
         faded = (known == 0) & (belief < self._whole)
         acceleration = np.where(faded, products.factor_product(acceleration, belief), acceleration)
         jerk = np.where(faded, products.factor_product(jerk, belief), jerk)
+        return self._fed(motion, acceleration, jerk)
+
+    def _fed(self, motion: ObservedMotion, acceleration: Real, jerk: Real) -> ObservedMotion:
+        """Return motions with A_T, and with J_T, to which the drag adds."""
         if self._drag:
-            jerk = jerk + products.factor_product(acceleration, self._drag)
-        limited = clamp(jerk, self._jerk_limit)
-        return replace(motion, acceleration_m_step2=acceleration, jerk_m_step2_update=limited)
-
-    def _feed_limited(self, motion: ObservedMotion, aim: Real, before: Real, goes_on: Rows) -> ObservedMotion:
-        """Return motions with the A_T of aims that a limit has changed, and half of its change for J_T.
-
-        before (n, k) was the last A_T; where no limit had changed the aim then, J_T is 0.
-        """
-        products, told = self._products, aim[:, 2 * self._axes : 3 * self._axes]
-        change = clamp(products.change_product(self._update, told), self._acceleration)
-        acceleration = products.target_product(self._step, change)
-        half = products.tracker_product(self._half, acceleration - before)
-        jerk = np.where(goes_on[:, None], clamp(half, self._jerk_limit), np.zeros_like(half))
-        return replace(motion, acceleration_m_step2=acceleration, jerk_m_step2_update=jerk)
+            jerk = jerk + self._products.factor_product(acceleration, self._drag)
+        return replace(
+            motion, acceleration_m_step2=acceleration, jerk_m_step2_update=clamp(jerk, self._jerk_limit)
+        )
 
 
-def level_observer(constants: QuadraticConstants, products: QuadraticArithmetic) -> TargetObserver | None:
-    """Return the observer of targets along x and y; None without one."""
+def level_observer(constants: QuadraticConstants, products: QuadraticArithmetic) -> TargetObserver:
+    """Return the observer of targets along x and y."""
     found = constants.target_observer
-    if found is None:
-        return None
     shares = constants.observer.drag_1_step, float(np.mean(constants.law.snap_s))
     return TargetObserver(found, found.level, products, 2, shares)
 
 
-def climb_observer(constants: QuadraticConstants, products: QuadraticArithmetic) -> TargetObserver | None:
-    """Return the observer of the height of targets; None without one."""
-    found, height = constants.target_observer, constants.height
-    if found is None or found.climb is None or height is None:
-        return None
+def climb_observer(
+    constants: QuadraticConstants, products: QuadraticArithmetic, height: HeightConstants
+) -> TargetObserver:
+    """Return the observer of the height of targets."""
+    found = constants.target_observer
+    assert found.climb is not None, "with a height"
     return TargetObserver(found, found.climb, products, 1, (0.0, height.snap_s))
 
 

@@ -58,6 +58,12 @@ SNAP_1_S2: Final = 2.1
 KNOWN_SNAP_1_S2: Final = 6.4
 """The largest derivatives over the largest acceleration."""
 
+DESIRED_GAIN: Final = 0.58
+"""The gain of the filter of the desired velocity: less passes fences by more, more feels noise.
+
+The gain of the jerk is that of Benedict and Bordner, as in tracker.c.
+"""
+
 FADE_SHARE: Final = 0.06
 FADE_END: Final = 3
 """The weight of the acceleration falls from where its deviation by noise is this share of what the tilt limit
@@ -91,7 +97,6 @@ class TargetObserverConstants:
 
     update_s:      the update period.
     velocity_range: largest velocity of a target, m/s.
-    most_m_s2:     largest acceleration along x and y.
     least, first, longest: set-points in memory: the fewest, those at first, the most.
     memory_slopes: (2,) set-points per m/s of noise.
     slow:          what the second line has without noise.
@@ -103,12 +108,12 @@ class TargetObserverConstants:
     ahead_share:   from the difference of two accelerations, AHEAD_S apart, to a jerk in steps.
     snap_share:    of the latest change of such a jerk in the snap.
     half_ahead_s:  by how much such a jerk is ahead.
+    desired_gain, desired_jerk_gain: of the difference of a change of the desired velocity within limits.
     level, climb:  limits along x and y, and of the height; None without.
     """
 
     update_s: float
     velocity_range: float
-    most_m_s2: float
     least: int
     first: int
     longest: int
@@ -127,6 +132,8 @@ class TargetObserverConstants:
     ahead_share: float
     snap_share: float
     half_ahead_s: float
+    desired_gain: float
+    desired_jerk_gain: float
     level: MotionLimits
     climb: MotionLimits | None
 
@@ -136,10 +143,8 @@ class TargetObserverConstants:
         return [self.level, *([self.climb] if self.climb else [])]
 
 
-def target_observer_constants(settings: Sections) -> TargetObserverConstants | None:
-    """Derive the constants of the observer; None if `settings` have none."""
-    if not settings.target.is_observed:
-        return None
+def target_observer_constants(settings: Sections) -> TargetObserverConstants:
+    """Derive the constants of the observer."""
     update_s = settings.horizon.update_period_s
     # Noise that is independent from set-point to set-point counts by its density.
     density = math.sqrt(update_s / _PERIOD_S)
@@ -156,7 +161,6 @@ def target_observer_constants(settings: Sections) -> TargetObserverConstants | N
     return TargetObserverConstants(
         update_s=update_s,
         velocity_range=settings.ranges.velocity_m_s,
-        most_m_s2=most_m_s2,
         least=least,
         first=first,
         longest=longest,
@@ -178,6 +182,8 @@ def target_observer_constants(settings: Sections) -> TargetObserverConstants | N
         ahead_share=update_s / AHEAD_S,
         snap_share=min(1.0, update_s / AHEAD_SNAP_S),
         half_ahead_s=AHEAD_S / 2,
+        desired_gain=DESIRED_GAIN,
+        desired_jerk_gain=DESIRED_GAIN**2 / (2 - DESIRED_GAIN),
         level=motion_limits(settings, most_m_s2),
         climb=motion_limits(settings, _climb_m_s2(settings.height, settings)) if settings.height else None,
     )

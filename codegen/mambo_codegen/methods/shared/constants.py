@@ -62,12 +62,7 @@ class Constants(ABC):
 
     @property
     def target_observer(self) -> Any:
-        """The constants of the target's observer; None without one."""
-        return None
-
-    @property
-    def climb_tracker(self) -> TrackerConstants | None:
-        """The constants of the tracker of the target's height; None without one."""
+        """The constants of the target's observer; None with the 1-norm."""
         return None
 
     @cached_property
@@ -102,7 +97,6 @@ class Constants(ABC):
             "braking_trim": limiting is not None and limiting.tilted.trim_m_s2 != 0,
             "confine": False,
             "double": settings.code.scalar == "float64",
-            "doubts": tracker is not None and tracker.noise is not None,
             "feedback": self.feedback_steps is not None,
             "fixed": is_fixed,
             "float": is_fixed,
@@ -113,7 +107,6 @@ class Constants(ABC):
             "limits_arithmetic": limiting is not None,
             "set_limits": limiting is not None,
             "thrust_vector": self.has_thrust_vector,
-            "target_motion": tracker is not None,
             "target_observer": False,
             "tracker": tracker is not None,
             "turning": limiting is not None and limiting.turn_m_s_rad is not None,

@@ -16,7 +16,6 @@ from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
 from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
-from mambo_codegen.methods.shared.tracker_constants import target_limit_m_s2
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]
@@ -64,8 +63,6 @@ class LimitsMemory:
 
     command_limit: (n, 2) acceleration of a command at the tilt limit, right and forward, m/step^2; zeros with
                    the 1-norm.
-    velocity_m_s:  (n, 2) what stood for the target's velocity in the last step; zeros unless the target is
-                   observed.
     active:        (n,) the limits that acted in the last step, but TILT.
     target_m_s:    (n, 2) the target's velocity in the last step; zeros unless its turns limit the speed.
     turn_m2_s2:    (n,) mean product of successive ones, |v|^2 times the angle of an update period; likewise.
@@ -73,7 +70,6 @@ class LimitsMemory:
 
     bounds: Bounds
     command_limit: Real
-    velocity_m_s: Real
     active: NDArray[np.int64]
     target_m_s: Real
     turn_m2_s2: Real
@@ -92,7 +88,7 @@ def forgotten_target(memory: LimitsMemory) -> LimitsMemory:
 def _memory(bounds: Bounds) -> LimitsMemory:
     """Return the memory of controllers with `bounds` before the first step."""
     pair, one = np.zeros_like(bounds.centre_m), np.zeros_like(bounds.tilt_rad)
-    return LimitsMemory(bounds, pair, pair, np.zeros(len(one), np.int64), pair, one)
+    return LimitsMemory(bounds, pair, np.zeros(len(one), np.int64), pair, one)
 
 
 class NoLimits:
@@ -142,8 +138,6 @@ class LimitsLaw:
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
         self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
         self._trim = constant(limits.tilted.trim_m_s2, "braking")
-        self.is_observed = constants.settings.target.is_observed
-        self._jump = constant(target_limit_m_s2(constants.settings), "thrust") if self.is_observed else None
         self._turn = None
         if limits.turn_m_s_rad is not None:
             self._turn = constant(limits.turn_m_s_rad, "slope")
@@ -317,11 +311,8 @@ class LimitsLaw:
         desired, active = self._desire(memory.bounds, fastest, position, target)
         limit_active = (active != 0)[:, None]
         velocity = np.where(limit_active, desired, target[:, 2:4])
-        columns = [np.where(limit_active, position, target[:, 0:2]), velocity]
-        if self.is_observed:
-            columns.append(np.where(limit_active, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
-            memory = replace(memory, velocity_m_s=velocity)
-        return replace(memory, active=active), np.concatenate(columns, axis=1)
+        within = np.concatenate([np.where(limit_active, position, target[:, 0:2]), velocity], axis=1)
+        return replace(memory, active=active), within
 
     def forget_braking(
         self, motion: TargetMotion, before: LimitsMemory, after: LimitsMemory, target: Real
@@ -334,14 +325,11 @@ class LimitsLaw:
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
 
     def shift(self, memory: LimitsMemory, change_m_s: Real) -> LimitsMemory:
-        """Change the remembered velocities with the frame, by the first columns of `change_m_s`."""
-
-        def changed(velocity: Real) -> Real:
-            return clamp(velocity + change_m_s[:, 0:2], self._ranges.velocity)
-
-        if self.is_observed:
-            memory = replace(memory, velocity_m_s=changed(memory.velocity_m_s))
-        return memory if self._turn is None else replace(memory, target_m_s=changed(memory.target_m_s))
+        """Change the remembered velocity with the frame, by the first columns of `change_m_s`."""
+        if self._turn is None:
+            return memory
+        moved = clamp(memory.target_m_s + change_m_s[:, 0:2], self._ranges.velocity)
+        return replace(memory, target_m_s=moved)
 
     def is_slow(self, bounds: Bounds, target: Real) -> Rows:
         """Return whether targets move at half the speed at which braking ends or less, along x and y (n,)."""
@@ -362,13 +350,7 @@ class LimitsLaw:
             )
         ]
         columns += [memory.command_limit] if has_command else []
-        columns += [memory.velocity_m_s] if self.is_observed else []
         return columns + ([] if self._turn is None else [memory.target_m_s, memory.turn_m2_s2[:, None]])
-
-    def _rate(self, velocity: Real, previous: Real) -> Real:
-        """Return the acceleration (n, 2) of a desired velocity, m/s^2; 0 where it has jumped."""
-        rate = self._products.rate_product(velocity - previous)
-        return np.where(np.abs(rate) <= self._jump, rate, np.zeros_like(rate))
 
 
 def limits_law(constants: Constants) -> LimitsLaw | NoLimits:

@@ -74,7 +74,6 @@ def limits_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "quotient": velocity + SHARE_BITS - ((braking + braking_odd) // 2) - ROOT_BITS,
         "stopping": (2 * ROOT_BITS) - position,
         "tilt": bits["slope"] + bits["angle"] - braking,
-        "rate": bits["rate"] + velocity - bits["thrust"],
         "turn": bits["slope"] + bits["angle"] - velocity,
         "mean_turn": TURN_BITS,
         "velocity": velocity,
@@ -94,7 +93,6 @@ class LimitsArithmetic(Products):
         """k, 1/s."""
         self._steepest = constant(limits.steepest_1_s, "approach")
         self._knee_s2, self._near_s2 = constant(limits.knee_s2, "knee"), constant(limits.near_s2, "knee")
-        self._steps_per_s = constant(limits.steps_per_s, "rate")
         self._fastest = constant(ranges.velocity_m_s, "velocity")
         self._farthest = 2 * constant(ranges.position_m, "position")
         turns = 2**TURN_BITS
@@ -168,10 +166,6 @@ class LimitsArithmetic(Products):
         quotient = self._down(self._root_product(speed_m_s, root), "quotient")
         stopping = self._down(quotient * quotient, "stopping")
         return self._at_most(stopping + self.half(self.knee(braking)), self._farthest)
-
-    def rate_product(self, change_m_s: Real) -> Real:
-        """Return the change of a velocity in an update period as an acceleration, m/s^2."""
-        return self._nearest(self._steps_per_s * change_m_s, "rate")
 
     def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
         """Return slope * tilt, the acceleration of a tilt, m/s^2."""

@@ -75,7 +75,6 @@ class LimitsConstants:
     tilted:       what the tilt limit gives.
     limits:       (7,) the limits of the settings, of the quantities LIMITS: a missing one is the widest that
                   may be set. With a height (11,), HEIGHT_LIMITS too.
-    steps_per_s:  the update rate.
     is_tracked:   whether the target's acceleration is fed forward, and so the braking.
     turn_m_s_rad: change of velocity in an update period that a turn may take, per tilt; None if turns do not
                   limit the speed.
@@ -84,7 +83,6 @@ class LimitsConstants:
     approach_1_s: float
     tilted: TiltAcceleration
     limits: NDArray[np.float64]
-    steps_per_s: float
     is_tracked: bool
     turn_m_s_rad: float | None = None
 
@@ -134,8 +132,7 @@ def limits_constants(settings: Sections, approach_1_s: float, tilted: TiltAccele
                 *_height_limits(settings),
             ]
         ),
-        steps_per_s=1 / settings.horizon.update_period_s,
-        is_tracked=settings.target.acceleration != "none",
+        is_tracked=settings.cost.norm == "quadratic" or settings.target.acceleration == "tracked",
     )
 
 
@@ -181,17 +178,16 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
 
     velocity and position are the formats of those inputs. braking: of twice the braking, with three bits to
     spare for its product with a distance. approach: of `steepest_1_s`. knee: of `knee_s2`. slope: of
-    `TiltAcceleration`. rate: of the update rate.
+    `TiltAcceleration`.
     """
     if found is None:
-        return dict.fromkeys(("braking", "approach", "knee", "slope", "rate"), 0)
+        return dict.fromkeys(("braking", "approach", "knee", "slope"), 0)
     slope = found.tilted.slope_m_s2_rad
     return {
         "braking": fractional_bits(16 * slope * found.limits[LIMITS.index("angle")]),
         "approach": min(fractional_bits(found.steepest_1_s), 29 + velocity - position),
         "knee": fractional_bits(found.knee_s2),
         "slope": fractional_bits(SPELLING * slope),
-        "rate": fractional_bits(found.steps_per_s),
     }
 
 

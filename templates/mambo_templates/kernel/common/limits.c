@@ -18,7 +18,7 @@
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
  * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
- * v_d for v_T; and the change of v_d for the target's acceleration, where that may be known.
+ * v_d for v_T.
  */
 
 #if WITH_TRACKER
@@ -280,34 +280,12 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
     const nmpc_real_t fastest_m_s = bounds->speed_m_s;
 #endif
     unsigned int active = 0U;
-#if WITH_TARGET_OBSERVER
-    const nmpc_real_t *velocity_m_s = target->velocity_m_s;
-#endif
 
     if ((is_clear == 0) || (limits_are_free(bounds, fastest_m_s, position_m, target) == 0)) {
         limited->position_m[0] = position_m[0];
         limited->position_m[1] = position_m[1];
         active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
-#if WITH_TARGET_OBSERVER
-    if (active != 0U) {
-        int axis;
-
-        for (axis = 0; axis < 2; axis++) {
-            const nmpc_sum_t rate_m_s2 =
-                rate_product(NMPC_UPDATES_PER_S, limited->velocity_m_s[axis] - bounds->velocity_m_s[axis]);
-
-            /* A jump is no acceleration. */
-            limited->acceleration_m_s2[axis] =
-                ((rate_m_s2 >= -NMPC_TARGET_LIMIT_M_S2) && (rate_m_s2 <= NMPC_TARGET_LIMIT_M_S2))
-                    ? (nmpc_real_t)rate_m_s2
-                    : (nmpc_real_t)0;
-        }
-        velocity_m_s = limited->velocity_m_s;
-    }
-    bounds->velocity_m_s[0] = velocity_m_s[0];
-    bounds->velocity_m_s[1] = velocity_m_s[1];
-#endif
 #if WITH_TRACKER
     if (active != self->limited) {
         limits_change(self, active, target);

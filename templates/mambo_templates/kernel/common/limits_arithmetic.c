@@ -175,14 +175,6 @@ static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_s * share, NMPC_SINE_BITS);
 }
-#if WITH_TARGET_OBSERVER
-
-/* The change of a velocity in an update period as an acceleration. */
-static nmpc_sum_t rate_product(nmpc_real_t updates_per_s, nmpc_real_t change_m_s)
-{
-    return NMPC_ROUNDED((nmpc_sum_t)updates_per_s * change_m_s, NMPC_RATE_SHIFT);
-}
-#endif
 #else
 typedef nmpc_real_t nmpc_square_t;
 typedef nmpc_real_t nmpc_root_t;

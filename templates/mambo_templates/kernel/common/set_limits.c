@@ -174,20 +174,15 @@ unsigned int nmpc_limits_active(const nmpc_t *self)
 {
     return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
 }
-#if WITH_TARGET_OBSERVER or WITH_TURNING
+#if WITH_TURNING
 
-/* The frame has jumped: the velocities that the law remembers change with it. */
+/* The frame has jumped: the velocity that the law remembers changes with it. */
 static void limits_shift(nmpc_bounds_t *bounds, const nmpc_real_t change_m_s[])
 {
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
-#if WITH_TARGET_OBSERVER
-        bounds->velocity_m_s[axis] = clamp(bounds->velocity_m_s[axis] + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
-#endif
-#if WITH_TURNING
         bounds->target_m_s[axis] = clamp(bounds->target_m_s[axis] + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
-#endif
     }
 }
 #endif

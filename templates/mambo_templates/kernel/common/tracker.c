@@ -1,10 +1,9 @@
 /* ---- Tracker --------------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
- * steps, which are T_s = NMPC_UPDATE_PERIOD_S apart; tau is a step of the prediction, which is T_s too with a quadratic
- * cost. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its acceleration, and J_T the
- * change of A_T from one control step to the next: the jerk. In every control step the measured acceleration M, the
- * predicted one P and the new estimates are
+ * steps, which are T_s = NMPC_UPDATE_PERIOD_S apart; tau is a step of the prediction. Along one axis, x or y, let Tv_k
+ * be the velocity of the target, A_T = tau^2 a_T its acceleration, and J_T the change of A_T from one control step to
+ * the next: the jerk. In every control step the measured acceleration M, the predicted one P and the new estimates are
  *
  *     M = (tau^2/T_s) (Tv_k - Tv_k-1)
  *     P = A_T(k-1) + J_T(k-1)
@@ -16,14 +15,6 @@
  * bounded.
  */
 
-#if WITH_DOUBTS
-/* Let q be the noise of the target's acceleration, c^2 = NMPC_NOISE_SQUARE, d = (M - P)/(c q), from -1 to 1, and r the
- * mean over 0.5 s of -d_k d_k-1 where that is more than 0. Of M - P the tracker believes the share s = 1/(1 + c^2 r):
- * noise reverses its sign from one control step to the next, a corner of the target's path does not. What is not
- * believed is forgotten: P and J_T(k-1) are multiplied by 1 - NMPC_REVERSAL_SHARE (1 - s)^2. A control step takes one
- * of Newton's steps to s, s (2 - s (1 + c^2 r)), which needs no division; s falls to a quarter of itself at most. */
-
-#endif
 /* A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
  * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are
  * 0. */
@@ -31,7 +22,7 @@
 #include "tracker.h"
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
-#if WITH_HEIGHT or WITH_LIMITS
+#if WITH_LIMITS
 NMPC_SHARED void tracker_clear(nmpc_t *self)
 #else
 static void tracker_clear(nmpc_t *self)
@@ -43,60 +34,13 @@ static void tracker_clear(nmpc_t *self)
         self->tracker.velocity_m_s[axis] = (nmpc_real_t)0;
         self->tracker.acceleration_m_step2[axis] = (nmpc_real_t)0;
         self->tracker.jerk_m_step2_update[axis] = (nmpc_real_t)0;
-#if WITH_DOUBTS
-        self->tracker.noise[axis].deviation = (nmpc_real_t)0;
-        self->tracker.noise[axis].reversal = (nmpc_real_t)0;
-        self->tracker.noise[axis].doubt = (nmpc_real_t)0;
-#endif
     }
     self->has_target = 0U;
 }
 
-#if WITH_DOUBTS
-/* Take an acceleration M into A_T and J_T, which stay within their limits, and into d, r and 1 - s. */
-NMPC_SHARED void tracker_believe(nmpc_real_t *acceleration_m_step2, nmpc_real_t *jerk_m_step2_update,
-                                 nmpc_noise_t *noise, nmpc_real_t measured_m_step2, nmpc_real_t bound_m_step2,
-                                 nmpc_real_t limit_m_step2_update)
-{
-    const nmpc_real_t predicted_m_step2 = *acceleration_m_step2 + *jerk_m_step2_update;
-    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
-    const nmpc_real_t limited_m_step2 = clamp(difference_m_step2, NMPC_DEVIATION_LIMIT_M_STEP2);
-    const nmpc_real_t latest = noise_product(NMPC_PER_DEVIATION_STEP2_M, limited_m_step2);
-    const nmpc_real_t product = factor_product(latest, noise->deviation);
-    const nmpc_real_t reversed = (product < (nmpc_real_t)0) ? -product : (nmpc_real_t)0;
-    const nmpc_real_t mean =
-        clamp(factor_product(NMPC_REVERSAL_REST, noise->reversal) + factor_product(NMPC_REVERSAL_SHARE, reversed),
-              NMPC_WHOLE);
-    const nmpc_real_t before = NMPC_WHOLE - noise->doubt;
-    const nmpc_real_t weighed = factor_product(before, mean);
-    const nmpc_real_t counted = clamp(weighed, NMPC_MOST_COUNTED);
-    const nmpc_real_t better = factor_product(before, NMPC_TWICE - (before + (NMPC_NOISE_SQUARE * counted)));
-    const nmpc_real_t least = factor_product(NMPC_LEAST_CHANGE, before);
-    const nmpc_real_t limited = (better > NMPC_WHOLE) ? NMPC_WHOLE : better;
-    const nmpc_real_t share = (limited < least) ? least : limited;
-    const nmpc_real_t doubt = NMPC_WHOLE - share;
-    const nmpc_real_t square = factor_product(doubt, doubt);
-    const nmpc_real_t kept = NMPC_WHOLE - factor_product(NMPC_REVERSAL_SHARE, square);
-    const nmpc_real_t believed_m_step2 = factor_product(difference_m_step2, NMPC_WHOLE - doubt);
-
-    noise->deviation = latest;
-    noise->reversal = mean;
-    noise->doubt = doubt;
-    *acceleration_m_step2 = clamp(
-        factor_product(predicted_m_step2, kept) + tracker_product(NMPC_TRACKER_GAIN, believed_m_step2), bound_m_step2);
-    *jerk_m_step2_update =
-        clamp(factor_product(*jerk_m_step2_update, kept) + tracker_product(NMPC_TRACKER_JERK_GAIN, believed_m_step2),
-              limit_m_step2_update);
-}
-
-#endif
 /* Take the acceleration of the target along `axis` in this control step into the estimates. */
 NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t measured_m_step2)
 {
-#if WITH_DOUBTS
-    tracker_believe(&tracker->acceleration_m_step2[axis], &tracker->jerk_m_step2_update[axis], &tracker->noise[axis],
-                    measured_m_step2, NMPC_TARGET_BOUND_M_STEP2, NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
-#else
     const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
     const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
 
@@ -105,7 +49,6 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
     tracker->jerk_m_step2_update[axis] =
         clamp(tracker->jerk_m_step2_update[axis] + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
               NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
-#endif
 }
 
 /* Take the target's velocity of this control step into the estimates. */
@@ -114,9 +57,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     nmpc_tracker_t *const tracker = &self->tracker;
     int axis;
 
-#if not WITH_HEIGHT
     NMPC_UNROLL
-#endif
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
         const int is_steady = within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);

@@ -22,10 +22,8 @@ NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
     step->limited->position_m[1] = (nmpc_real_t)0;
     step->limited->velocity_m_s[0] = (nmpc_real_t)0;
     step->limited->velocity_m_s[1] = (nmpc_real_t)0;
-#if WITH_TARGET_OBSERVER
-    step->limited->acceleration_m_s2[0] = (nmpc_real_t)0;
-    step->limited->acceleration_m_s2[1] = (nmpc_real_t)0;
-#endif
+    step->was_limited = 0;
+    step->by_limits = 0;
 }
 
 /* Predict the estimates at the next control step. */

@@ -14,50 +14,48 @@ NMPC_INLINE void command_thrust(nmpc_t *self, nmpc_step_t *step)
 }
 
 #endif
-/* Aim at the target within the limits. */
+/* Aim at the target within the limits. At a wall, and at a slow target, A_T and J_T are those of v_d. */
 NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
 {
     const nmpc_real_t position_m[2] = { step->observer.position_m[0], step->observer.position_m[1] };
+    unsigned int active;
 
-#if WITH_TARGET_OBSERVER and WITH_HEIGHT
-    step->was_limited = ((unsigned int)self->limited % NMPC_LIMIT_HEIGHT) != 0U;
-#elif WITH_TARGET_OBSERVER
-    step->was_limited = self->limited != 0U;
+#if WITH_HEIGHT
+    step->was_limited = (self->has_target != 0U) && (((unsigned int)self->limited % NMPC_LIMIT_HEIGHT) != 0U);
+#else
+    step->was_limited = (self->has_target != 0U) && (self->limited != 0U);
 #endif
-    if (limits_apply(self, position_m, step->aim, step->limited) != 0U) {
+    active = limits_apply(self, position_m, step->aim, step->limited);
+    if (active != 0U) {
+        if (((active & NMPC_LIMIT_FENCE) != 0U) || (limits_are_slow(&self->bounds, step->aim) != 0)) {
+            step->by_limits = 1;
+        }
         step->aim = step->limited;
     }
 }
 
-#if WITH_TARGET_OBSERVER
 /* Estimate how a target moves; where its velocity alone is known, the estimated one stands for it. */
 NMPC_INLINE void observe_target(nmpc_t *self, nmpc_step_t *step, const nmpc_target_t *target)
 {
-    tracker_update(self, target, step->aim, step->was_limited);
-    if ((step->aim == target) && (target->known == 0)) {
+    tracker_update(self, target);
+    if (step->aim != target) {
+        tracker_follow(&self->tracker, step->aim->velocity_m_s, step->was_limited, step->by_limits);
+    } else if (target->known == 0) {
         step->limited->position_m[0] = target->position_m[0];
         step->limited->position_m[1] = target->position_m[1];
         step->limited->velocity_m_s[0] = self->tracker.axis[0].velocity_m_s;
         step->limited->velocity_m_s[1] = self->tracker.axis[1].velocity_m_s;
         step->aim = step->limited;
+    } else {
+        /* The target is known as it is. */
     }
 }
 
-#elif WITH_TRACKER
-/* Estimate how the target moves. */
-NMPC_INLINE void track_target(nmpc_t *self, nmpc_step_t *step)
-{
-    tracker_update(self, step->aim->velocity_m_s);
-}
-
-#endif
 /* After an outage: brake by the model's velocity, and command level attitude once the model is at rest. */
 NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 {
-#if WITH_TARGET_MOTION
     tracker_clear(self);
-#endif
-#if WITH_TARGET_MOTION and WITH_HEIGHT
+#if WITH_HEIGHT
     height_clear_target(&self->height);
 #endif
 #if WITH_THRUST_VECTOR
@@ -92,16 +90,10 @@ NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
     if (step->missed == NMPC_NO_ESTIMATE) {
         end_outage(self, step);
     } else if (step->aim != NULL) {
-#if WITH_TARGET_OBSERVER
         const nmpc_target_t *const target = step->aim;
 
-#endif
         limit_target(self, step);
-#if WITH_TARGET_OBSERVER
         observe_target(self, step, target);
-#elif WITH_TRACKER
-        track_target(self, step);
-#endif
     } else {
         /* The last command holds. */
     }

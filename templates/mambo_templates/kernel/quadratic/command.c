@@ -54,11 +54,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
         error[1][axis] =
             step->observer.velocity_m_step[axis] - speed_product(NMPC_UPDATE_STEP_S, step->aim->velocity_m_s[axis]);
         error[2][axis] = observer_disturbance(&step->observer, axis);
-#if WITH_TARGET_MOTION
         error[2][axis] = error[2][axis] - self->tracker.acceleration_m_step2[axis];
-#else
-        state[axis][3] = (nmpc_real_t)0;
-#endif
 #if WITH_PREDICTED
         state[axis][4] = attitude->tilt_m_step2[axis];
 #else
@@ -72,10 +68,8 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
     for (axis = 0; axis < 3; axis++) {
         turn_to_heading(attitude, error[axis][0], error[axis][1], &state[NMPC_RIGHT][axis], &state[NMPC_FORWARD][axis]);
     }
-#if WITH_TARGET_MOTION
     turn_to_heading(attitude, self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1],
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
-#endif
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t most_m_step2 = largest_move(self, step, axis);

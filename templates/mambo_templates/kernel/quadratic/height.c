@@ -165,27 +165,6 @@ NMPC_INLINE int height_measure(nmpc_height_t *height, const nmpc_state_t *state,
     return on_ground;
 }
 
-#if WITH_TRACKER
-/* Take an acceleration of the target into the estimate of its motion. */
-NMPC_INLINE void height_track_acceleration(nmpc_height_t *height, nmpc_real_t measured_m_step2)
-{
-#if WITH_DOUBTS
-    tracker_believe(&height->target_acceleration_m_step2, &height->target_jerk_m_step2_update, &height->target_noise,
-                    measured_m_step2, NMPC_CLIMB_BOUND_M_STEP2, NMPC_CLIMB_JERK_LIMIT_M_STEP2_UPDATE);
-#else
-    const nmpc_real_t predicted_m_step2 = height->target_acceleration_m_step2 + height->target_jerk_m_step2_update;
-    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
-
-    height->target_acceleration_m_step2 =
-        tracker_product(NMPC_TRACKER_REST, predicted_m_step2) + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
-    height->target_jerk_m_step2_update =
-        shared_clamp(height->target_jerk_m_step2_update + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
-                     NMPC_CLIMB_JERK_LIMIT_M_STEP2_UPDATE);
-#endif
-}
-
-#endif
-#if WITH_TARGET_OBSERVER
 /* Take the target of this control step into the estimate of its motion. */
 NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target, int is_known)
 {
@@ -203,48 +182,14 @@ NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target
                                                target_product(NMPC_STEP_TO_STEP2_S, motion_limits[1][NMPC_MOST_JERK]));
 }
 
-#elif WITH_TRACKER
-/* Take the target of this control step into the estimate of its motion. */
-NMPC_INLINE void height_track(nmpc_height_t *height, const nmpc_target_t *target, int is_known)
-{
-    const nmpc_real_t change_m_s = target->climb_m_s - height->target_velocity_m_s;
-#if WITH_FIXED
-    /* The clamp changes nothing where it counts: it tells a proof by intervals how large the change is. */
-    const nmpc_real_t steady_m_s = clamp(change_m_s, NMPC_CLIMB_CHANGE_LIMIT_M_S);
-    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, steady_m_s);
-#else
-    const nmpc_real_t measured_m_step2 = target_product(NMPC_STEP_SQUARED_PER_UPDATE_S, change_m_s);
-#endif
-
-    if ((is_known != 0) && (within(change_m_s, NMPC_CLIMB_CHANGE_LIMIT_M_S) != 0)) {
-        height_track_acceleration(height, measured_m_step2);
-    } else {
-        height->target_jerk_m_step2_update = (nmpc_real_t)0;
-    }
-    height->target_velocity_m_s = target->climb_m_s;
-}
-
-#endif
-#if WITH_TARGET_MOTION
 /* Forget the target. */
 NMPC_INLINE void height_clear_target(nmpc_height_t *height)
 {
-#if WITH_TRACKER
-    height->target_velocity_m_s = (nmpc_real_t)0;
-#endif
     height->target_acceleration_m_step2 = (nmpc_real_t)0;
     height->target_jerk_m_step2_update = (nmpc_real_t)0;
-#if WITH_DOUBTS
-    height->target_noise.deviation = (nmpc_real_t)0;
-    height->target_noise.reversal = (nmpc_real_t)0;
-    height->target_noise.doubt = (nmpc_real_t)0;
-#endif
-#if WITH_TARGET_OBSERVER
     motion_clear(&height->target);
-#endif
 }
 
-#endif
 /* Predict the estimates at the next control step; a drone that lies on the floor stays there. */
 NMPC_INLINE void height_predict(nmpc_height_t *height, int on_ground)
 {
@@ -263,12 +208,7 @@ static void height_set_thrust(nmpc_height_t *height, nmpc_real_t thrust_m_s2)
 static void height_shift(nmpc_height_t *height, nmpc_real_t change_m, nmpc_real_t change_m_s)
 {
     axis_shift(&height->height_m, &height->velocity_m_step, change_m, speed_product(NMPC_UPDATE_STEP_S, change_m_s));
-#if WITH_TRACKER
-    height->target_velocity_m_s = clamp(height->target_velocity_m_s + change_m_s, NMPC_VELOCITY_RANGE_M_S);
-#endif
-#if WITH_TARGET_OBSERVER
     height->target.velocity_m_s = clamp(height->target.velocity_m_s + change_m_s, NMPC_VELOCITY_RANGE_M_S);
-#endif
 }
 
 /* Forget everything; the drone holds a thrust with the attitude of a command. */
@@ -289,7 +229,5 @@ static void height_reset(nmpc_height_t *height, nmpc_real_t thrust_m_s2, nmpc_re
     height->commanded_m_s2 = height->thrust_m_s2;
     height->budget_m_s2 = NMPC_THRUST_BUDGET_M_S2;
 #endif
-#if WITH_TARGET_MOTION
     height_clear_target(height);
-#endif
 }

@@ -77,17 +77,10 @@ NMPC_INLINE int height_errors(nmpc_t *self, const nmpc_target_t *target, nmpc_re
 #endif
     state[3] = (nmpc_real_t)0;
     if (target != NULL) {
-#if not WITH_TARGET_OBSERVER
-        climb_m_step = speed_product(NMPC_UPDATE_STEP_S, target->climb_m_s);
-#endif
-#if WITH_TARGET_MOTION
         height_track(height, target, (int)self->has_target);
         state[2] = state[2] - height->target_acceleration_m_step2;
         state[3] = height->target_jerk_m_step2_update;
-#endif
-#if WITH_TARGET_OBSERVER
         climb_m_step = speed_product(NMPC_UPDATE_STEP_S, height->target.velocity_m_s);
-#endif
     }
     lead_m = reach_product(NMPC_REACH_STEPS, climb_m_step);
     state[0] = confine(error_m, lead_m - up_m, lead_m + down_m);
@@ -153,14 +146,12 @@ NMPC_INLINE nmpc_real_t height_spare(const nmpc_height_t *height)
 
         spare_m_step2 = (chord_m_step2 < spare_m_step2) ? chord_m_step2 : spare_m_step2;
     }
-#if WITH_TARGET_OBSERVER
     /* Where the target's acceleration is known, so is the tilt that it takes. */
     if (height->target.memory <= (nmpc_real_t)0) {
         const nmpc_real_t known_m_step2 = factor_product(vertical_m_step2, NMPC_KNOWN_SPARE);
 
         spare_m_step2 = (spare_m_step2 < known_m_step2) ? known_m_step2 : spare_m_step2;
     }
-#endif
     return (spare_m_step2 < NMPC_LEAST_SPARE_M_STEP2) ? NMPC_LEAST_SPARE_M_STEP2 : spare_m_step2;
 }
 

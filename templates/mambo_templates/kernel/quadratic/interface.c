@@ -30,9 +30,7 @@ static void restart(nmpc_t *self, const nmpc_command_t *command)
 #if WITH_TILT_GAIN
     tilt_gain_clear(&self->tilt_gain);
 #endif
-#if WITH_TARGET_MOTION
     tracker_clear(self);
-#endif
 }
 
 void nmpc_init(nmpc_t *self)
@@ -280,12 +278,7 @@ nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], c
 #if WITH_HEIGHT
     height_shift(&self->height, position_change_m[2], velocity_change_m_s[2]);
 #endif
-#if WITH_TARGET_MOTION
     tracker_shift(&self->tracker, velocity_change_m_s);
-#endif
-#if WITH_TARGET_OBSERVER
-    limits_shift(&self->bounds, velocity_change_m_s);
-#endif
     if (within(heading_change_rad, (nmpc_real_t)0) == 0) {
         nmpc_real_t sine;
         nmpc_real_t cosine;
@@ -293,9 +286,7 @@ nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], c
         sine_cosine(heading_change_rad, &sine, &cosine);
         attitude_shift(&self->attitude, sine, cosine);
         observer_turn(&self->observer, sine, cosine);
-#if WITH_TARGET_MOTION
         tracker_turn(self, sine, cosine);
-#endif
     }
     return NMPC_OK;
 }

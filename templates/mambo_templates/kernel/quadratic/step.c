@@ -26,10 +26,10 @@ typedef struct {
     /* What rate feedback adds to the commands. */
     nmpc_real_t feedback_rad[2];
 #endif
-#if WITH_TARGET_OBSERVER
-    /* Whether a limit changed the target in the step before. */
+    /* 1 if a limit of speed, braking or place acted in the step before, else 0. */
     int was_limited;
-#endif
+    /* 1 if A_T and J_T are those of the velocity within the limits, else 0. */
+    int by_limits;
 #if WITH_HEIGHT
     /* The acceleration of a tilt over that in hover, with the next thrust; 1 over it; 1 on the floor, else 0. */
     nmpc_real_t weight;

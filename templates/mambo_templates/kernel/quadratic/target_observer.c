@@ -20,8 +20,13 @@
  *
  * A_T = w T_s a and J_T = w (T_s j + t s) + drag A_T. t is the feed-forward gain of s with which the law follows without
  * an error, less 0.025 s where j is that much ahead; w falls with the noise from 1 to 0, and is 1 with known
- * accelerations. While limits of speed, braking or place act, A_T is that of the target within them, and J_T half of its
- * change from step to step; 0 in the first step.
+ * accelerations. While limits of speed, braking or place act, the desired velocity v_d stands for the target's, and an
+ * alpha-beta filter estimates its change d and the change e of that:
+ *
+ *     x = (v_d - v_d,k-1) - (d + e),   d' = (d + e) + alpha x,   e' = e + beta x.
+ *
+ * d begins with a, e with 0; a change of more than the largest acceleration leaves d and makes e 0. At a wall, and where
+ * the target is slow, A_T = T_s d and J_T = T_s e + drag A_T.
  */
 
 #include "target_observer.h"
@@ -56,6 +61,9 @@ static void tracker_clear(nmpc_t *self)
         self->tracker.acceleration_m_step2[axis] = (nmpc_real_t)0;
         self->tracker.jerk_m_step2_update[axis] = (nmpc_real_t)0;
         motion_clear(&self->tracker.axis[axis]);
+        self->tracker.desired_m_s[axis] = (nmpc_real_t)0;
+        self->tracker.desired_acceleration[axis] = (nmpc_real_t)0;
+        self->tracker.desired_jerk[axis] = (nmpc_real_t)0;
     }
     self->has_target = 0U;
 }
@@ -99,10 +107,8 @@ NMPC_SHARED int motion_judge(nmpc_motion_t *motion, nmpc_real_t innovation, nmpc
     int judged = 1;
 
     motion->noise = (mean > NMPC_NOISE_MOST_M_S) ? NMPC_NOISE_MOST_M_S : mean;
-#if WITH_FIXED
     /* This changes nothing: it tells a proof by intervals that the mean of sizes is not less than 0. */
-    motion->noise = (motion->noise < 0) ? 0 : motion->noise;
-#endif
+    motion->noise = (motion->noise < (nmpc_real_t)0) ? (nmpc_real_t)0 : motion->noise;
     motion->innovation = innovation;
     if (within(innovation, trust) == 0) {
         if (motion->missed > (nmpc_real_t)0) {
@@ -271,51 +277,80 @@ NMPC_SHARED void motion_feed(const nmpc_motion_t *motion, int known, nmpc_real_t
     }
 }
 
-/* Take a set-point into the motion along x and y. `aim` is the target, or that within the limits, which
- * changed it in the step before, too, if `was_limited` is 1. */
-NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_target_t *target, const nmpc_target_t *aim, int was_limited)
+/* Set A_T and J_T along an axis; the jerk is without drag. */
+NMPC_INLINE void tracker_feed(nmpc_tracker_t *tracker, int axis, nmpc_real_t acceleration_m_step2,
+                              nmpc_real_t jerk_m_step2)
+{
+    const nmpc_real_t limit_m_step2 = target_product(NMPC_STEP_TO_STEP2_S, motion_limits[0][NMPC_MOST_JERK]);
+#if WITH_DRAG
+    const nmpc_real_t drag_m_step2 = factor_product(acceleration_m_step2, NMPC_TARGET_DRAG);
+
+    tracker->jerk_m_step2_update[axis] = clamp(jerk_m_step2 + drag_m_step2, limit_m_step2);
+#else
+    tracker->jerk_m_step2_update[axis] = clamp(jerk_m_step2, limit_m_step2);
+#endif
+    tracker->acceleration_m_step2[axis] = acceleration_m_step2;
+}
+
+/* Take a set-point into the motion along x and y. */
+NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_target_t *target)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
-    const nmpc_real_t jerk_limit_m_step2 = target_product(NMPC_STEP_TO_STEP2_S, motion_limits[0][NMPC_MOST_JERK]);
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         nmpc_motion_t *const motion = &tracker->axis[axis];
         nmpc_set_point_t point;
+        nmpc_real_t acceleration_m_step2;
+        nmpc_real_t jerk_m_step2;
 
         point.velocity_m_s = target->velocity_m_s[axis];
         point.acceleration_m_s2 = target->acceleration_m_s2[axis];
         point.ahead_m_s2 = target->ahead_m_s2[axis];
         point.known = target->known;
         motion_observe(motion, &point, motion_limits[0], self->has_target == 0U);
-        if (aim != target) {
-            const nmpc_real_t before_m_step2 = tracker->acceleration_m_step2[axis];
-            const nmpc_real_t change = motion_change(aim->acceleration_m_s2[axis], motion_limits[0]);
-
-            tracker->acceleration_m_step2[axis] = target_product(NMPC_STEP_TO_STEP2_S, change);
-            tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
-            if (was_limited != 0) {
-                tracker->jerk_m_step2_update[axis] =
-                    clamp(tracker_product(NMPC_HALF_SHARE, tracker->acceleration_m_step2[axis] - before_m_step2),
-                          jerk_limit_m_step2);
-            }
-        } else {
-            nmpc_real_t acceleration_m_step2;
-            nmpc_real_t jerk_m_step2;
-
-            motion_feed(motion, point.known, (point.known > 1) ? NMPC_AHEAD_SNAP_TO_JERK_S : NMPC_SNAP_TO_JERK_S,
-                        &acceleration_m_step2, &jerk_m_step2);
-#if WITH_DRAG
-            jerk_m_step2 = jerk_m_step2 + factor_product(acceleration_m_step2, NMPC_TARGET_DRAG);
-#endif
-            tracker->acceleration_m_step2[axis] = acceleration_m_step2;
-            tracker->jerk_m_step2_update[axis] = clamp(jerk_m_step2, jerk_limit_m_step2);
-        }
+        motion_feed(motion, point.known, (point.known > 1) ? NMPC_AHEAD_SNAP_TO_JERK_S : NMPC_SNAP_TO_JERK_S,
+                    &acceleration_m_step2, &jerk_m_step2);
+        tracker_feed(tracker, axis, acceleration_m_step2, jerk_m_step2);
     }
     self->has_target = 1U;
 }
 
-/* The frame has jumped: the target's velocity changes with it, and that is no acceleration. */
+/* Take in the desired velocity, while limits act. `was_limited` is 0 where it stood for no target before. */
+NMPC_SHARED void tracker_follow(nmpc_tracker_t *tracker, const nmpc_real_t velocity_m_s[2], int was_limited,
+                                int by_limits)
+{
+    const nmpc_real_t most = motion_limits[0][NMPC_MOST_ACCELERATION];
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t change = velocity_m_s[axis] - tracker->desired_m_s[axis];
+        nmpc_real_t acceleration = tracker->desired_acceleration[axis];
+        nmpc_real_t jerk = tracker->desired_jerk[axis];
+
+        if (was_limited == 0) {
+            acceleration = tracker->axis[axis].acceleration;
+            jerk = (nmpc_real_t)0;
+        } else if (within(change, most) != 0) {
+            const nmpc_real_t predicted = acceleration + jerk;
+            const nmpc_real_t difference = change - predicted;
+
+            acceleration = clamp(predicted + tracker_product(NMPC_DESIRED_GAIN, difference), most);
+            jerk = clamp(jerk + tracker_product(NMPC_DESIRED_JERK_GAIN, difference), motion_limits[0][NMPC_MOST_JERK]);
+        } else {
+            jerk = (nmpc_real_t)0;
+        }
+        tracker->desired_m_s[axis] = velocity_m_s[axis];
+        tracker->desired_acceleration[axis] = acceleration;
+        tracker->desired_jerk[axis] = jerk;
+        if (by_limits != 0) {
+            tracker_feed(tracker, axis, target_product(NMPC_STEP_TO_STEP2_S, acceleration),
+                         target_product(NMPC_STEP_TO_STEP2_S, jerk));
+        }
+    }
+}
+
+/* The frame has jumped: velocities change with it, and that is no acceleration. */
 static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[])
 {
     int axis;
@@ -324,6 +359,7 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
         nmpc_motion_t *const motion = &tracker->axis[axis];
 
         motion->velocity_m_s = clamp(motion->velocity_m_s + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
+        tracker->desired_m_s[axis] = clamp(tracker->desired_m_s[axis] + change_m_s[axis], NMPC_VELOCITY_RANGE_M_S);
     }
 }
 
@@ -340,7 +376,7 @@ static void turn_components(nmpc_real_t *x, nmpc_real_t *y, nmpc_real_t sine, nm
 }
 
 /* The frame has turned, and the target's motion with it, but for its velocity: a caller turns the target about the
- * drone. The next velocity is taken as it is. */
+ * drone. The target's next velocity is taken as it is. */
 static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
 {
     nmpc_tracker_t *const tracker = &self->tracker;
@@ -354,6 +390,11 @@ static void tracker_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
     turn_components(&x->acceleration, &y->acceleration, sine, cosine, motion_limits[0][NMPC_MOST_ACCELERATION]);
     turn_components(&x->jerk, &y->jerk, sine, cosine, motion_limits[0][NMPC_MOST_JERK]);
     turn_components(&x->snap, &y->snap, sine, cosine, motion_limits[0][NMPC_MOST_KNOWN_SNAP]);
+    turn_components(&tracker->desired_m_s[0], &tracker->desired_m_s[1], sine, cosine, NMPC_VELOCITY_RANGE_M_S);
+    turn_components(&tracker->desired_acceleration[0], &tracker->desired_acceleration[1], sine, cosine,
+                    motion_limits[0][NMPC_MOST_ACCELERATION]);
+    turn_components(&tracker->desired_jerk[0], &tracker->desired_jerk[1], sine, cosine,
+                    motion_limits[0][NMPC_MOST_JERK]);
     x->innovation = (nmpc_real_t)0;
     y->innovation = (nmpc_real_t)0;
     x->missed = NMPC_HAS_TURNED;
