@@ -35,9 +35,7 @@ from mambo_sil.flight.controllers.controller_library import generator_digest
 from mambo_sil.flight.names import (
     ALTITUDE_NAMES,
     SENSORS_KINDS,
-    TARGET_ACCELERATIONS,
     SensorsKind,
-    TargetAcceleration,
 )
 from mambo_sil.model.derive.derived_flight import chosen_text
 
@@ -79,8 +77,7 @@ class Controller:
     ) -> Self:
         """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
 
-        sensors:      what measures, in place of the sensors in the file; "true" for the state of a simulator.
-        acceleration: "observed" as `design --acceleration observed` derives it, with more tilt.
+        sensors: what measures, in place of the sensors in the file; "true" for the state of a simulator.
 
         Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
         InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
@@ -89,11 +86,7 @@ class Controller:
         if sensors is not None:
             require_choice("sensors", sensors, SENSORS_KINDS)
             drone = drone.with_sensors(sensors)
-        wanted: list[TargetAcceleration] = [
-            name for name in TARGET_ACCELERATIONS if name == options.get("acceleration")
-        ]
-        text = chosen_text(drone, drone.name, acceleration=wanted[0] if wanted else "tracked")
-        settings = controller_toml.parse(text, f"settings for {drone.name}")
+        settings = controller_toml.parse(chosen_text(drone, drone.name), f"settings for {drone.name}")
         return cls._made(settings, n, drone, options)
 
     @classmethod
@@ -322,7 +315,7 @@ class Controller:
 
     def _aims(self, target: TargetState) -> list[FloatArray]:
         """Return the columns of targets; raises ArgumentError if the controller is not told enough."""
-        if self.settings.target.is_observed and self._method.has_height:
+        if self._method.has_height:
             for name in ("acceleration_m_s2", "ahead_m_s2"):
                 values = getattr(target, name)
                 if values is not None and values.shape[-1] != 3:

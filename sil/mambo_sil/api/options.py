@@ -1,6 +1,6 @@
 """What a program changes of a controller's settings when it makes one: arguments, checked like the keys."""
 
-from typing import Any, Final, Literal, TypedDict
+from typing import Any, Final, TypedDict
 
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import controller_toml
@@ -15,8 +15,6 @@ class ControllerOptions(TypedDict, total=False):
 
     age_s: float
     """Age of the measured position and velocity (`observer.age_s`): 0 for the true state of a simulator."""
-    acceleration: Literal["none", "tracked", "observed"]
-    """What the controller knows of the target's acceleration (`target.acceleration`)."""
     tilt_rad: float
     """Largest command (`limits.tilt_rad`); a smaller one without `braking_m_s2` lowers that by as much."""
     speed_m_s: float
@@ -43,7 +41,6 @@ class ControllerOptions(TypedDict, total=False):
 
 KEYS: Final = {
     "age_s": "observer.age_s",
-    "acceleration": "target.acceleration",
     "tilt_rad": "limits.tilt_rad",
     "speed_m_s": "limits.speed_m_s",
     "braking_m_s2": "limits.braking_m_s2",

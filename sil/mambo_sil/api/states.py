@@ -95,8 +95,8 @@ class TargetState:
     velocity_m_s: FloatArray
     """Along the same axes (..., 2) or (..., 3)."""
     acceleration_m_s2: FloatArray | None
-    """Along the same axes (..., 2) or (..., 3), or None if it is not known. Read with `target.acceleration
-    = "observed"`, z of it with `[height]`; z is read by the altitude loop too, if there."""
+    """Along the same axes (..., 2) or (..., 3), or None if it is not known. Read with a quadratic cost, z
+    of it with `[height]`; z is read by the altitude loop too, if there."""
     ahead_m_s2: FloatArray | None
     """The acceleration 0.05 s later, or None if it is not known. Read likewise."""
     yaw_rad: FloatArray | None

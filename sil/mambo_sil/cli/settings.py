@@ -31,7 +31,7 @@ from mambo_sil.cli.options import (
 from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.errors import FlightError, StudyError
-from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind, TargetAcceleration
+from mambo_sil.flight.names import SENSORS_KINDS, SensorsKind
 from mambo_sil.results.folders import SUMMARY, create_folder, lock, new_results
 from mambo_sil.results.terminal import sentence, table
 
@@ -189,14 +189,6 @@ def design(
             "What measures, in place of the file's sensors: true, mocap, flow-deck, autopilot, mambo.",
         ),
     ] = None,
-    acceleration: Annotated[
-        TargetAcceleration,
-        typer.Option(
-            help="What the controller knows of the target's acceleration: tracked, what its velocity shows; "
-            "observed, what each target knows, noisy or not, and flies quick curves.",
-            metavar="NAME",
-        ),
-    ] = "tracked",
     firm: Annotated[
         bool,
         typer.Option(
@@ -219,7 +211,7 @@ def design(
     if sensors is not None:
         drone = drone.with_sensors(sensors)
     with progress_bar("deriving"):
-        chosen = choose_settings(drone, source, _relative(vehicle, output), acceleration, firm=firm)
+        chosen = choose_settings(drone, source, _relative(vehicle, output), firm=firm)
     settings = controller_toml.parse(chosen.text, f"settings for vehicle {source}")
     if write_file(chosen.text, output, force=force):
         name = echo(str(output))
@@ -231,7 +223,7 @@ def design(
     typer.echo(sentence(reach_words(settings)), err=True)
     calm = None
     if firm:
-        calm = controller_toml.parse(choose_settings(drone, source, None, acceleration).text, source)
+        calm = controller_toml.parse(choose_settings(drone, source).text, source)
     with progress_bar("flying") as bar:
         said, good = _judgement(settings, calm, drone, bar)
     for line in said:

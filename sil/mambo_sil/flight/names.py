@@ -30,14 +30,11 @@ ControllerName = Literal["nmpc", PdName, "reference"]
 AltitudeName = Literal["stock", "feedforward", "pid"]
 """The loop that holds the height: the vehicle's own, that with feed-forward of the target's climb and
 acceleration and compensation of the tilt, or a PID with these."""
-TargetAcceleration = Literal["tracked", "observed"]
-"""What a controller that is derived knows of its target's acceleration: target.acceleration."""
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 
 STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_KINDS: Final[tuple[SensorsKind, ...]] = get_args(SensorsKind)
-TARGET_ACCELERATIONS: Final[tuple[TargetAcceleration, ...]] = get_args(TargetAcceleration)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)

@@ -410,7 +410,7 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
     thrust = np.clip(rng.uniform(8, 12, n), low, high)
-    if settings.target.is_observed:
+    if method.target_observer is not None:
         accelerations = rng.uniform(-0.5, 0.5, (n, 2)) * target_limit_m_s2(settings)
         target = np.concatenate([target, accelerations], axis=1)
     if not method.has_height:
@@ -418,7 +418,7 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
         return StepRows(method).join(StepInputs(state, target, thrust))
     own = rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
     goal = own + 0.1 * rng.uniform(-1, 1, (n, 2)) * scale[[0, 2]]
-    climbs = rng.uniform(-1, 1, (n, int(settings.target.is_observed)))
+    climbs = rng.uniform(-1, 1, (n, 1))
     state = np.concatenate([state, own, np.zeros((n, 1))], axis=1)
     target = np.concatenate([target, goal, climbs], axis=1)
     state, target = completed(method, "state", state, rng), completed(method, "target", target, rng)

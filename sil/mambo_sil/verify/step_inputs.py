@@ -139,9 +139,10 @@ def completed(method: Method, record: str, known: Array, rng: np.random.Generato
     whole[:, there] = known
     for one in (one for one in numbers if one.row.member not in _DRAWN):
         if one.row.kind == WHOLE:
-            most = MOST_KNOWN + 1 if one.row.draw is COUNT else 1
-            fractions = np.where(rng.random(len(known)) < 0.05, 0.5, 0.0)
-            whole[:, one.column] = rng.integers(most + 1, size=len(known)) + fractions
+            most = MOST_KNOWN if one.row.draw is COUNT else 1
+            is_special = rng.random(len(known)) < 0.05
+            special = rng.choice([0.5, most + 1.0], len(known))
+            whole[:, one.column] = np.where(is_special, special, rng.integers(most + 1, size=len(known)))
         else:
             size = one.row.draw.largest if one.row.draw is not None else None
             whole[:, one.column] = rng.uniform(-1, 1, len(known)) * (size or 1.0)

@@ -20,11 +20,11 @@ from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.flown_settings import FlownSettings
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.metrics import height_error_m
-from mambo_sil.flight.names import SENSORS_OF, SensorsName, TargetAcceleration
-from mambo_sil.flight.scenario import choose_sensors
+from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.flight.trajectories import Circle, Hover, Trajectory
-from mambo_sil.model.derive.derived_settings import controller_text, wants_exact, why_not_exact
+from mambo_sil.flight.trajectories import Hover, Trajectory
+from mambo_sil.model.derive.derived_settings import EXACT_TILT_SHARES, controller_text, wants_exact
 
 DURATION_S: Final = 10.0
 JUDGED_S: Final = 5.0
@@ -41,7 +41,8 @@ SWINGING_RAD: Final = 0.15
 """Rms of a tilt that oscillates: 0.02 is the most of shipped drones, 0.07 that with 2 cm of noise."""
 QUICK_CIRCLE: Final = 1.2
 """Rate of a circle over the one that takes the whole tilt limit."""
-SLOWER_ROTORS: Final = 1.5
+SLOWER_ROTORS, OTHER_MASS, DRAWN = 1.5, 0.1, 16
+"""How much slower the rotors on that circle are, what the mass may differ by, and how many drones fly it."""
 LOST_HEIGHT_M: Final = 1.0
 
 PUSHES_M_S2: Final = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0)
@@ -59,7 +60,7 @@ SWINGING_M_S: Final = 0.2
 
 @dataclass(frozen=True)
 class ChosenSettings:
-    """A controller.toml, and why it has small angles where the exact tilt was asked for or is of use."""
+    """A controller.toml, and why it has small angles where the exact tilt is of use."""
 
     text: str
     small_angles: str | None
@@ -127,10 +128,10 @@ def quick_rate_rad_s(tilt_rad: float) -> float:
 
 
 def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
-    """Return whether a drone with slower rotors survives a circle that asks for more than its tilt limit.
+    """Return whether drones with slower rotors survive a circle that asks for more than their tilt limit.
 
-    Lost is a drone whose height is a metre off, as that of one that lies on the ground is.
-    Raises BuildError, CacheError.
+    Masses, headings and sensor noise are drawn. Lost is a drone whose height is a metre off, as that of one
+    that lies on the ground is. Raises BuildError, CacheError.
     """
     parts = {name: getattr(drone, name) for name in ("rotors", "thrust")}
     slower = {
@@ -138,8 +139,23 @@ def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
         for name, part in parts.items()
         if part is not None
     }
-    circle = Circle(1.0, quick_rate_rad_s(settings.limits.tilt_rad))
-    trace = _flown(settings, drone.model_copy(update=slower), circle, Offset())
+    rng = np.random.default_rng(0)
+    circles = [
+        Scenario(
+            vehicle=drone.model_copy(update=slower),
+            seed=seed,
+            trajectory="circle",
+            size_m=1.0,
+            rate_rad_s=quick_rate_rad_s(settings.limits.tilt_rad),
+            duration_s=DURATION_S,
+            yaw_rad=rng.uniform(0.0, 2.0 * math.pi),
+            mass_kg=drone.body.mass_kg * rng.uniform(1.0 - OTHER_MASS, 1.0 + OTHER_MASS),
+            sensors=_own_sensors(drone),
+        )
+        for seed in range(DRAWN)
+    ]
+    flight = flight_of(circles, settings.horizon.update_period_s)
+    trace = fly(flight, CompiledController(settings, DRAWN))
     return bool((np.abs(height_error_m(trace)) < LOST_HEIGHT_M).all())
 
 
@@ -200,42 +216,32 @@ def _target_m(trace: Trace) -> FloatArray:
 
 
 def choose_settings(
-    drone: VehicleFile,
-    source: str,
-    vehicle: str | None = None,
-    acceleration: TargetAcceleration = "tracked",
-    *,
-    firm: bool = False,
+    drone: VehicleFile, source: str, vehicle: str | None = None, *, firm: bool = False
 ) -> ChosenSettings:
     """Return the controller.toml that `design` writes: see `controller_text`.
 
-    With the exact thrust vector if it is of use, and the drone survives a circle that is too quick for it.
-    Small angles stay without a compiler.
+    With the exact thrust vector if it is of use, and the largest tilt limit with which drones survive a
+    circle that is too quick for it. Small angles stay without a compiler.
     """
-    plain = controller_text(drone, source, vehicle, acceleration=acceleration, firm=firm)
-    if not wants_exact(drone, acceleration):
-        why = None if acceleration == "tracked" else why_not_exact(drone)
-        return ChosenSettings(plain, why)
-    exact = controller_text(drone, source, vehicle, exact=True, acceleration=acceleration, firm=firm)
-    settings = controller_toml.parse(exact, source)
-    try:
-        if flies_quick_circle(settings, drone):
-            return ChosenSettings(exact, None)
-    except BuildError:
-        return ChosenSettings(plain, "no compiler: not flown with the exact tilt")
+    small_angles = controller_text(drone, source, vehicle, firm=firm)
+    if not wants_exact(drone):
+        return ChosenSettings(small_angles, None)
+    for share in EXACT_TILT_SHARES:
+        exact = controller_text(drone, source, vehicle, exact_share=share, firm=firm)
+        settings = controller_toml.parse(exact, source)
+        try:
+            if flies_quick_circle(settings, drone):
+                return ChosenSettings(exact, None)
+        except BuildError:
+            return ChosenSettings(small_angles, "no compiler: not flown with the exact tilt")
     rate_rad_s = quick_rate_rad_s(settings.limits.tilt_rad)
     why = (
         f"with the exact tilt, up to {settings.limits.tilt_rad:g} rad, it is lost on a circle of 1 m at "
         f"{rate_rad_s:.2g} rad/s with rotors {SLOWER_ROTORS:g} times slower"
     )
-    return ChosenSettings(plain, why)
+    return ChosenSettings(small_angles, why)
 
 
-def chosen_text(
-    drone: VehicleFile,
-    source: str,
-    vehicle: str | None = None,
-    acceleration: TargetAcceleration = "tracked",
-) -> str:
+def chosen_text(drone: VehicleFile, source: str, vehicle: str | None = None) -> str:
     """Return the text alone that `choose_settings` returns."""
-    return choose_settings(drone, source, vehicle, acceleration).text
+    return choose_settings(drone, source, vehicle).text

@@ -22,7 +22,6 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MocapSensors,
     TrueState,
 )
-from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.reach import tilted_m_s2
 from mambo_sil.model.derive.step_response import fit_steps
 
@@ -40,16 +39,10 @@ QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
 LEAST_TILT_RAD = 0.02
 """With less a controller can hardly brake: settings want 0.125 m/s^2."""
-TILT_SHARE, OBSERVED_TILT_SHARE = 0.5, 0.7
-"""Tilt limit over the tilt at which the largest thrust still carries the weight: for a target that is
-tracked, and with the exact tilt for one that is observed."""
-EXACT_THRUST: Final = 2.5
-"""Largest thrust over the weight from which on a larger tilt is worth its trigonometry."""
-ACCELERATIONS: Final[dict[TargetAcceleration, str]] = {
-    "tracked": "Removes most of the tracking error on curves",
-    "observed": "Each target says what it knows, and an observer finds the rest, with noise too",
-}
-"""Why the settings take the target's acceleration from there."""
+TILT_SHARE: Final = 0.5
+"""With small angles, tilt limit over the tilt at which the largest thrust still carries the weight."""
+EXACT_TILT_SHARES: Final = (0.7, 0.6, 0.5)
+"""The same with the exact tilt, the best first: a flight chooses."""
 
 DEFAULT_DISTURBANCE_M_S3: Final = 0.3
 QUICK_DISTURBANCE_M_S3: Final = 3.0
@@ -93,46 +86,29 @@ class Derived:
     reason: str
 
 
-def wants_exact(drone: VehicleFile, acceleration: TargetAcceleration = "tracked") -> bool:
-    """Return whether more tilt than small angles allow is of use, by the thrust or by what the target knows.
+def wants_exact(drone: VehicleFile) -> bool:
+    """Return whether more tilt than small angles allow is of use.
 
-    Not without a height, nor behind the optical flow of a Mambo.
+    Not without a height, which a larger tilt takes, nor behind the optical flow of a Mambo, which drifts.
     """
-    useful = acceleration != "tracked" or drone.largest_thrust_n / drone.weight_n >= EXACT_THRUST
-    return useful and any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
+    return any(_height(drone)) and not isinstance(drone.sensors, MamboSensors)
 
 
-def why_not_exact(drone: VehicleFile) -> str:
-    """Return why a larger tilt is of no use to a drone whose target is observed."""
-    if isinstance(drone.sensors, MamboSensors):
-        return "the optical flow drifts in larger tilts"
-    return "the settings do not hold the height, which a larger tilt takes"
-
-
-def derive(
-    drone: VehicleFile,
-    *,
-    exact: bool = False,
-    acceleration: TargetAcceleration = "tracked",
-    firm: bool = False,
-) -> list[Derived]:
+def derive(drone: VehicleFile, *, exact_share: float | None = None, firm: bool = False) -> list[Derived]:
     """Return the settings for a drone that differ from the defaults, section by section.
 
-    exact:        with the exact thrust vector, and a tilt limit without the bound of small angles.
-    acceleration: what is known of the target's acceleration.
-    firm:         with quicker answers to errors and pushes, and commands that change more.
+    exact_share: tilt limit over the possible tilt, with the exact thrust vector; None: with small angles.
+    firm:        with quicker answers to errors and pushes, and commands that change more.
     """
     attitude = list(_attitude(drone))
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
-    share = TILT_SHARE if acceleration == "tracked" or not exact else OBSERVED_TILT_SHARE
-    tilt = _tilt_limit(drone, share, exact=exact)
+    tilt = _tilt_limit(drone, exact_share)
     return [
         *_horizon(drone),
         *attitude,
         Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
         Derived("model", "attitude", "predicted", "No quick loop through the measured attitude"),
-        *([_exact_tilt(drone)] if exact else []),
-        *_target(acceleration),
+        *([] if exact_share is None else [_exact_tilt(drone)]),
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0, firm=firm),
         *(_firmly(_observer(drone)) if firm else _observer(drone)),
@@ -149,14 +125,13 @@ def controller_text(
     source: str,
     vehicle: str | None = None,
     *,
-    exact: bool = False,
-    acceleration: TargetAcceleration = "tracked",
+    exact_share: float | None = None,
     firm: bool = False,
 ) -> str:
     """Return a controller.toml for the drone of `source`, with the reason of each value as a comment.
 
     vehicle: what the key `vehicle` names, for commands that fly the settings; None leaves it out.
-    exact, acceleration, firm: as for `derive`.
+    exact_share, firm: as for `derive`.
     """
     lines = [
         comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
@@ -169,7 +144,7 @@ def controller_text(
         ]
         lines += [f"{VEHICLE} = {json.dumps(vehicle, ensure_ascii=False)}"]
     section = ""
-    for each in derive(drone, exact=exact, acceleration=acceleration, firm=firm):
+    for each in derive(drone, exact_share=exact_share, firm=firm):
         if each.section != section:
             section = each.section
             lines += ["", f"[{section}]"]
@@ -218,11 +193,6 @@ def _exact_tilt(drone: VehicleFile) -> Derived:
     ratio = drone.largest_thrust_n / drone.weight_n
     words = f"The thrust, {ratio:.3g} times the weight, carries more tilt than small angles are good for"
     return Derived("model", "tilt", "exact", words)
-
-
-def _target(acceleration: TargetAcceleration) -> Iterator[Derived]:
-    """Yield what is known of the target's acceleration."""
-    yield Derived("target", "acceleration", acceleration, ACCELERATIONS[acceleration])
 
 
 def _response(slowness_s: float, *, firm: bool) -> Derived:
@@ -329,16 +299,17 @@ def _limits(drone: VehicleFile, tilt: Derived) -> Iterator[Derived]:
         yield Derived("limits", "braking_m_s2", braking_m_s2, words)
 
 
-def _tilt_limit(drone: VehicleFile, share: float, *, exact: bool) -> Derived:
+def _tilt_limit(drone: VehicleFile, exact_share: float | None) -> Derived:
     """Return a share of the tilt at which the largest thrust carries the weight, as far as angles may be."""
     ratio = drone.largest_thrust_n / drone.weight_n
+    share = TILT_SHARE if exact_share is None else exact_share
     tilt_rad = share * math.acos(1.0 / ratio)
-    part = "Half" if share == TILT_SHARE else f"{share:g} of"
+    part = "Half" if share == 0.5 else f"{share:g} of"
     words = f"{part} the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
     most_rad, why = MOST_TILT_RAD, "the model takes a tilt for its tangent"
     if isinstance(drone.sensors, MamboSensors):
         most_rad, why = MOST_TILT_BY_FLOW_RAD, "the optical flow drifts in larger tilts"
-    if tilt_rad > most_rad and not exact:
+    if tilt_rad > most_rad and exact_share is None:
         tilt_rad, words = most_rad, f"{words}; at most {most_rad:g}, since {why}"
     return Derived("limits", "tilt_rad", _round(max(tilt_rad, LEAST_TILT_RAD)), words)
 

@@ -90,7 +90,7 @@ _OBSERVED: Final[dict[str, tuple[str, float]]] = {
     "target_climb_ahead_m_s2": ("target_climb_ahead", 1.0),
     "target_known": ("target_known", 1.0),
 }
-"""What a module with target.acceleration = "observed" logs beside."""
+"""What a module logs of what its targets know."""
 _PARAMETERS: Final = "MC_NMPC_"
 """How the names of the module's parameters begin."""
 _DAMAGED: Final = "the log is damaged, or of another version; log another flight"

@@ -39,7 +39,6 @@ DEFAULT_SEARCH: Final[dict[str, dict[str, dict[str, Any]]]] = {
         },
     },
     "quadratic": {
-        "target": {"tracker_gain": {"uniform": [0.2, 0.8]}},
         "cost": {"response_time_s": {"uniform": [0.15, 0.3]}},
         "observer": {
             "disturbance_noise": {"log_uniform": [0.03, 3.0]},
