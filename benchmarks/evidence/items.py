@@ -233,7 +233,7 @@ ITEMS: Final = (
     Item(
         name="fast",
         commands=(f"python -m benchmarks.flights.fast {RESULTS}/fast/pictures",),
-        controllers=("design crazyflie", "design crazyflie --acceleration observed"),
+        controllers=("design crazyflie",),
         paths=(*_FLIGHT, "benchmarks/flights/fast.py", _STYLE),
         read=read_printed,
         tables={"fast": printed},
@@ -316,7 +316,7 @@ ITEMS: Final = (
     Item(
         name="link",
         commands=(f"python -m benchmarks.flights.link {RESULTS}/link/link",),
-        controllers=(f"design {_HERE}/link-drone.toml --acceleration observed",),
+        controllers=(f"design {_HERE}/link-drone.toml",),
         paths=(
             *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/link", "sil/mambo_sil/model/derive"),
             *("benchmarks/flights/link.py", "benchmarks/flights/wire.py", f"{_HERE}/link-drone.toml"),
@@ -368,9 +368,7 @@ ITEMS: Final = (
         name="quick",
         commands=(f"python -m benchmarks.simulators quick {RESULTS}/quick/quick",),
         controllers=tuple(
-            f"design {drone}{words}"
-            for drone in ("crazyflie-l250", "crazyflie-brushless", "x500", "hummingbird")
-            for words in ("", " --acceleration observed")
+            f"design {drone}" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500", "hummingbird")
         ),
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
         read=read_figures("quick"),

@@ -37,15 +37,14 @@ def plain_c(source: str) -> str:
 
 
 def _settings(source: str) -> Settings:
-    """Return the settings of a preset, a file, or `design DRONE [--sensors KIND] [--acceleration NAME]`."""
+    """Return the settings of a preset, a file, or `design DRONE [--sensors KIND]`."""
     if source.startswith(_DESIGN):
         name, *words = source.removeprefix(_DESIGN).split()
         options: dict[str, Any] = dict(zip(words[::2], words[1::2], strict=True))
         drone = vehicle_toml.load(name)
         if "--sensors" in options:
             drone = drone.with_sensors(options["--sensors"])
-        acceleration = options.get("--acceleration", "tracked")
-        return parse(chosen_text(drone, name, acceleration=acceleration), source)
+        return parse(chosen_text(drone, name), source)
     return presets.load(source if source in presets.names() else str(ROOT / source))
 
 
@@ -53,8 +52,8 @@ def _settings(source: str) -> Settings:
 def generated(controller: str) -> str:
     """Return update period and C of settings, without their names.
 
-    `controller` is a preset, a file, or `design DRONE [--sensors KIND] [--acceleration NAME]`, with or
-    without `--scalar TYPE`.
+    `controller` is a preset, a file, or `design DRONE [--sensors KIND]`, with or without
+    `--scalar TYPE`.
     """
     source, _, scalar = controller.partition(" --scalar ")
     settings = _settings(source)

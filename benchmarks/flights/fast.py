@@ -28,7 +28,7 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import height_error_m, measure
-from mambo_sil.flight.names import CurveName, TargetAcceleration
+from mambo_sil.flight.names import CurveName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.results.pictures import save
@@ -68,19 +68,16 @@ CASES: Final = (
 
 @dataclass(frozen=True)
 class Sender:
-    """What flies: the name of settings, and what the program knows of its targets."""
+    """What a program knows of its targets."""
 
     words: str
-    settings: str
     known: int
 
 
 SENDERS: Final = (
-    Sender("tracked", "tracked", 0),
-    Sender("tracked, exact tilt", "tracked, exact tilt", 0),
-    Sender("observed: velocity", "observed", 0),
-    Sender("observed: acceleration", "observed", 1),
-    Sender("observed: one ahead", "observed", 2),
+    Sender("velocity", 0),
+    Sender("acceleration", 1),
+    Sender("one ahead", 2),
 )
 NOISES_M_S: Final = (0.01, 0.04)
 ACCELERATION_NOISE_M_S2: Final = 0.1
@@ -116,19 +113,9 @@ class Sent(Flight):
         return sent
 
 
-def settings() -> dict[str, Settings]:
-    """Return the settings that are compared: those of `design`, and tracked with the exact tilt, by name."""
-
-    def derived(acceleration: TargetAcceleration) -> Settings:
-        text = chosen_text(DRONE, "crazyflie", acceleration=acceleration)
-        return controller_toml.parse(text, "derived")
-
-    observed = derived("observed")
-    return {
-        "tracked": derived("tracked"),
-        "tracked, exact tilt": controller_toml.with_option(observed, "target.acceleration", "tracked"),
-        "observed": observed,
-    }
+def settings() -> Settings:
+    """Return the settings of `design`."""
+    return controller_toml.parse(chosen_text(DRONE, "crazyflie"), "derived")
 
 
 def drawn(case: QuickFlight, seed: int) -> Flight:
@@ -160,6 +147,12 @@ def drawn(case: QuickFlight, seed: int) -> Flight:
     return flight_of(flights, 0.01)
 
 
+def sent(flight: Flight, known: int, noise: tuple[float, float] = (0.0, 0.0)) -> Sent:
+    """Return flights with what their program knows, and with noise in m/s and m/s^2."""
+    values = {field.name: getattr(flight, field.name) for field in fields(flight)}
+    return Sent(**values, known=known, noise_m_s=noise[0], noise_m_s2=noise[1])
+
+
 def cell(case: QuickFlight, chosen: Settings, known: int, noise: tuple[float, float]) -> str:
     """Return IAE, median and 95 %, in m s; change of the commands, in rad; height, in m; and crashes.
 
@@ -168,9 +161,8 @@ def cell(case: QuickFlight, chosen: Settings, known: int, noise: tuple[float, fl
     iae, change, lost, crashes = [], [], [], 0
     for seed in SEEDS:
         flight = drawn(case, seed)
-        values = {field.name: getattr(flight, field.name) for field in fields(flight)}
-        sent = Sent(**values, known=known, noise_m_s=noise[0], noise_m_s2=noise[1])
-        trace = replace(fly(sent, CompiledController(chosen, DRONES)), target=flight.traced_targets)
+        trace = fly(sent(flight, known, noise), CompiledController(chosen, DRONES))
+        trace = replace(trace, target=flight.traced_targets)
         crashed = detect_crashes(trace, DRONE)
         crashes += int(crashed.sum())
         iae.append(np.where(crashed, np.inf, measure(trace).iae_m_s))
@@ -185,7 +177,7 @@ def cell(case: QuickFlight, chosen: Settings, known: int, noise: tuple[float, fl
 
 def rows() -> Iterator[dict[str, str]]:
     """Fly everything and yield the rows of the table, those with noise last."""
-    compared, acceleration = settings(), f"{ACCELERATION_NOISE_M_S2:g} m/s² in the acceleration"
+    chosen, acceleration = settings(), f"{ACCELERATION_NOISE_M_S2:g} m/s² in the acceleration"
     noisy = [(f"{1e3 * size:g} mm/s", (size, 0.0)) for size in NOISES_M_S]
     noisy += [(acceleration, (0.0, ACCELERATION_NOISE_M_S2))]
     flown = [(case, case.words, (0.0, 0.0)) for case in CASES]
@@ -194,27 +186,26 @@ def rows() -> Iterator[dict[str, str]]:
         yield {
             "flight": words,
             **{
-                one.words: "-"
-                if noise[1] and not one.known
-                else cell(case, compared[one.settings], one.known, noise)
+                one.words: "-" if noise[1] and not one.known else cell(case, chosen, one.known, noise)
                 for one in SENDERS
             },
         }
 
 
 def draw_eight(stem: Path) -> None:
-    """Draw the eight at 1.2 rad/s as flown with settings for a tracked target and for an observed one."""
-    compared, flight = settings(), drawn(CASES[2], SEEDS[0])
+    """Draw the eight at 1.2 rad/s as flown by who knows least of its targets, and by who knows most."""
+    chosen, flight = settings(), drawn(CASES[2], SEEDS[0])
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 2.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, name, colour in zip(panels, ("tracked", "observed"), (VERMILION, BLUE), strict=True):
-            trace = fly(flight, CompiledController(compared[name], DRONES))
+        senders = SENDERS[0], SENDERS[-1]
+        for axes, sender, colour in zip(panels, senders, (VERMILION, BLUE), strict=True):
+            trace = fly(sent(flight, sender.known), CompiledController(chosen, DRONES))
             late = trace.time_s > DURATION_S / 2.0
             target = trace.target[late, 0]
             axes.plot(target[:, 0], target[:, 1], color=TARGET_COLOUR, linewidth=BROAD, label="target")
             axes.plot(*trace.position_m[late, 0, :2].T, color=colour, label="drone")
-            axes.set(xlabel="x, m", aspect="equal", title=name)
+            axes.set(xlabel="x, m", aspect="equal", title=sender.words)
         panels[0].set_ylabel("y, m")
         save(figure, stem)
 

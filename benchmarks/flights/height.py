@@ -43,6 +43,7 @@ from mambo_sil.flight.names import AltitudeName
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Circle, Hover, InSpace, PositionStep, Trajectory
+from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.model.derive.derived_settings import controller_text
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, BROAD, PAGE_INCHES, TARGET, VERMILION, style
@@ -105,8 +106,9 @@ class AppTakeOff:
 
 
 def settings_of(*, height: bool) -> Settings:
-    """Return the settings that `design` derives, or the same without a height."""
-    settings = controller_toml.parse(controller_text(DRONE, "crazyflie"), "derived")
+    """Return the settings that `design` derives, or with small angles and without a height."""
+    text = chosen_text(DRONE, "crazyflie") if height else controller_text(DRONE, "crazyflie")
+    settings = controller_toml.parse(text, "derived")
     return settings if height else _without_height(settings)
 
 

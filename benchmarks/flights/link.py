@@ -4,7 +4,7 @@
 
 writes figures.json. Each flight is flown by both autopilots at several headings; a figure is the worst of
 them. The drone is `link-drone.toml`, whose state the autopilot knows without noise; its settings are those
-that `design --acceleration observed` derives.
+that `design` derives.
 """
 
 import json
@@ -104,7 +104,7 @@ def fly(
     frame: SteadyFrame | None = None,
 ) -> WiredFlight:
     """Fly a course from the ground to the ground; `happens` is called with the time since the take-over."""
-    text = chosen_text(vehicle_toml.read(DRONE), DRONE.name, acceleration="observed")
+    text = chosen_text(vehicle_toml.read(DRONE), DRONE.name)
     settings = controller_toml.parse(text, DRONE.name)
     flown, begun_s = WiredFlight(), math.inf
     link = WiredLink(stack, drone, Condition(yaw_rad=heading_rad))

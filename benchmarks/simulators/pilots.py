@@ -14,7 +14,6 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 
@@ -64,13 +63,11 @@ class Designed:
     """What `design` derives from a drone: for its sensors through noise, else for the true state."""
 
     drone: VehicleFile
-    acceleration: TargetAcceleration = "tracked"
 
     def controller(self, drones: int, *, noisy: bool) -> Controller:
         """Return the C for new drones."""
         drone = self.drone if noisy else self.drone.with_sensors("true")
-        text = chosen_text(drone, drone.name, acceleration=self.acceleration)
-        return Controller(controller_toml.parse(text, drone.name), drones)
+        return Controller(controller_toml.parse(chosen_text(drone, drone.name), drone.name), drones)
 
     def pilot(self, drones: int, mass_kg: float, *, noisy: bool) -> SimulatorPilot:
         """Return the C for new drones."""

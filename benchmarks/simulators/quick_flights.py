@@ -1,4 +1,4 @@
-"""Quick curves in crazyflow and RotorPy: their controllers, `design`, the exact thrust vector."""
+"""Quick curves in crazyflow and RotorPy: their controllers, and what `design` derives."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -16,7 +16,6 @@ from benchmarks.simulators.rotorpy_flights import HUMMINGBIRD, RotorpyDrone
 from benchmarks.simulators.single import measure, search
 from mambo_nmpc.curves import Circle, Gerono
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
 WORLDS: Final = (
     ("cf2x_L250", "first_principles", "crazyflie-l250"),
@@ -30,6 +29,7 @@ QUICK: Final = {
     "eight 1.2": Mission("eight 1.2 rad/s, mm", Gerono(2.0, 1.2), 18.0, rms_mm),
     "circle 2.4": Mission("circle 2.4 rad/s, mm", Circle(1.0, 2.4), 12.0, rms_mm),
 }
+OURS: Final = "ours, by the page"
 TUNED_ON: Final = {name: QUICK[name] for name in ("eight 1.0", "circle 2.0")}
 
 
@@ -40,7 +40,7 @@ def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str
         best, factors = tuned(world, TUNED_ON)
         (folder / f"{drone}-{model}-found.txt").write_text(f"{factors}\n", "utf-8")
         challengers: dict[str, Challenger] = {"Mellinger": Mellinger(drone), "Mellinger, tuned": best}
-        challengers |= _ours(vehicle_toml.preset(vehicle))
+        challengers[OURS] = Designed(vehicle_toml.preset(vehicle))
         figures: dict[str, dict[str, list[Score]]] = {title: {} for title in challengers}
         for name, mission in QUICK.items():
             found, _ = scored(world, challengers, name, mission)
@@ -54,10 +54,8 @@ def _hummingbird(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[st
     noise = rotorpy_flights.noise()
     _, factors = search(RotorpyDrone, 6, noise, TUNED_ON)
     (folder / "hummingbird-found.txt").write_text(f"{factors}\n", "utf-8")
-    challengers = {"SE3Control": np.ones(6), "SE3Control, tuned": np.array(factors)} | _ours(HUMMINGBIRD)
+    challengers = {"SE3Control": np.ones(6), "SE3Control, tuned": np.array(factors)} | {
+        OURS: Designed(HUMMINGBIRD)
+    }
     contestants = {who: partial(RotorpyDrone, each) for who, each in challengers.items()}
     yield from measure(rotorpy_flights.TITLE, contestants, noise, missions=QUICK)
-
-
-def _ours(drone: VehicleFile) -> dict[str, Challenger]:
-    return {"ours, by the page": Designed(drone), "ours, target observed": Designed(drone, "observed")}
