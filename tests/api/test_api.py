@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import mambo_nmpc
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings.controller_toml import to_toml
 from mambo_nmpc import (
     ArgumentError,
     Controller,
@@ -75,7 +75,8 @@ def test_every_name_is_there() -> None:
 def test_a_step_has_the_bits_of_the_compiled_controller() -> None:
     """Through reset and set_command, for each of n drones."""
     ours, other = Controller.from_preset("crazyflie", 2), CompiledController(presets.load("crazyflie"), 2)
-    state, target = np.zeros((2, 7)), np.array([[1.0, 0.0, 0.0, 0.0], [0.3, -0.2, 0.0, 0.0]])
+    state, target = np.zeros((2, 7)), np.zeros((2, 9))
+    target[:, :2] = [1.0, 0.0], [0.3, -0.2]
     thrust = np.full(2, 9.81)
     for _ in range(3):
         assert (
@@ -247,8 +248,8 @@ def test_wrong_arguments_of_a_step_are_refused_by_name() -> None:
 
 
 def test_a_target_may_tell_its_acceleration() -> None:
-    """Where the settings observe it; others ignore it."""
-    settings = with_option(presets.load("crazyflie"), "target.acceleration", "observed")
+    """With a quadratic cost; the 1-norm ignores it."""
+    settings = presets.load("crazyflie")
     observing, other = Controller(settings), CompiledController(settings)
     state = DroneState.in_frame("ENU", np.zeros(3), np.zeros(3), np.array([0.0, 0.0, np.pi / 2.0]))
     north = np.array([0.0, 1.0, 0.0])
@@ -257,7 +258,7 @@ def test_a_target_may_tell_its_acceleration() -> None:
     told = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]])
     assert command_rad[1] < 0.0
     assert (command_rad == other.step(np.zeros((1, 7)), told, np.array([9.81])).command_rad[0]).all()
-    assert (Controller.from_preset("crazyflie").step(state, target).command_rad == 0.0).all()
+    assert (Controller.from_preset("mambo-1norm").step(state, target).command_rad == 0.0).all()
     with pytest.raises(ValueError, match="acceleration_m_s2: has shape"):
         TargetState(np.zeros(2), np.zeros(2), np.zeros(4))
 

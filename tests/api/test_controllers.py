@@ -23,11 +23,10 @@ from mambo_sil.api import set_points
 from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
-from mambo_sil.model.derive.derived_flight import chosen_text
 from tests.support.derived import settings_for
 from tests.support.one_norm import ONE_NORM
 
-DERIVED = settings_for(vehicle_toml.preset("crazyflie"))
+DERIVED = settings_for(vehicle_toml.preset("crazyflie"), exact=True)
 RECIPROCAL_M_S2 = RECIPROCAL_ERROR * GRAVITY_M_S2
 """Error of the thrust in hover with `[height]`, whose C divides by products."""
 RNG = np.random.default_rng(5)
@@ -87,24 +86,11 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
     assert (quick.disturbance_noise, derived.observer.disturbance_noise) == (3.0, 1.0)
 
 
-def test_a_program_that_knows_its_curve_gets_what_design_writes_for_it() -> None:
-    """The exact tilt and more of it; a smaller tilt limit counts."""
-    text = chosen_text(vehicle_toml.preset("crazyflie"), "x", acceleration="observed")
-    quick = Controller.from_vehicle("crazyflie", acceleration="observed").settings
-    assert quick == controller_toml.parse(text, "x")
-    assert (quick.model.tilt, quick.limits.tilt_rad > DERIVED.limits.tilt_rad) == ("exact", True)
-    careful = Controller.from_vehicle("crazyflie", acceleration="observed", tilt_rad=0.4).settings
-    assert careful == with_option(
-        with_option(quick, "limits.tilt_rad", 0.4), "limits.braking_m_s2", careful.limits.braking_m_s2
-    )
-
-
 @pytest.mark.long
 def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     """From a vehicle, a preset and a file alike."""
     document: dict[str, Any] = presets.load("crazyflie").model_dump()
     document["observer"]["age_s"] = 0.0
-    document["target"]["acceleration"] = "observed"
     document["limits"] = {
         "tilt_rad": 0.4,
         "speed_m_s": 3.0,
@@ -114,7 +100,6 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     made = Controller.from_preset(
         "crazyflie",
         age_s=0.0,
-        acceleration="observed",
         tilt_rad=0.4,
         speed_m_s=3.0,
         braking_m_s2=2.5,
@@ -149,7 +134,6 @@ def test_another_update_period_changes_the_delay_of_the_thrust() -> None:
         ({"age_s": "old"}, 'age_s = "old" must be a number'),
         ({"age_s": True}, "age_s = True must be no truth value"),
         ({"age_s": None}, "age_s = .* must be a number"),
-        ({"acceleration": "told"}, 'acceleration = "told" must be "none" or "tracked"'),
         ({"tilt_rad": 2.0}, r"tilt_rad = 2\.0 must lie in"),
         ({"speed_m_s": -1.0}, r"speed_m_s = -1\.0 must"),
         ({"tilt_rad": 0.2, "braking_m_s2": 9.0}, "braking_m_s2 = 9.0"),

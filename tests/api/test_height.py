@@ -23,24 +23,20 @@ STATE, GOAL = DroneState([0, 0, -1], [0, 0, 0], [0, 0, 0]), TargetState([0, 0, -
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("acceleration", ["tracked", "observed"])
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str, acceleration: str) -> None:
+def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str) -> None:
     """Through reset, set_command and set_thrust; z points down, the height of the C up."""
-    settings = height_settings(scalar, acceleration)
+    settings = height_settings(scalar)
     ours, theirs = Controller(settings, 2), CompiledController(settings, 2)
-    orders = {"tracked": 2, "observed": 4}[acceleration]
-    position, velocity, attitude, *aims = RNG.normal(0.0, 0.2, (3 + orders, 2, 3))
-    ahead = aims[3] if orders == 4 else None
-    known = [np.full(2, 2.0)] if orders == 4 else []
+    position, velocity, attitude, *aims = RNG.normal(0.0, 0.2, (7, 2, 3))
     for grounded in (np.array([False, True]), np.zeros(2, np.bool_)):
         state = [position[:, :2], velocity[:, :2], attitude, -position[:, 2:], -velocity[:, 2:]]
         aimed = [*(aim[:, :2] for aim in aims[:3]), *(-aim[:, 2:] for aim in aims[:3])]
-        target = [*aimed, *(one for aim in aims[3:] for one in (aim[:, :2], -aim[:, 2:])), *known]
+        target = [*aimed, aims[3][:, :2], -aims[3][:, 2:], np.full(2, 2.0)]
         for _ in range(3):
             expected = theirs.step(np.column_stack([*state, grounded]), np.column_stack(target))
             found = ours.step(
-                DroneState(position, velocity, attitude, grounded), TargetState(*aims[:3], ahead_m_s2=ahead)
+                DroneState(position, velocity, attitude, grounded), TargetState(*aims[:3], ahead_m_s2=aims[3])
             )
             assert (found.command_rad == expected.command_rad).all()
             assert (found.thrust_m_s2 == expected.thrust_m_s2).all()
@@ -141,7 +137,7 @@ def test_what_needs_a_height_says_so() -> None:
         ArgumentError, match=r"thrust_m_s2 = 9\.0 must be left out: the settings have no \[hei"
     ):
         level.reset(thrust_m_s2=9.0)
-    observing = Controller.from_vehicle("crazyflie", acceleration="observed")
+    observing = Controller.from_vehicle("crazyflie")
     with pytest.raises(ArgumentError, match="target: acceleration_m_s2 has no z"):
         observing.step(STATE, TargetState([0, 0, -1], [0, 0, 0], [0, 0]))
 

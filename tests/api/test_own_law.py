@@ -132,7 +132,7 @@ def test_a_law_may_have_a_controller_of_its_own() -> None:
             found = self.controller.step(state, target, 9.81)
             return found.command_rad
 
-    controller = Controller.from_preset("crazyflie", acceleration="observed")
+    controller = Controller.from_preset("crazyflie")
     assert flown(Ours(controller)).trace.same_bits(flown(controller).trace)
 
 

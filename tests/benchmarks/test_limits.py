@@ -17,7 +17,6 @@ from benchmarks.flights.limits import (
     top_speed_m_s,
 )
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m
 from mambo_sil.flight.trajectories import STEP_TIME_S, Circle, Hover, PositionStep, Waypoints
 
@@ -105,9 +104,9 @@ def test_a_drone_outside_a_fence_flies_back_in(preset: str) -> None:
 
 @pytest.mark.parametrize("preset", QUADRATIC)
 def test_a_circle_beyond_the_tilt_limit_is_no_orbit(preset: str) -> None:
-    """1 m at 2.2 rad/s with speed 2 and braking 2: at most 0.18 m after the first ten seconds."""
+    """1 m at 2.2 rad/s with speed 2 and braking 2: at most 0.27 m after the first ten seconds."""
     trace = flown(limited(preset, 2.0, 2.0), QUADRATIC[preset], Circle(1.0, 2.2), 30.0, LimitsCase())
-    assert np.all(horizontal_error_m(trace)[trace.time_s > TRANSIENT_S] < 0.18)
+    assert np.all(horizontal_error_m(trace)[trace.time_s > TRANSIENT_S] < 0.27)
 
 
 @pytest.mark.first_is_quick
@@ -123,12 +122,11 @@ def test_with_the_1norm_a_circle_beyond_the_tilt_limit_is_no_orbit(
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("preset", QUADRATIC)
-@pytest.mark.parametrize("acceleration", ["none", "observed"])
-def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str, acceleration: str) -> None:
-    """Unless it is tracked, as above: a step stops, since braking is fed forward where it can be."""
-    settings = with_option(limited(preset, 5.0, 2.0), "target.acceleration", acceleration)
+def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str) -> None:
+    """A step stops, since braking is fed forward."""
+    settings = limited(preset, 5.0, 2.0)
     trace = flown(settings, QUADRATIC[preset], PositionStep(24, 18), 16.0, LimitsCase())
-    assert np.all(overshoot_m(trace) < (0.5 if acceleration == "none" else 0.04))
+    assert np.all(overshoot_m(trace) < 0.04)
     assert np.all(top_speed_m_s(trace) < 5.0 * 1.04)
 
 

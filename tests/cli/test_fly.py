@@ -31,7 +31,8 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     }
     trace = read_npz(out / "trace.npz")
     rows = list(csv.DictReader((out / "trace.csv").read_text().splitlines()))
-    assert tuple(rows[0]) == CSV_COLUMNS
+    assert tuple(rows[0])[: len(CSV_COLUMNS)] == CSV_COLUMNS
+    assert list(rows[0])[-1] == "target_known"
     assert len(rows) == len(trace.time_s) == 201
     assert (out / "flight.png").read_bytes().startswith(b"\x89PNG")
     drawn = (out / "flight.svg").read_text()

@@ -1,6 +1,4 @@
-"""The guard: budgets that bound how much commands vary, a tracker that knows noise, coarse gains."""
-
-from typing import Any
+"""The guard: budgets that bound how much commands vary, and coarse gains."""
 
 import numpy as np
 import pytest
@@ -8,8 +6,6 @@ import pytest
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.quadratic.method import Quadratic
-from mambo_codegen.methods.shared.tracker import Tracker, unknown_motion
-from mambo_codegen.methods.shared.tracker_constants import LEAST_CHANGE, MOST_COUNTED, MOST_NOISE
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import SCALARS
@@ -17,8 +13,7 @@ from tests.support.height_settings import height_settings
 from tests.support.parity import inputs_of_steps
 from tests.support.quadratic import TWO_MOVES, quadratic_settings, settings_of
 
-GUARDED = settings_of(TWO_MOVES | {"target.acceleration": "tracked", "guard.tilt_rad": 1.5})
-Q_M_S2 = 0.3
+GUARDED = settings_of(TWO_MOVES | {"guard.tilt_rad": 1.5})
 
 
 def guarded_height(scalar: str) -> Settings:
@@ -56,48 +51,11 @@ def test_a_swing_from_end_to_end_is_free() -> None:
     for settings in (GUARDED, without):
         controller = method_of(settings).reference_controller(1)
         for sign in (1.0, -1.0):
-            state, target = np.zeros((1, 7)), np.array([[5.0 * sign, 5.0 * sign, 0.0, 0.0]])
+            state, target = np.zeros((1, 7)), np.zeros((1, 9))
+            target[0, :2] = 5.0 * sign
             commands.append(controller.step(state, target, [9.81]).command_rad)
     assert (np.array(commands[:2]) == np.array(commands[2:])).all()
     assert np.abs(commands[1] - commands[0]).min() > 1.9 * GUARDED.limits.tilt_rad
-
-
-def deviations(difference_m_s2: Any, steps: int) -> tuple[Tracker, Any]:
-    """Track accelerations that differ from the predicted ones by so much; return the motion at the end."""
-    method = Quadratic(GUARDED)
-    tracker = method.reference_controller().parts.tracker
-    assert isinstance(tracker, Tracker)
-    motion = unknown_motion(np.zeros((1, 2), np.float32))
-    velocity, signs = 0.0, np.resize(difference_m_s2, steps)
-    for sign in signs:
-        predicted = float((motion.acceleration_m_step2 + motion.jerk_m_step2_update)[0, 0]) / 1e-4
-        velocity += 0.01 * (predicted + sign)
-        motion = tracker.update(motion, np.full((1, 2), velocity, np.float32))
-    return tracker, motion
-
-
-def test_noise_at_its_measure_is_half_believed_and_a_corner_wholly() -> None:
-    """A deviation of q that reverses for long has the share 1/2; one that never does has the share 1."""
-    _, rattling = deviations([Q_M_S2, -Q_M_S2], 600)
-    _, steady = deviations([Q_M_S2], 600)
-    assert 1 / (1 + 256 * rattling.reversal[0, 0]) == pytest.approx(0.5, abs=0.02)
-    assert steady.reversal[0, 0] < 1e-6
-
-
-def test_a_tracker_without_noise_tracks_as_one_without_a_guard() -> None:
-    """Along a smooth path the estimates differ by less than a thousandth."""
-    plain = Settings.model_validate(GUARDED.model_dump(exclude={"guard"}))
-    times_s = 0.01 * np.arange(1000)
-    velocities = np.column_stack([np.cos(times_s), np.sin(times_s)]).astype(np.float32)
-    found = []
-    for settings in (GUARDED, plain):
-        tracker = Quadratic(settings).reference_controller().parts.tracker
-        assert isinstance(tracker, Tracker)
-        motion = unknown_motion(np.zeros((1, 2), np.float32))
-        for velocity in velocities:
-            motion = tracker.update(motion, velocity[np.newaxis])
-        found.append(motion.acceleration_m_step2[0])
-    assert np.abs(found[0] - found[1]).max() < 1e-3 * np.abs(found[1]).max()
 
 
 def test_coarse_gains_are_those_of_a_filter_for_noisier_positions() -> None:
@@ -114,7 +72,7 @@ def test_coarse_gains_are_those_of_a_filter_for_noisier_positions() -> None:
 def test_without_a_measured_position_the_estimate_follows_less() -> None:
     """A position that jumps moves the estimate of a controller that was told so less, until a reset."""
     controller = Quadratic(GUARDED).reference_controller(2)
-    target = np.zeros((2, 4))
+    target = np.zeros((2, 9))
     for _ in range(5):
         controller.step(np.zeros((2, 7)), target, [9.81, 9.81])
     assert (controller.set_position_measured(np.array([True, False])) == 0).all()
@@ -148,21 +106,3 @@ def test_without_the_section_there_is_no_guard() -> None:
     """The preset has none, and its reference says so."""
     with pytest.raises(ValueError, match="the settings have no guard"):
         Quadratic(quadratic_settings()).reference_controller().set_position_measured(np.array([True]))
-
-
-def test_the_noise_of_a_target_has_these_constants() -> None:
-    """16 times q counts at most; a reversal is a mean over 0.5 s; the share falls to a quarter at most."""
-    slow = with_option(GUARDED, "horizon.update_period_s", 0.02)
-    for settings, period_s in ((GUARDED, 0.01), (slow, 0.02)):
-        tracker = Quadratic(settings).tracker
-        assert tracker is not None
-        assert tracker.noise is not None
-        most = 16 * Q_M_S2 * period_s**2
-        assert tracker.noise.limit_m_step2 == pytest.approx(most, rel=1e-12)
-        assert tracker.noise.steps2_per_m == pytest.approx(1 / most, rel=1e-12)
-        assert tracker.noise.share == pytest.approx(period_s / 0.5, rel=1e-12)
-    slowest = Quadratic(with_option(GUARDED, "horizon.update_period_s", 0.1)).tracker
-    assert slowest is not None
-    assert slowest.noise is not None
-    assert slowest.noise.share == pytest.approx(0.2, rel=1e-12)
-    assert (MOST_NOISE, LEAST_CHANGE, MOST_COUNTED) == (16, 0.25, 1 / 64)

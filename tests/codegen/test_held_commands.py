@@ -11,10 +11,11 @@ from mambo_codegen.methods.quadratic.controller import QuadraticController, Quad
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
+from tests.support.quadratic import told
 
 Array = NDArray[np.float64]
 
-BAD = np.full((1, 4), np.nan)
+BAD = np.full((1, 9), np.nan)
 LIMIT_RAD = 0.35
 
 
@@ -32,7 +33,7 @@ def step(used: QuadraticController, roll_rad: float, target: Array, *, yaw_rad: 
 
 def east(distance_m: float) -> Array:
     """Return a target at rest to the east, which roll tilts to at heading 0."""
-    return np.array([[0.0, distance_m, 0.0, 0.0]])
+    return told([[0.0, distance_m, 0.0, 0.0]])
 
 
 @pytest.mark.parametrize("scalar", ["float32", "float64", "fixed"])
@@ -85,7 +86,7 @@ def test_a_reset_command_is_held_in_every_bit(scalar: str) -> None:
 def test_a_held_command_stays_in_the_axes_of_the_body() -> None:
     """The drone keeps its roll and pitch while it yaws, so the model does too; its tilt turns."""
     used = controller()
-    step(used, 0.1, np.array([[3.0, 3.0, 0.0, 0.0]]))
+    step(used, 0.1, told([[3.0, 3.0, 0.0, 0.0]]))
     before = used.memory.attitude
     for count in range(1, 20):
         step(used, 0.1, BAD, yaw_rad=0.05 * count)
@@ -99,7 +100,7 @@ def test_the_command_of_the_step_may_be_set(scalar: str) -> None:
     used, other = controller(scalar), controller(scalar)
     rng = np.random.default_rng(3)
     for _ in range(50):
-        roll_rad, target = rng.uniform(-0.1, 0.1), rng.uniform(-1.0, 1.0, (1, 4))
+        roll_rad, target = rng.uniform(-0.1, 0.1), told(rng.uniform(-1.0, 1.0, (1, 4)))
         command_rad = step(used, roll_rad, target).command_rad
         assert step(other, roll_rad, target).command_rad.tolist() == command_rad.tolist()
         assert used.set_command(command_rad)[0] == Status.OK

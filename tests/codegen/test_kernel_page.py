@@ -8,7 +8,7 @@ import pytest
 
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.step import QuadraticMemory
-from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, TargetObserver
+from mambo_codegen.methods.quadratic.target_observer import ObservedMotion
 from mambo_codegen.methods.shared.limits import ActiveLimit
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -17,7 +17,7 @@ from tests.support.kernel_page import Loop, Numbers, ObservedAxis, jerk_numbers,
 from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, Array, case_values, settings_of
 from tests.support.strategies import Values
 
-HEIGHT, THRUST = ActiveLimit.HEIGHT, ActiveLimit.THRUST
+FENCE, HEIGHT, THRUST = ActiveLimit.FENCE, ActiveLimit.HEIGHT, ActiveLimit.THRUST
 
 
 def _with(settings: Settings, values: Values) -> Settings:
@@ -27,8 +27,8 @@ def _with(settings: Settings, values: Values) -> Settings:
     return settings
 
 
-OBSERVED_ONLY: Final[Values] = {"target.acceleration": "observed", "code.scalar": "float64"}
-OBSERVED: Final[Values] = TWO_MOVES | OBSERVED_ONLY
+DOUBLE: Final[Values] = {"code.scalar": "float64"}
+OBSERVED: Final[Values] = TWO_MOVES | DOUBLE
 QUICK: Final[Values] = {
     "horizon.update_period_s": 0.0025,
     "model.drag_1_s": 0.07,
@@ -43,7 +43,7 @@ SLOW: Final[Values] = {
     "ranges.thrust_acceleration_max_m_s2": 12.0,
 }
 HIGH: Final = _with(
-    height_settings("float64", "observed", thrust_max_m_s2=35.0),
+    height_settings("float64", thrust_max_m_s2=35.0),
     {
         "horizon.update_period_s": 0.02,
         "observer.outage_s": 0.2,
@@ -63,7 +63,8 @@ CASES: Final = (
     *(f"{verdict} {what}" for verdict in ("accepted", "rejected", "jump") for what in KINDS),
     *("velocities begin", "accelerations begin", *(f"first, known {known}" for known in range(3))),
     *("largest noise", "shorter memory", "faded", "faded wholly", "turned, known 0", "turned, known 1"),
-    *("limited", "limited jump", "limited twice", "limited after braking", "outage", "bad target"),
+    *("limits begin", "limited", "limited jump", "fed by limits", "fed by the target"),
+    *("outage", "bad target"),
     *("largest a", "largest j", "largest s"),
 )
 """What every flight must have met."""
@@ -114,7 +115,16 @@ class Flight:
             self.numbers.append(Numbers(settings, self.method.height.snap_s, is_height=True))
         self.pages = [[ObservedAxis(one, self.cases) for one in self.numbers] for _ in range(DRONES)]
         self.missed = np.full(DRONES, self.method.outage_steps)
-        self.worst = 0.0
+        self.worst, self.worst_fed, self.was_limited = 0.0, 0.0, np.zeros(DRONES, np.bool_)
+        self.desired: Array = np.zeros((DRONES, 2))
+        limit = self.controller.parts.limits.limit
+
+        def recorded(*inputs: Any) -> Any:
+            found = limit(*inputs)
+            self.desired = found[1][:, 2:4]
+            return found
+
+        self.controller.parts.limits.limit = recorded  # type: ignore[assignment, method-assign]
 
     def fly(self, steps: int) -> None:
         """Step both, with all that may happen to a target, and keep the largest differences."""
@@ -124,6 +134,7 @@ class Flight:
             if step == 250:
                 assert (self.controller.reset(np.zeros((DRONES, self.axes))) == 0).all()
                 self.missed[:] = self.method.outage_steps
+                self.was_limited[:] = False
                 self._forget(np.arange(DRONES))
             self._step(step)
             self._compare()
@@ -146,29 +157,28 @@ class Flight:
         gone = self.missed > self.method.outage_steps
         self._forget(np.flatnonzero(self.missed == self.method.outage_steps + 1))
         self.cases.update({"outage": int(gone.sum()), "bad target": int((bad & ~lost).sum())})
-        brakes = self.controller.memory.limits.active & ActiveLimit.BRAKING != 0
-        for drone in np.flatnonzero(gone):
-            for page in self.pages[drone][:2]:
-                page.was_limited = bool(brakes[drone])
         self._observe(drawn, ~(bad | gone), before)
 
     def _observe(self, drawn: Array, follows: Any, before: QuadraticMemory) -> None:
         """Let the pages take in set-points; compare the velocities along x and y that the law is given."""
-        memories = before, self.controller.memory
-        was, limited = ((one.limits.active & ~(HEIGHT | THRUST)) != 0 for one in memories)
-        desired = np.where(limited[:, None], memories[1].limits.velocity_m_s, drawn[1, :, :2])
+        limited = (self.controller.memory.limits.active & ~(HEIGHT | THRUST)) != 0
+        aim = np.concatenate([drawn[0, :, :2], drawn[1, :, :2]], axis=1)
+        aim[limited, 2:4] = self.desired[limited]
         given = np.zeros((DRONES, self.axes))
+        parts = self.controller.parts.limits
+        slow = parts.is_slow(before.limits.bounds, np.concatenate([drawn[0, :, :2], drawn[1, :, :2]], axis=1))
+        feeds = slow | (self.controller.memory.limits.active & FENCE != 0)
         for drone in np.flatnonzero(follows):
+            known, begins = int(self.program.known[drone]), not self.was_limited[drone]
             for axis, page in enumerate(self.pages[drone]):
-                within = float(desired[drone, axis]) if limited[drone] and axis < 2 else None
-                known, braked = int(self.program.known[drone]), page.is_first and page.was_limited
-                given[drone, axis] = page.step(drawn[1:, drone, axis], known, within)
-                self.cases["limited after braking"] += braked and within is not None and page.fed_a != 0
+                begins = begins or page.is_first
+                given[drone, axis] = page.step(drawn[1:, drone, axis], known)
+                if axis < 2 and limited[drone]:
+                    given[drone, axis] = self.desired[drone, axis]
+                    page.follow(given[drone, axis], begins=begins, feeds=bool(feeds[drone]))
+        self.was_limited = np.where(follows, limited, self.was_limited)
         program = np.column_stack([*drawn[:, :, :2], self.program.known])
-        aim = np.concatenate([program[:, :2], desired, program[:, 4:6]], axis=1)
-        tracker = self.controller.parts.tracker
-        assert isinstance(tracker, TargetObserver)
-        theirs = tracker.follow(before.target, program, aim, (limited, was))[1][:, 2:4]
+        theirs = self.controller.parts.target_observer.follow(before.target, program, aim, limited)[1][:, 2:4]
         self._keep((theirs - given[:, :2])[follows])
 
     def _compare(self) -> None:
@@ -178,7 +188,9 @@ class Flight:
         theirs = np.concatenate([_kept(one) for one in motions], axis=1)
         own = np.array([[page.kept() for page in pages] for pages in self.pages])
         known = [not pages[0].is_first for pages in self.pages]
-        self._keep(((own - theirs) / np.array([one.scales for one in self.numbers]))[known])
+        differences = ((own - theirs) / np.array([one.scales for one in self.numbers]))[known]
+        self._keep(np.nan_to_num(differences[..., 2:]))
+        self.worst_fed = max(self.worst_fed, float(np.abs(differences[..., :2]).max(initial=0.0)))
 
     def _keep(self, differences: Array) -> None:
         self.worst = max(self.worst, float(np.abs(differences).max(initial=0.0)))
@@ -212,10 +224,12 @@ class Flight:
 
 
 def _kept(motion: ObservedMotion) -> Array:
-    """Return what is kept of motions along k axes (n, k, 10), as `ObservedAxis.kept` does."""
+    """Return what is kept of motions along k axes (n, k, 13), as `ObservedAxis.kept` does."""
     fed = motion.acceleration_m_step2, motion.jerk_m_step2_update
     fit = motion.velocity_m_s, motion.acceleration, motion.jerk, motion.snap
-    return np.stack([*fed, *fit, motion.innovation, motion.noise, motion.memory, motion.missed], axis=2)
+    judged = motion.innovation, motion.noise, motion.memory, motion.missed
+    desired = motion.desired_m_s, motion.desired_acceleration, motion.desired_jerk
+    return np.stack([*fed, *fit, *judged, *desired], axis=2)
 
 
 FLIGHTS: Final = {
@@ -232,14 +246,15 @@ def test_the_reference_observes_targets_as_the_page_says(settings: Settings) -> 
     flight = Flight(settings, seed=1)
     flight.fly(400)
     assert flight.worst < 1e-12
+    assert flight.worst_fed < 1e-10
     assert [case for case in CASES if flight.cases[case] == 0] == []
 
 
 @pytest.mark.parametrize("index", [0, 1])
 def test_the_law_has_the_numbers_of_the_jerk_of_the_page(index: int) -> None:
     """Those of each row, and t, of two moves and of one, with delays, integrals and a height, or without."""
-    found = [settings_of(case_values(one) | OBSERVED_ONLY) for one in range(8 + 4 * index, 12 + 4 * index)]
-    for settings in [*found, HIGH] if index else [settings_of(ONE_MOVE | OBSERVED_ONLY), *found]:
+    found = [settings_of(case_values(one) | DOUBLE) for one in range(8 + 4 * index, 12 + 4 * index)]
+    for settings in [*found, HIGH] if index else [settings_of(ONE_MOVE | DOUBLE), *found]:
         method, horizon = Quadratic(settings), settings.horizon
         laws = [*zip(_loops(settings), method.law.rows, method.law.snap_s, strict=True)]
         if method.height and settings.height:

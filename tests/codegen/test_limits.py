@@ -16,6 +16,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import SCALARS
+from tests.support.quadratic import told
 
 FENCE = {"x_min_m": -2.0, "x_max_m": 2.0, "y_min_m": -1.5, "y_max_m": 1.5}
 BASES = ("mambo", "mambo-1norm")
@@ -116,10 +117,9 @@ def test_no_desired_velocity_exceeds_a_limit(base: str, scalar: str) -> None:
             assert np.all(towards[limit_active & (room < -1e-3)] < 0), "outside it leads back in"
 
 
-@pytest.mark.parametrize("acceleration", ["tracked", "none"])
-def test_the_law_is_that_of_the_page(acceleration: str) -> None:
+def test_the_law_is_that_of_the_page() -> None:
     """In float64 it equals the formulas, with roots and norms, where drone and target are inside."""
-    settings = with_option(limited(fence=FENCE), "target.acceleration", acceleration)
+    settings = limited(fence=FENCE)
     method = method_of(settings)
     assert method.limiting is not None
     k, position, target = method.limiting.approach_1_s, *random_flights(3)
@@ -133,7 +133,7 @@ def test_the_law_is_that_of_the_page(acceleration: str) -> None:
     error = target[:, 0:2] - position
     distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
     knee = 2.0 / k**2
-    slow = np.all(np.abs(target[:, 2:4]) < 1.0 / k, axis=1)[:, None] & (acceleration == "tracked")
+    slow = np.all(np.abs(target[:, 2:4]) < 1.0 / k, axis=1)[:, None]
     near = np.where(slow, NEAR_SHARE * knee, knee)
     speed = np.where(distance > near, f(distance + knee - near), k * distance)
     expected = target[:, 2:4] + (speed * error / distance)
@@ -158,9 +158,10 @@ def test_flights_within_the_limits_keep_every_bit(base: str, scalar: str) -> Non
     wide = limited(base, scalar, speed_m_s=20.0, fence={"x_min_m": -900.0, "x_max_m": 900.0})
     ours, theirs = (method_of(settings).reference_controller(20) for settings in (wide, plain))
     target = np.column_stack([rng.normal(0, 5, (20, 2)), np.zeros((20, 2))])
+    aimed = target if plain.cost.norm == "1-norm" else told(target)
     for _ in range(40):
         state = np.column_stack([target + rng.normal(0, 0.15, (20, 4)), rng.normal(0, 0.1, (20, 3))])
-        steps = [one.step(state, target, np.full(20, 9.8)) for one in (ours, theirs)]
+        steps = [one.step(state, aimed, np.full(20, 9.8)) for one in (ours, theirs)]
         assert not ours.memory.limits.active.any()
         assert steps[0].command_rad.tobytes() == steps[1].command_rad.tobytes()
 
@@ -298,11 +299,9 @@ def test_limits_that_are_not_set_have_no_trace_in_the_digest(base: str) -> None:
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("acceleration", ["none", "tracked", "observed"])
-def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
+def test_an_outage_ends_in_level_attitude() -> None:
     """After outage_s without a state the model brakes to rest, and then the command is level."""
-    settings = with_option(limited(), "target.acceleration", acceleration)
-    controller: Any = method_of(settings).reference_controller(2)
+    controller: Any = method_of(limited()).reference_controller(2)
     state = np.array([[0.0, 0, 2.0, 0, 0, 0, 0.3], [0.0, 0, 0, -1.5, 0, 0, 1.0]])
     target = np.zeros((2, 9))
     target[:, :2] = np.diag([5.0, -5.0])

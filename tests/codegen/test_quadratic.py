@@ -69,7 +69,7 @@ def test_one_move_is_the_gain_of_the_riccati_equation(settings: Settings) -> Non
             axis.transition, axis.change[:, None], axis.state_cost, np.array([[axis.change_cost]])
         )
         row = np.eye(8)[7] - axis.gain(to_go)
-        used = axis.scale != 0
+        used = axis.decided
         assert in_si(one)[index, 0][used] == pytest.approx(row[used], rel=1e-9, abs=1e-11)
 
 
@@ -91,7 +91,7 @@ def test_two_moves_are_the_minimum_of_a_simulated_cost() -> None:
             axis = axis_of(settings, angle)
             curvature, slope = two_move_cost(axis, settling_steps(settings))
             rows = -np.linalg.solve(curvature, slope)
-            used = axis.scale != 0
+            used = axis.decided
             assert in_si(settings)[index][:, used] == pytest.approx(rows[:, used], rel=1e-8)
             assert law.ratios[index] == pytest.approx(curvature[0, 1] / curvature[0, 0], rel=1e-9)
 

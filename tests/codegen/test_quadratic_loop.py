@@ -9,7 +9,16 @@ from mambo_codegen.methods.quadratic.controller import QuadraticController, Quad
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
-from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, Array, axis_of, case_values, settings_of
+from tests.support.quadratic import (
+    ANGLES,
+    ONE_MOVE,
+    TWO_MOVES,
+    Array,
+    axis_of,
+    case_values,
+    settings_of,
+    told,
+)
 
 G_M_S2, HOVER = 9.81, 9.81
 EXACT = TWO_MOVES | {"code.scalar": "float64"}
@@ -70,7 +79,7 @@ def fly(
     """Fly to the origin; `distort` changes what the controller is told."""
     outcomes = []
     for step in range(steps):
-        outcome = controller.step([distort(step, drone.measured())], [[0.0] * 4], [HOVER])
+        outcome = controller.step([distort(step, drone.measured())], told([[0.0] * 4]), [HOVER])
         drone.step(outcome.command_rad[0])
         outcomes.append(outcome)
     return outcomes
@@ -135,7 +144,7 @@ def told_in_between(bad: list[float]) -> Callable[[int, Array], Array]:
 
 def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
     """Whichever bad state it was: all stored numbers are the same after it, and finite."""
-    settings = settings_of(EXACT | {"damping.roll_rate_feedback_s": 0.05, "target.acceleration": "tracked"})
+    settings = settings_of(EXACT | {"damping.roll_rate_feedback_s": 0.05})
     stored = set()
     for bad in BAD_STATES:
         drone, controller = LinearDrone(settings, 0.4), QuadraticController(Quadratic(settings))
@@ -167,7 +176,7 @@ def test_in_a_short_outage_the_controller_flies_on() -> None:
 
 def test_after_a_long_outage_the_estimate_starts_anew() -> None:
     """When it is over its time the drone brakes to a stop; position and velocity are then those measured."""
-    settings = settings_of(EXACT | {"observer.outage_s": 0.1, "target.acceleration": "tracked"})
+    settings = settings_of(EXACT | {"observer.outage_s": 0.1})
     controller, period_s = QuadraticController(Quadratic(settings)), settings.horizon.update_period_s
     drone = LinearDrone(settings)
     drone.put((0.5, -0.3))
@@ -177,7 +186,7 @@ def test_after_a_long_outage_the_estimate_starts_anew() -> None:
     assert np.all(commands[-1] == 0)
     assert int(outcomes[-1].missed[0]) == 12
     elsewhere = [40.0, -30.0, 2.0, 1.0, 0.0, 0.0, 0.0]
-    found = controller.step([elsewhere], [[0.0] * 4], [HOVER]).stored[0]
+    found = controller.step([elsewhere], told([[0.0] * 4]), [HOVER]).stored[0]
     assert found[2:4] == pytest.approx(np.array(elsewhere[2:4]) * period_s, rel=0.05)
     assert found[0:2] == pytest.approx(np.array(elsewhere[:2]) + found[2:4], abs=1e-3)
 
@@ -187,28 +196,30 @@ def test_a_command_of_others_moves_the_model() -> None:
     settings = settings_of(EXACT)
     used, undisturbed = (QuadraticController(Quadratic(settings)) for _ in range(2))
     for controller in (used, undisturbed):
-        controller.step([[0.0] * 7], [[0.0] * 4], [HOVER])
+        controller.step([[0.0] * 7], told([[0.0] * 4]), [HOVER])
     assert used.set_command([[0.2, 0.1]])[0] == Status.OK
-    held = used.step([[np.nan] * 7], [[np.nan] * 4], [HOVER])
+    held = used.step([[np.nan] * 7], told([[np.nan] * 4]), [HOVER])
     assert np.array_equal(held.command_rad, [[0.2, 0.1]])
-    assert not np.array_equal(held.stored, undisturbed.step([[np.nan] * 7], [[np.nan] * 4], [HOVER]).stored)
+    assert not np.array_equal(
+        held.stored, undisturbed.step([[np.nan] * 7], told([[np.nan] * 4]), [HOVER]).stored
+    )
     assert used.set_command([[np.nan, 0.1]])[0] == Status.BAD_COMMAND
 
 
 @pytest.mark.long
-def test_a_tracked_target_is_followed_closer() -> None:
-    """With an accelerating target the tracked loop follows much closer than the one that is not told."""
-    errors = {}
-    for kind in ("none", "tracked"):
-        settings = settings_of(ONE_MOVE | {"target.acceleration": kind, "code.scalar": "float64"})
+def test_a_target_on_a_circle_is_followed_within_a_thousandth_of_its_radius() -> None:
+    """By its velocity alone, and by its acceleration too."""
+    for known in (0.0, 1.0):
+        settings = settings_of(ONE_MOVE | {"code.scalar": "float64"})
         drone, controller = LinearDrone(settings), QuadraticController(Quadratic(settings))
         largest = 0.0
         for step in range(1500):
             angle = 0.01 * step
-            target = [np.cos(angle), np.sin(angle), -np.sin(angle), np.cos(angle)]
+            place = np.array([np.cos(angle), np.sin(angle)])
+            across = np.array([-np.sin(angle), np.cos(angle)])
+            target = np.concatenate([place, across, -place, [0.0, 0.0, known]])
             state = drone.measured()
             drone.step(controller.step([state], [target], [HOVER]).command_rad[0])
             if step > 800:
-                largest = max(largest, float(np.hypot(*(state[:2] - target[:2]))))
-        errors[kind] = largest
-    assert errors["tracked"] < 0.1 * errors["none"]
+                largest = max(largest, float(np.hypot(*(state[:2] - place))))
+        assert largest < 1e-3

@@ -117,8 +117,8 @@ def test_bounds_are_closed(key: Key) -> None:
         ('optimizer.variant = "rprop"', 'must be "rprop+" or "irprop-"'),
         (
             'target.acceleration = "given"',
-            'must be "none", "tracked" or "observed": since version 0.4 a target with "observed" says '
-            "what it knows of its acceleration, in its member `known` (quadratic cost)",
+            'must be "none" or "tracked"; with a quadratic cost leave it out: since version 0.4 each '
+            "target says what it knows of its acceleration, in its member `known`",
         ),
         ("optimizer.step_max_rad = 0.005", "must lie in 0.01..1 (at least optimizer.initial_step_rad)"),
         ("optimizer.step_min_rad = 0.02", "must lie in 1e-9..0.01 (at most optimizer.initial_step_rad)"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods.quadratic.method import Quadratic
-from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, TargetObserver
+from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, TargetObserver, unknown_target
 from mambo_codegen.methods.quadratic.target_observer_constants import target_observer_constants
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
@@ -20,8 +20,8 @@ from tests.support.quadratic import TWO_MOVES, Array, settings_of
 
 PERIOD_S: Final = 0.01
 NAN, INF = math.nan, math.inf
-SETTINGS: Final = settings_of(TWO_MOVES | {"target.acceleration": "observed", "code.scalar": "float64"})
-OBSERVER: Final = target_observer_constants(SETTINGS) or pytest.fail("it is observed")
+SETTINGS: Final = settings_of(TWO_MOVES | {"code.scalar": "float64"})
+OBSERVER: Final = target_observer_constants(SETTINGS)
 SNAP_S: Final = float(Quadratic(SETTINGS).law.snap_s.mean())
 """The feed-forward gain of the snap."""
 MOST_M_S: Final = PERIOD_S * 1.5 * 9.81 * 0.5
@@ -32,18 +32,17 @@ class Seen:
     """An observer of n targets, and what it has made of their set-points."""
 
     def __init__(self, settings: Settings = SETTINGS, n: int = 1) -> None:
-        tracker = Quadratic(settings).reference_controller(n).parts.tracker
-        assert isinstance(tracker, TargetObserver)
-        self.tracker, self.n = tracker, n
-        self.motion: ObservedMotion = tracker.unknown(np.zeros((n, 2)))
-        self.aim: Array = np.zeros((n, 6))
+        self.tracker: TargetObserver = Quadratic(settings).reference_controller(n).parts.target_observer
+        self.n = n
+        self.motion: ObservedMotion = unknown_target(np.zeros((n, 2)))
+        self.aim: Array = np.zeros((n, 4))
 
     def see(self, velocity: Any, given: Any = 0.0, ahead: Any = 0.0, known: int = 0) -> ObservedMotion:
         """Take a set-point at the origin, whose vectors have the shape (n, 2) or less."""
         parts = (np.broadcast_to(part, (self.n, 2)) for part in (0.0, velocity, given, ahead))
         program = np.concatenate([*parts, np.full((self.n, 1), known)], axis=1)
         free = np.zeros(self.n, np.bool_)
-        self.motion, self.aim = self.tracker.follow(self.motion, program, program[:, :6], (free, free))
+        self.motion, self.aim = self.tracker.follow(self.motion, program, program[:, :4], free)
         return self.motion
 
 
@@ -79,19 +78,24 @@ def test_a_cubic_without_noise_is_followed_exactly(drag_1_s: float) -> None:
     assert (seen.aim[:, 2:4] == motion.velocity_m_s).all()
 
 
-def test_within_limits_their_aim_counts_and_the_fit_is_of_the_program() -> None:
-    """A_T is the aim's, at most the largest, J_T half its change, 0 in the first step; the aim stays."""
-    seen, yes = Seen(), np.array([True])
-    seen.see(0.02)
-    program = np.array([[0.0, 0, 0.04, 0.04, 9, 9, 9, 9, 0]])
-    aim = np.array([[0.1, 0.1, 0.05, 0.05, 1.5, -30]])
-    motion, fitted = seen.tracker.follow(seen.motion, program, aim, (yes, ~yes))
-    assert (fitted == aim).all()
-    assert motion.acceleration_m_step2[0] == pytest.approx([1.5e-4, -MOST_M_S * PERIOD_S], rel=1e-9)
-    assert (motion.jerk_m_step2_update == 0).all()
-    later = seen.tracker.follow(motion, program, aim - [0, 0, 0, 0, 0.5, -60], (yes, yes))[0]
-    assert later.jerk_m_step2_update[0] / PERIOD_S**2 == pytest.approx([-0.25, 10 * MOST_M_S], rel=1e-9)
-    assert (fit_of(motion) == fit_of(seen.see(0.04))).all()
+def test_a_desired_velocity_is_tracked_and_feeds_where_it_is_to() -> None:
+    """Its acceleration is found without a lag, a jump leaves it, and the fit of the program stays."""
+    seen = Seen()
+    motion = seen.see(0.3)
+    yes, no = np.array([True]), np.array([False])
+    for step in range(60):
+        desired = np.array([[0.01 * step, 0.3 - 0.005 * step]])
+        motion = seen.tracker.follow_limits(motion, desired, np.array([step > 0]), no)
+        assert motion.acceleration_m_step2.tobytes() == seen.motion.acceleration_m_step2.tobytes()
+    fed = seen.tracker.follow_limits(motion, np.add(desired, (0.01, -0.005)), yes, yes)
+    assert fed.acceleration_m_step2[0] / PERIOD_S == pytest.approx([0.01, -0.005], rel=1e-6)
+    assert fed.jerk_m_step2_update == pytest.approx(0.0, abs=1e-9)
+    assert (fit_of(fed) == fit_of(seen.motion)).all()
+    jumped = seen.tracker.follow_limits(fed, desired + 1.0, yes, yes)
+    assert jumped.acceleration_m_step2.tobytes() == fed.acceleration_m_step2.tobytes()
+    assert (jumped.desired_jerk == 0).all()
+    begun = seen.tracker.follow_limits(fed, desired, no, yes)
+    assert begun.desired_acceleration.tobytes() == seen.motion.acceleration.tobytes()
 
 
 @pytest.mark.parametrize("sigma_m_s", [0.005, 0.01, 0.02, 0.04])
@@ -263,7 +267,7 @@ def test_no_set_point_takes_the_fit_beyond_its_limits(known: int) -> None:
 @pytest.mark.parametrize(("known", "unread"), [(0, (4, 5, 8, 9, 10, 11)), (1, (9, 10, 11)), (2, ())])
 def test_members_that_are_not_known_do_not_count(scalar: str, known: int, unread: tuple[int, ...]) -> None:
     """Equal bits with these accelerations as with their opposites, within limits or not; others count."""
-    settings = height_settings(scalar, "observed")
+    settings = height_settings(scalar)
     controller, kept = Quadratic(settings).reference_controller(30), []
     for inputs in inputs_of_steps(settings, 10, 30, seed=8):
         own = inputs.target.copy()
@@ -283,7 +287,7 @@ def test_members_that_are_not_known_do_not_count(scalar: str, known: int, unread
 @pytest.mark.parametrize(("column", "value"), [(12, 3), (12, -1), (12, NAN), (6, NAN), (4, INF), (11, NAN)])
 def test_a_bad_target_is_refused_and_changes_no_fit(scalar: str, column: int, value: float) -> None:
     """A member that is not finite, or `known` beyond 0 to 2: status 3, and what is known of it stays."""
-    controller = Quadratic(height_settings(scalar, "observed")).reference_controller(1)
+    controller = Quadratic(height_settings(scalar)).reference_controller(1)
     target, state = np.zeros((1, 13)), np.zeros((1, 10))
     target[:, 2], target[:, 7] = 0.05, 0.03
     assert controller.step(state, target).status == [Status.OK]
@@ -298,7 +302,7 @@ def test_a_bad_target_is_refused_and_changes_no_fit(scalar: str, column: int, va
 @pytest.mark.parametrize("known", [0, 1, 2])
 def test_the_height_of_a_target_is_observed_as_its_place(known: int) -> None:
     """The same motion upwards as along x has the same fit; its jerk counts by the law of the height."""
-    method = Quadratic(height_settings("float64", "observed"))
+    method = Quadratic(height_settings("float64"))
     controller = method.reference_controller(1)
     for step in range(150):
         path = [0.5 * one / PERIOD_S**k for k, one in enumerate(derivatives(CUBIC[:, 0], step * PERIOD_S))]

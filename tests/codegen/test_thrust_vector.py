@@ -104,6 +104,7 @@ def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:
     method = Quadratic(exact_settings())
     controller = method.reference_controller(200)
     height, step_s2 = controller.parts.height, method.step_s**2
+    controller.step(np.zeros((200, 10)), np.zeros((200, 13)))
     vertical_m_s2 = np.linspace(0.0, 25.0, 200)
     state = controller.memory.height
     found = height.spare(state.__class__(**{**vars(state), "command": vertical_m_s2 * step_s2}))
@@ -121,7 +122,7 @@ def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:
 @pytest.mark.parametrize("known", [0, 1, 2])
 def test_a_known_acceleration_always_gets_a_tilt_of_its_own(known: int) -> None:
     """0.36 rad by the vertical part of the thrust, where the target's velocities alone get 1.7 m/s^2."""
-    method = Quadratic(with_option(exact_settings(), "target.acceleration", "observed"))
+    method = Quadratic(exact_settings())
     controller = method.reference_controller(200)
     height, step_s2 = controller.parts.height, method.step_s**2
     target = np.zeros((200, 13))
@@ -145,7 +146,8 @@ def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
     for above_m in (0.0, 5.0):
         controller = Quadratic(settings).reference_controller(1)
         state = np.zeros((1, 10))
-        target = np.array([[20.0, 0.0, 0.0, 0.0, above_m, 0.0]])
+        target = np.zeros((1, 13))
+        target[0, [0, 6]] = 20.0, above_m
         for _ in range(30):
             step = controller.step(state, target)
         assert step.active is not None

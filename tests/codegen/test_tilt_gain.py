@@ -15,7 +15,7 @@ from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.height import CRAZYFLIE
-from tests.support.quadratic import settings_of
+from tests.support.quadratic import settings_of, told
 
 LEVEL = settings_of(
     {
@@ -139,7 +139,7 @@ def test_a_drone_that_tilts_more_gets_smaller_commands(gain: float) -> None:
     """The first command is that of the model over the gain; at the limit it stays within it."""
     states = np.zeros((1, 7))
     for target_m, is_free in ((0.05, True), (50.0, False)):
-        targets = np.array([[target_m, -target_m, 0.0, 0.0]])
+        targets = told([[target_m, -target_m, 0.0, 0.0]])
         thrust = np.full(1, 9.81)
         plain = controller(LEVEL).step(states, targets, thrust)
         found = controller(LEVEL, gain).step(states, targets, thrust)

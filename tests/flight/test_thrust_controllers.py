@@ -43,12 +43,11 @@ def assert_same(ours: Trace, theirs: Trace) -> None:
 
 @pytest.mark.first_is_quick
 @pytest.mark.sampled(6)
-@pytest.mark.parametrize("acceleration", ["tracked", "observed"])
 @pytest.mark.parametrize("scalar", ["float32", *SLOW])
 @pytest.mark.parametrize("batch", FLOWN)
-def test_engine_and_reference_have_the_bits_of_numpy(batch: str, scalar: str, acceleration: str) -> None:
+def test_engine_and_reference_have_the_bits_of_numpy(batch: str, scalar: str) -> None:
     """On level courses and in space, through sensors, with lost updates and late commands, in all lanes."""
-    settings, flight = height_settings(scalar, acceleration), flight_of(BATCHES[batch], PERIOD_S)
+    settings, flight = height_settings(scalar), flight_of(BATCHES[batch], PERIOD_S)
     expected = loop.fly(flight, CompiledController(settings, flight.flights))
     assert_same(loop.fly(flight, method_of(settings).reference_controller(flight.flights)), expected)
     for lanes in lanes_here():

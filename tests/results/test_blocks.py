@@ -152,7 +152,7 @@ def test_distances_are_in_cm_up_to_a_metre(value_m: float, text: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "answer"),
     [
-        ("fly --duration-s 20 --no-pictures", "mambo on mambo: 1.4 cm in the mean, 18 cm at most"),
+        ("fly --duration-s 20 --no-pictures", "mambo on mambo: 1.6 cm in the mean, 18 cm at most"),
         ("campaign --flights 2 -o c", "mambo: "),
         ("diff mambo crazyflie", "A: mambo, settings "),
         ("margins", "mambo on mambo, the true state, 10 ms an update"),

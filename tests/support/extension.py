@@ -30,7 +30,7 @@ typedef REAL nmpc_real_t;
 typedef SUM nmpc_sum_t;
 typedef int... nmpc_status_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
-typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; ...; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 TRACKER_TYPE
 """

@@ -20,23 +20,20 @@ CRAZYFLIE: Final[Values] = TWO_MOVES | {
 EVERY_FUNCTION: Final = settings_of(
     CRAZYFLIE
     | {
-        "target.acceleration": "tracked",
         "observer.age_s": 0.01,
         "model.drag_1_s": 0.2,
         "model.roll_gain": 0.9,
         "limits.speed_m_s": 5.0,
         "guard.tilt_rad_s": 5.0,
         "guard.position_noise": 0.03,
-        "guard.target_noise_m_s2": 0.3,
     }
 )
 """Settings of every function of nmpc.h; roll and pitch differ."""
 
 HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
-    CRAZYFLIE | {"target.acceleration": "observed", "observer.age_s": 0.01, "observer.outage_s": 0.05},
+    CRAZYFLIE | {"observer.age_s": 0.01, "observer.outage_s": 0.05},
     CRAZYFLIE
     | {
-        "target.acceleration": "tracked",
         "limits.speed_m_s": 1.5,
         "limits.fence.floor_m": -0.5,
         "limits.fence.ceiling_m": 1.5,
@@ -59,7 +56,6 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     },
     CRAZYFLIE
     | {
-        "target.acceleration": "observed",
         "limits.fence.x_min_m": -1.5,
         "limits.fence.x_max_m": 2.0,
         "damping.pitch_rate_feedback_s": 0.02,
@@ -70,7 +66,6 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     },
     CRAZYFLIE
     | {
-        "target.acceleration": "tracked",
         "limits.speed_m_s": 1.5,
         "guard.tilt_rad_s": 1.0,
         "guard.thrust_m_s2": 3.0,
@@ -83,7 +78,6 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "model.roll_gain": 0.8,
         "model.pitch_gain": 1.2,
         "model.pitch_trim_rad": -0.03,
-        "target.acceleration": "tracked",
         "limits.speed_m_s": 1.5,
         "damping.pitch_rate_feedback_s": 0.02,
         "guard.tilt_rad_s": 1.0,
@@ -104,14 +98,13 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     | {
         "model.tilt": "exact",
         "limits.tilt_rad": 0.7,
-        "target.acceleration": "observed",
         "model.drag_1_s": 0.244,
         "limits.speed_m_s": 1.5,
         "observer.outage_s": 0.05,
         "guard.tilt_rad_s": 8.4,
     },
 )
-"""One move and two, all that can be learnt, with and without tracker, limits, fence, age, feedback
+"""One move and two, all that can be learnt, with and without limits, fence, age, feedback
 and guard; drones that deliver less than the commanded thrust, and more; with small angles and with the
 thrust vector."""
 

@@ -13,9 +13,9 @@ CRAZYFLIE_HEIGHT: Final = {
 }
 
 
-def height_settings(scalar: str = "float32", acceleration: str = "tracked", **height: Any) -> Settings:
+def height_settings(scalar: str = "float32", **height: Any) -> Settings:
     """Return preset crazyflie with a height."""
     values: dict[str, Any] = presets.preset("crazyflie").model_dump(exclude_none=True)
     values["height"] = CRAZYFLIE_HEIGHT | height
-    values["code"]["scalar"], values["target"]["acceleration"] = scalar, acceleration
+    values["code"]["scalar"] = scalar
     return Settings.model_validate(values)

@@ -66,7 +66,8 @@ class Numbers:
         self.h_1 = 2 / math.sqrt(math.pi) * deviation
         self.most_h = min(6 * self.h_1, self.v / 4)
         fed = step * self.a, step * self.j
-        self.scales = [*fed, 1.0, self.a, self.j, self.s, self.a, self.most_h, 1.0, 1.0]  # of what is kept
+        # Of what is kept.
+        self.scales = [*fed, 1.0, self.a, self.j, self.s, self.a, self.most_h, 1.0, 1.0, 1.0, self.a, self.j]
 
     def _count(self, time_s: float, least: int) -> int:
         return max(min(round(time_s / self.period_s), 250), least)
@@ -76,21 +77,23 @@ class ObservedAxis:
     """The observer along one axis, by docs/explanation/kernel.md; `cases` counts what has happened."""
 
     def __init__(self, numbers: Numbers, cases: Counter[str]) -> None:
-        self.numbers, self.cases, self.before_m_s = numbers, cases, 0.0
+        self.numbers, self.cases = numbers, cases
         self.forget()
 
     def forget(self) -> None:
-        """Forget all that is observed; the velocity aimed at before stays."""
+        """Forget all that is observed."""
         self.v = self.a = self.j = self.s = self.nu = self.h = self.n = self.fed_a = self.fed_j = 0.0
-        self.m, self.is_first, self.was_limited = 0, True, False
+        self.desired, self.d, self.e = math.nan, math.nan, math.nan
+        self.m, self.is_first = 0, True
 
     def kept(self) -> list[float]:
-        """Return A_T, J_T, v, a, j, s, nu, h, n and m."""
-        return [self.fed_a, self.fed_j, self.v, self.a, self.j, self.s, self.nu, self.h, self.n, self.m]
+        """Return A_T, J_T, v, a, j, s, nu, h, n, m, and v_d, d and e, NaN before limits act."""
+        fit = self.v, self.a, self.j, self.s, self.nu, self.h, self.n, self.m
+        return [self.fed_a, self.fed_j, *fit, self.desired, self.d, self.e]
 
-    def step(self, given: Array, known: int, desired_m_s: float | None = None) -> float:
-        """Take in a velocity, an acceleration, one 0.05 s later (3,); v_d while limits act. Return T_v."""
-        velocity, before = float(given[0]), self.fed_a
+    def step(self, given: Array, known: int) -> float:
+        """Take in a velocity, an acceleration, one 0.05 s later (3,). Return T_v without limits."""
+        velocity = float(given[0])
         now, later = (clamp(self.numbers.period_s * float(one), self.numbers.a) for one in given[1:])
         self._begin(known)
         if self.is_first or known == 2:
@@ -102,16 +105,34 @@ class ObservedAxis:
             else:
                 self._correct_acceleration(velocity, now)
         self._feed(known)
-        if desired_m_s is not None:
-            self._feed_limited(desired_m_s, before)
-        self.was_limited = desired_m_s is not None
-        self.before_m_s = velocity if desired_m_s is None else desired_m_s
-        return self.v if known == 0 and desired_m_s is None else self.before_m_s
+        return self.v if known == 0 else velocity
+
+    def follow(self, desired: float, *, begins: bool, feeds: bool) -> None:
+        """Take in v_d while limits act; `begins` in the first such step, `feeds` where A_T is that of v_d."""
+        number, alpha = self.numbers, 0.58
+        change, before = desired - self.desired, self.d + self.e
+        if begins:
+            self.cases["limits begin"] += 1
+            self.d, self.e = self.a, 0.0
+        elif abs(change) <= number.a:
+            self.cases["limited"] += 1
+            self.d = clamp(before + alpha * (change - before), number.a)
+            self.e = clamp(self.e + alpha**2 / (2 - alpha) * (change - before), number.j)
+        else:
+            self.cases["limited jump"] += 1
+            self.e = 0.0
+        self.desired = desired
+        self.cases["fed by limits" if feeds else "fed by the target"] += 1
+        if feeds:
+            self.fed_a = number.period_s * self.d
+            self.fed_j = clamp(
+                number.period_s * self.e + number.drag * self.fed_a, number.period_s * number.j
+            )
 
     def shift(self, change_m_s: float) -> None:
         """Move with the frame."""
         self.v = clamp(self.v + change_m_s, self.numbers.v)
-        self.before_m_s = clamp(self.before_m_s + change_m_s, self.numbers.v)
+        self.desired = clamp(self.desired + change_m_s, self.numbers.v)
 
     def _begin(self, known: int) -> None:
         """Step 1: the kind of set-points."""
@@ -193,7 +214,7 @@ class ObservedAxis:
             self.cases[f"largest {name}"] += abs(getattr(self, name)) == most
 
     def _feed(self, known: int) -> None:
-        """Step 6."""
+        """Set A_T and J_T: step 6."""
         number = self.numbers
         self.fed_a = number.period_s * self.a
         self.fed_j = number.period_s * self.j + (number.snap_s - 0.025 * (known == 2)) * self.s
@@ -203,21 +224,14 @@ class ObservedAxis:
             self.fed_a, self.fed_j = self.fed_a * max(share, 0), self.fed_j * max(share, 0)
         self.fed_j = clamp(self.fed_j + number.drag * self.fed_a, number.period_s * number.j)
 
-    def _feed_limited(self, desired_m_s: float, before: float) -> None:
-        """While limits act; `before` is A_T of the step before."""
-        number, wanted = self.numbers, (desired_m_s - self.before_m_s) / self.numbers.period_s
-        is_jump = abs(wanted) > number.most_m_s2
-        self.fed_a = 0.0 if is_jump else number.period_s * clamp(number.period_s * wanted, number.a)
-        half = clamp((self.fed_a - before) / 2, number.period_s * number.j)
-        self.fed_j = half if self.was_limited else 0.0
-        self.cases["limited jump" if is_jump else "limited twice" if self.was_limited else "limited"] += 1
-
 
 def turn(x: ObservedAxis, y: ObservedAxis, angle_rad: float) -> None:
     """Turn the pairs along x and y with the frame, by docs/explanation/kernel.md."""
     sine, cosine, number, step = math.sin(angle_rad), math.cos(angle_rad), x.numbers, x.numbers.period_s
-    limits = number.a, number.j, number.known_s, step * number.a, step * number.j
-    for name, limit in zip(("a", "j", "s", "fed_a", "fed_j"), limits, strict=True):
+    fed = step * number.a, step * number.j
+    limits = number.a, number.j, number.known_s, *fed, number.v, number.a, number.j
+    names = "a", "j", "s", "fed_a", "fed_j", "desired", "d", "e"
+    for name, limit in zip(names, limits, strict=True):
         first, second = getattr(x, name), getattr(y, name)
         setattr(x, name, clamp(first * cosine - second * sine, limit))
         setattr(y, name, clamp(second * cosine + first * sine, limit))

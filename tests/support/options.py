@@ -80,7 +80,6 @@ SPACE: Final[Base] = {
 }
 """A controller of the height, for the Crazyflie."""
 ALL: Final[Base] = SPACE | {
-    "target.acceleration": "observed",
     "model.tilt": "exact",
     "limits.tilt_rad": 0.8,
     "limits.speed_m_s": 1.5,
@@ -129,7 +128,7 @@ _LIMITS: Final[Values] = {
 
 OPTIONS: Final[dict[str, Option]] = {
     # The first row is in the quick tests.
-    "height, observed": Option(SPACE, {"target.acceleration": "observed"}, _SPACE),
+    "height": Option(SPACE, {"height.lag_s": 0.072}, _SPACE),
     "1-norm": Option(PAPER, {"cost.norm": "1-norm"}, _PAPER),
     "1-norm, tracked": Option(PAPER, {"target.acceleration": "tracked"}, _PAPER),
     "1-norm, limits": Option(PAPER, _LIMITS, _PAPER),
@@ -153,8 +152,6 @@ OPTIONS: Final[dict[str, Option]] = {
     "1-norm, float64": Option(PAPER, {"code.scalar": "float64"}, _PAPER),
     "1-norm, fixed": Option(PAPER, {"code.scalar": "fixed"}, _PAPER),
     "quadratic": Option(LEVEL, {"cost.norm": "quadratic"}, _LEVEL),
-    "observed": Option(LEVEL, {"target.acceleration": "observed"}, _LEVEL),
-    "tracked": Option(LEVEL, {"target.acceleration": "tracked"}, _LEVEL),
     "predicted attitude": Option(LEVEL, {"model.attitude": "predicted"}, _LEVEL),
     "learnt gain": Option(LEVEL, {"observer.tilt_gain": "learnt"}, _LEVEL),
     "ramp": Option(LEVEL, {"horizon.ramp_s": 0.4}, _LEVEL),
@@ -179,8 +176,6 @@ OPTIONS: Final[dict[str, Option]] = {
     "float64": Option(LEVEL, {"code.scalar": "float64"}, _LEVEL),
     "fixed": Option(LEVEL, {"code.scalar": "fixed"}, _LEVEL),
     "prefix": Option(LEVEL, {"code.prefix": "own"}, _LEVEL),
-    "height": Option(SPACE, {"height.lag_s": 0.072}, _SPACE),
-    "height, tracked": Option(SPACE, {"target.acceleration": "tracked"}, _SPACE),
     "exact tilt": Option(SPACE, {"model.tilt": "exact", "limits.tilt_rad": 0.8}, _SPACE),
     "acceleration learnt": Option(SPACE, {"height.learn": "acceleration"}, _SPACE),
     "nothing learnt": Option(SPACE, {"height.learn": "none"}, _SPACE),

@@ -31,7 +31,6 @@ ONE_MOVE: Final[Values] = MAMBO_LOOPS | {
     "cost.response_time_s": 0.01 ** (1 / 3),
     "damping.roll_rate_feedback_s": 0.05,
     "model.attitude": "predicted",
-    "target.acceleration": "tracked",
 }
 """One free move, for the Mambo."""
 TWO_MOVES: Final[Values] = {
@@ -52,6 +51,12 @@ TWO_MOVES: Final[Values] = {
 """Two free moves, for the Crazyflie."""
 
 
+def told(places_and_speeds: Any) -> Array:
+    """Return targets (n, 9) of which positions and velocities (n, 4) are known and no more."""
+    known = np.asarray(places_and_speeds, np.float64)
+    return np.concatenate([known, np.zeros((len(known), 5))], axis=1)
+
+
 def settings_of(values: Values) -> Settings:
     """Return the settings with `values` by their dotted paths."""
     return Settings.model_validate(nested(values))
@@ -68,6 +73,12 @@ class Axis:
     change: Array
     state_cost: Array
     change_cost: float
+
+    @property
+    def decided(self) -> Array:
+        """Whether the cost decides what a row takes of each state (8,): not of the jerk, 3."""
+        decided: Array = (self.scale != 0) & (np.arange(8) != 3)
+        return decided
 
     @property
     def scale(self) -> Array:
@@ -173,21 +184,18 @@ def closed_loop(axis: Axis, row: Any) -> Array:
 
 
 CORNER_SETTINGS: Final[tuple[Values, ...]] = (
-    ONE_MOVE
-    | {"model.attitude": "measured", "target.acceleration": "none", "damping.roll_rate_feedback_s": 0.0},
+    ONE_MOVE | {"model.attitude": "measured", "damping.roll_rate_feedback_s": 0.0},
     TWO_MOVES | {"observer.outage_s": 0.03},
     ONE_MOVE
     | {"horizon.ramp_s": 0.4, "model.drag_1_s": 0.067, "observer.age_s": 0.041, "model.roll_trim_rad": 0.02},
     TWO_MOVES
     | {
-        "target.acceleration": "tracked",
         "limits.tilt_rad": 0.05,
         "observer.outage_s": 0.0,
         "model.pitch_trim_rad": -0.03,
     },
     TWO_MOVES
     | {
-        "target.acceleration": "observed",
         "limits.speed_m_s": 1.5,
         "limits.fence.x_min_m": -1.5,
         "limits.fence.x_max_m": 2.0,
@@ -196,7 +204,6 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     | {"observer.disturbance_limit_m_s2": 0.0, "ranges.position_m": 5.0, "ranges.velocity_m_s": 2.0},
     TWO_MOVES
     | {
-        "target.acceleration": "tracked",
         "damping.roll_rate_feedback_s": 0.02,
         "limits.speed_m_s": 1.5,
         "guard.tilt_rad_s": 1.0,
@@ -204,15 +211,13 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     },
     TWO_MOVES
     | {
-        "target.acceleration": "observed",
         "limits.speed_m_s": 1.5,
         "model.drag_1_s": 0.2,
         "observer.outage_s": 0.03,
         "guard.tilt_rad_s": 8.0,
     },
 )
-"""One move and two, attitude measured and predicted, with tracker, observer of the target, feedback, drag,
-age, trim and guard."""
+"""One move and two, attitude measured and predicted, with feedback, drag, age, trim and guard."""
 
 
 def quadratic_case(index: int, scalar: str) -> Settings:
@@ -235,8 +240,6 @@ def case_values(index: int) -> Values:
         "horizon.update_period_s": period_s,
         "horizon.ramp_s": float(rng.choice([0.0, max(0.02, 2 * period_s), 0.4, 1.0])),
         "limits.tilt_rad": tilt_rad,
-        "target.acceleration": str(rng.choice(["none", "tracked", "observed"])),
-        "target.tracker_gain": float(rng.uniform(0.05, 1)),
         "model.attitude": str(rng.choice(["measured", "predicted"])),
         "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),
         "model.drag_1_s": some(0.01, 5),
@@ -283,7 +286,6 @@ def _guard_of(index: int, tilt_rad: float) -> Values:
     return {
         "guard.tilt_rad": min(10.0, tilt_rad * float(rng.uniform(2, 4))),
         "guard.tilt_rad_s": float(10.0 ** rng.uniform(-1, 2)),
-        "guard.target_noise_m_s2": float(10.0 ** rng.uniform(-2, 1)),
         "guard.position_noise": float(10.0 ** rng.uniform(-3, 1)),
     }
 

@@ -235,7 +235,7 @@ def base_of(path: str) -> Values:
             "height.thrust_max_m_s2": 100.0,
         }
         return WIDE | {other: value for other, value in (SLOW | strong).items() if other != path}
-    if path in ("model.tilt", "target.acceleration") or path.startswith(("height.", "guard.thrust")):
+    if path == "model.tilt" or path.startswith(("height.", "guard.thrust")):
         return SLOW
     if path.startswith("limits.fence."):
         walls = {

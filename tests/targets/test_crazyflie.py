@@ -124,7 +124,7 @@ def test_a_set_point_that_no_other_follows_does_not_run_away(app: Crazyflie) -> 
 @pytest.mark.long
 def test_a_known_acceleration_is_that_of_the_set_point(tmp_path: Path) -> None:
     """With an observer of the target the flight is that of the controller alone; a wrong sign counts."""
-    settings = with_option(SETTINGS, "target.acceleration", "observed")
+    settings = SETTINGS
     observed = build(write_target("crazyflie", settings, tmp_path))
     apps = [observed.app(), *(observed.mutant(name, *mutant) for name, mutant in KNOWN_MUTANTS.items())]
     alone = fly(flight_of(1), WithoutAhead(settings))
@@ -195,7 +195,7 @@ def test_a_take_over_tells_the_controller_the_present_attitude(built: Built) -> 
     app.modes("modeAbs")
     app.aim(np.zeros(6))
     controller.reset([here[4:6]])
-    expected = controller.step([here], np.zeros((1, 6)), [9.81]).command_rad[0]
+    expected = controller.step([here], np.zeros((1, 9)), [9.81]).command_rad[0]
     assert np.radians(app.update(here)) == pytest.approx(expected, abs=1e-6)
     app.ticks += 10
     assert app.update(np.full(7, np.nan)) == (0.0, 0.0)

@@ -43,12 +43,7 @@ SUBJECTS = {
     "float64": with_option(SETTINGS, "code.scalar", "float64"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
-    "observed": with_option(SETTINGS, "target.acceleration", "observed"),
-    "observed fixed": with_option(
-        with_option(presets.preset("mambo"), "code.scalar", "fixed"), "target.acceleration", "observed"
-    ),
     "height": height_settings(),
-    "observed height": height_settings(acceleration="observed"),
     "limits": with_option(SETTINGS, "limits.speed_m_s", 2.0),
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
 }

@@ -14,7 +14,7 @@ from tests.support.height_settings import height_settings
 
 MOST_N = 0.48
 """Of the four motors, in the stubs."""
-SETTINGS = height_settings(acceleration="observed")
+SETTINGS = height_settings()
 AXES = (("x", 1.0), ("y", -1.0), ("z", 1.0))
 
 

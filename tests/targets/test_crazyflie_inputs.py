@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
@@ -20,7 +19,7 @@ from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.bundles import write_target
 from tests.support.crazyflie import Built, Crazyflie, Fleet, build
 
-SETTINGS = with_option(presets.preset("crazyflie"), "target.acceleration", "observed")
+SETTINGS = presets.preset("crazyflie")
 LOGGED = (
     *("takeOvers", "x", "y", "vx", "vy", "inRoll", "inPitch", "inYaw", "targetX", "targetY", "targetVx"),
     *("targetVy", "targetAx", "targetAy", "outRoll", "outPitch", "targetKnown"),

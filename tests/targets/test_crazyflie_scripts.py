@@ -330,11 +330,11 @@ def test_without_cflib_it_says_what_to_install(
     assert capsys.readouterr().err.endswith("pip install cflib.\n")
 
 
-def test_scripts_have_the_prefix_and_what_an_observed_target_needs(
+def test_scripts_have_the_prefix_and_log_what_targets_know(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The group of logs and parameters is that of the app."""
-    settings = with_option(with_option(SETTINGS, "code.prefix", "left"), "target.acceleration", "observed")
+    settings = with_option(SETTINGS, "code.prefix", "left")
     radio = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)["radio"]
     assert radio.GROUP == "left"
     assert radio.LOGGED[0][:2] == ("left.step", "left.x")

@@ -11,9 +11,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
+from tests.support.one_norm import ONE_NORM
 from tests.support.radio import LOG_BYTES, Drone
 from tests.support.scripts import SETTINGS, at_call, modules_of, run, without
 
@@ -116,17 +117,19 @@ def test_a_figure_longer_than_a_battery_is_refused(
     assert not drone.calls
 
 
-@pytest.mark.parametrize("acceleration", ["tracked", "observed"])
-def test_log_blocks_fit_the_radio(acceleration: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("settings", [height_settings(), ONE_NORM], ids=["height", "1-norm"])
+def test_log_blocks_fit_the_radio(
+    settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Each a packet; at 2 and 1 Mbit/s every update is logged, at 250 kbit/s every second one."""
-    settings = with_option(height_settings(), "target.acceleration", acceleration)
     folder = write_target("crazyflie", settings, tmp_path)
     radio = modules_of(folder, monkeypatch)["radio"]
     text = (folder / "src" / "nmpc_app_log.c").read_text("utf-8")
-    kinds = {f"nmpc.{name}": kind for kind, name in re.findall(r"^LOG_ADD\((\w+), (\w+), ", text, re.M)}
+    kinds = {"stateEstimate.z": "LOG_FLOAT"}
+    kinds |= {f"nmpc.{name}": kind for kind, name in re.findall(r"^LOG_ADD\((\w+), (\w+), ", text, re.M)}
     for names in radio.LOGGED:
         assert sum(BYTES[kinds[name]] for name in names) <= LOG_BYTES
-    assert ("nmpc.targetKnown" in kinds) == (acceleration == "observed")
+    assert ("nmpc.targetKnown" in kinds) == (settings.cost.norm == "quadratic")
     assert kinds.keys() >= {name for names in radio.LOGGED for name in names}
     count = len(radio.LOGGED)
     for rate, period_s in {"2M": 0.01, "1M": 0.01, "250K": 0.02}.items():

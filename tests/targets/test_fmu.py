@@ -41,12 +41,11 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "float64": with_option(presets.preset("mambo"), "code.scalar", "float64"),
-    "observed": with_option(presets.preset("mambo"), "target.acceleration", "observed"),
     "1-norm": presets.preset("mambo-1norm"),
     "limits": with_option(presets.preset("mambo"), "limits.speed_m_s", 1.0),
-    "height": height_settings(acceleration="observed"),
+    "height": height_settings(),
 }
-OTHERS = ("float64", "1-norm", "observed", "limits", "height")
+OTHERS = ("float64", "1-norm", "limits", "height")
 """Subjects whose flights are left to the long tests."""
 
 

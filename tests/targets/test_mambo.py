@@ -50,9 +50,7 @@ SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "1-norm": presets.preset("mambo-1norm"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
-    "observed": with_option(presets.preset("mambo"), "target.acceleration", "observed"),
     "height": height_settings(),
-    "observed height": height_settings(acceleration="observed"),
     "fixed height": height_settings("fixed"),
 }
 
@@ -60,8 +58,8 @@ SUBJECTS = {
 class FlightProcess:
     """A process on an emulated ARM that has loaded the library."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
-        self._process = process
+    def __init__(self, process: "subprocess.Popen[bytes]", *, is_observed: bool) -> None:
+        self._process, self._is_observed = process, is_observed
 
     def tick(self, state: FloatArray, target: FloatArray, thrust_n: float) -> FloatArray:
         """Return pitch, roll, status, refused, and with a height thrust and whether it is the controller's.
@@ -73,6 +71,8 @@ class FlightProcess:
         down, falling = (-vertical[0], -vertical[1]) if vertical else (0.0, 0.0)
         ahead, right = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
         reference = [*target[:4], *(-target[4:] if vertical else ())]
+        # Accelerations, and how many of them are known.
+        reference += [0.0] * (self._is_observed * (4 if vertical else 3))
         estimate = [x, y, down, yaw, pitch, roll, ahead, right, falling, 0.0, 0.0, 0.0]
         sensors = [*estimate, *reference, -thrust_n]
         assert self._process.stdin is not None
@@ -111,7 +111,8 @@ def flight_process(folder: Path) -> Iterator[FlightProcess]:
     ]
     with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         try:
-            yield FlightProcess(process)
+            header = (folder / "src/nmpc_mambo.h").read_text("utf-8")
+            yield FlightProcess(process, is_observed="is_known" in header)
         finally:
             process.kill()
 
@@ -122,7 +123,8 @@ def build(settings: Settings, folder: Path, right: str = "", wrong: str = "") ->
     files = render_target(settings, TARGETS["mambo"], with_digest=False)
     assert not right or files[BLOCK].count(right) == 1, f"the template moved on: {right}"
     place(files | {BLOCK: files[BLOCK].replace(right, wrong) if right else files[BLOCK]}, folder)
-    references = "-DREFERENCE_NUMBERS=6" if settings.height else "-DREFERENCE_NUMBERS=4"
+    numbers = (10 if settings.height else 7) if settings.cost.norm == "quadratic" else 4
+    references = f"-DREFERENCE_NUMBERS={numbers}"
     shell(
         *(compiler, *VENDOR_FLAGS, references, f"-I{STUBS}", f"-I{folder}/src"),
         *("-c", STUBS / "stock.c", "-o", folder / "stock.o"),
@@ -189,7 +191,9 @@ def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
                 begun = update == 120
                 reported_m_s2 = stock_n / mass_kg
                 alone.reset([[*present, reported_m_s2]]) if begun else alone.set_thrust([reported_m_s2])
-            expected = alone.step(state[np.newaxis], target[np.newaxis, :6])
+            told = np.zeros(13)
+            told[[0, 1, 2, 3, 6, 7]] = target[:6]
+            expected = alone.step(state[np.newaxis], told[np.newaxis])
             present = expected.command_rad[0].astype(np.float64)
             for tick in range(2):
                 found = process.tick(state, target[:6], stock_n + 0.01 * tick)

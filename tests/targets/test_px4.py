@@ -239,7 +239,7 @@ def jump(desk: Px4Desk, kind: str, sign: float = 1.0) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "within_ms", "most_deg"), [("position", 100, 1.0), ("velocity", 12, 1.7), ("heading", 100, 1.0)]
+    ("kind", "within_ms", "most_deg"), [("position", 100, 1.0), ("velocity", 12, 2.0), ("heading", 100, 1.0)]
 )
 def test_a_jump_of_the_estimator_moves_target_and_controller(
     kind: str, within_ms: int, most_deg: float, module: Path
@@ -274,7 +274,7 @@ FAULTS = {
     "silent": ("silent", 1.0, 200, "estimate is old"),
     "invalid": ("invalid", 1.0, 100, "estimate not valid"),
     "refused": ("jump_x", 5000.0, 700, "inputs refused"),
-    "tilted": ("roll_error", 0.8, 100, "tilted too far"),
+    "tilted": ("roll_error", 1.1, 100, "tilted too far"),
     "late": ("slow_ms", 3.0, 100, "steps took too long"),
 }
 
@@ -314,7 +314,7 @@ def test_a_drone_without_a_global_position_is_given_back_to_position_mode(module
     desk = Px4Desk(module).select(MPC, 1000)
     desk.set("px4.sticks", 1)
     desk.set("px4.indoors", 1.0)
-    desk.set("px4.roll_error", 0.8)
+    desk.set("px4.roll_error", 1.1)
     desk.run(150)
     assert desk["mode"] == MPC
     desk.run(250)

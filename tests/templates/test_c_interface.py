@@ -336,7 +336,7 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 def test_a_number_in_the_place_of_an_integer_is_that_integer_or_none(scalar: str) -> None:
     """A target knows 0, 1 or 2, anything else is refused; a drone touches the floor unless it is 0."""
-    settings = height_settings(scalar, "observed")
+    settings = height_settings(scalar)
     method, library = method_of(settings), build_library(settings, toolchain("gcc"))
     values = [0.0, -0.0, 1.0, 2.0, 0.5, 1.5, 3.0, -1.0, 100.0, 1e9, np.nan, np.inf]
     target, state = np.zeros((len(values), 13)), np.zeros((len(values), 10))

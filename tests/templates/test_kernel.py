@@ -40,7 +40,7 @@ SHAPES: dict[str, Settings] = {
         "model.pitch_trim_rad",
         -0.02,
     ),
-    "observed": height_settings(acceleration="observed"),
+    "height": height_settings(),
     "table1": presets.preset("table1"),
     "1-norm": presets.preset("mambo-1norm"),
     "1-norm fixed": settings_case(0, "fixed"),

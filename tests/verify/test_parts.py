@@ -70,12 +70,6 @@ FAULTS = {
         ),
         "a reset fills no budget": Harm("nmpc.c", r"    self->budget_rad\[1\] = [^;]*;\n", ""),
         "a word on the position is not heard": Harm("nmpc.c", r"\(self->is_coarse != 0U\) \? 1 : 0", "0"),
-        "what reverses is believed": Harm(
-            "nmpc.c", r"\(product < \(nmpc_real_t\)0\) \? -product", "(0) ? -product"
-        ),
-        "what is not believed is not forgotten": Harm(
-            "nmpc.c", r"square = doubt \* doubt", "square = doubt - doubt"
-        ),
     },
     "observed": {
         "a wild set-point is believed": Harm("nmpc.c", r"if \(within\(innovation, trust\) == 0\)", "if (0)"),

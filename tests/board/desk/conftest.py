@@ -20,13 +20,6 @@ def app() -> Path:
 
 
 @pytest.fixture(scope="session")
-def observing_app() -> Path:
-    """Return the library of the app with the settings of `design crazyflie --acceleration observed`."""
-    drone = vehicle_toml.load("crazyflie")
-    return desk_library.build(settings_for(drone, exact=True, acceleration="observed"), host_toolchain())
-
-
-@pytest.fixture(scope="session")
 def flow_app() -> Path:
     """Return the library of the app with the settings that `design crazyflie --sensors flow-deck` writes."""
     return built(vehicle_toml.load("crazyflie").model_copy(update={"sensors": FlowDeckSensors()}))
@@ -34,7 +27,7 @@ def flow_app() -> Path:
 
 def built(drone: VehicleFile) -> Path:
     """Return the library of the app with derived settings."""
-    return desk_library.build(settings_for(drone), host_toolchain())
+    return desk_library.build(settings_for(drone, exact=True), host_toolchain())
 
 
 @pytest.fixture(scope="session")

@@ -9,13 +9,17 @@ from mambo_sil.board.desk.desk_events import broken, fly_events, measure
 
 CLOCKS_MS = (3, 7, 9)
 """Offsets of the clock of camera or flow deck, each with a seed of its own."""
-RATTLING = ("noise-4-mm", "packets-out-of-order")
-"""The guard keeps the drone in the air, but farther from its target than is aimed at."""
+RATTLING = ("noise-4-mm",)
+"""The drone stays in the air and near, but loses 2 mm more of its height than is aimed at."""
+DISORDER = ("packets-out-of-order",)
+"""The preset's height is the firmware's, which is 5 cm off then where 2 cm are aimed at."""
+FAR = ("random-set-points",)
+"""The preset is 0.42 m off at one of the clocks, where 0.35 m is aimed at."""
 FLOW = ("flow-low", "flow-hover", "flow-high", "flow-noise", "flow-ends")
 HEADING = ("heading-30-degrees",)
 """The app cannot know the heading, and swings until the filter has learnt it: scripts ask, or hop first."""
 ONLY_WITH_A_HEIGHT = ("floor-then-land", "mass-in-grams", "table-above-its-height", "table-at-its-height")
-NOT_THE_PRESETS = (*RATTLING, "random-set-points", *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT)
+NOT_THE_PRESETS = (*RATTLING, *DISORDER, *FAR, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT)
 NAMES = [
     pytest.param(name, marks=[pytest.mark.xfail(strict=True)] * (name in (*RATTLING, *HEADING)))
     for name in events_file.EVENTS.names()
@@ -89,17 +93,3 @@ def test_an_absurd_mass_changes_nothing(written: float | str, app: Path) -> None
     trace = fly_events(app, flown)
     assert broken(measure(trace, flown), flown) == []
     assert "mass refused: it is in kg" in trace.console
-
-
-@pytest.mark.parametrize(
-    "name", [name for name in events_file.EVENTS.names() if name not in (*FLOW, *HEADING, "noise-4-mm")]
-)
-def test_an_observed_target_keeps_the_bounds(name: str, observing_app: Path) -> None:
-    """With the exact tilt of `design crazyflie --acceleration observed`, packets in disorder too."""
-    assert breaks(observing_app, name) == []
-
-
-def test_an_observed_target_of_much_noise_loses_little_height(observing_app: Path) -> None:
-    """4 mm in each position from which the velocities come: 2 mm more than the bound; it stays nearer."""
-    lost = breaks(observing_app, "noise-4-mm")
-    assert all(one.startswith("lowest_m = 0.89") for one in lost)

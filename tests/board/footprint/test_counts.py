@@ -273,7 +273,7 @@ def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_what_the_harness_asks_afterwards_is_no_part_of_a_step(tmp_path: Path) -> None:
     """A step takes two arc tangents without a loop; whether it ended at the tilt limit takes eight more."""
-    text = chosen_text(vehicle_toml.preset("crazyflie"), "x", acceleration="observed")
+    text = chosen_text(vehicle_toml.preset("crazyflie"), "x")
     elf = build_guest(settings := parse(text, "x"), board_builder("crazyflie"), tmp_path)
     by_function = counted(settings, elf, 20, 0).by_function
     longest = load(elf).symbol("arc_tangent").size_bytes / 2  # instructions have two bytes at least

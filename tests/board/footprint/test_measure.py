@@ -217,16 +217,16 @@ def test_wider_arithmetic_is_reported_with_its_caller(
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize(("preset", "most"), [("mambo", 2000), ("mambo-1norm", 5100), ("table1", 4400)])
+@pytest.mark.parametrize(("preset", "most"), [("mambo", 2100), ("mambo-1norm", 5100), ("table1", 4400)])
 def test_fixed_point_keeps_its_promises(preset: str, most: int) -> None:
-    """A tenth of the instructions of float32 on the Mambo, where a limit acts a seventh; 420 B of stack."""
+    """A tenth of the instructions of float32 on the Mambo, where a limit acts a seventh; 480 B of stack."""
     settings = with_option(presets.load(preset), "code.scalar", "fixed")
     board_builder("mambo")
     footprint = measure_footprint(settings, boards.load("mambo"), counted_ticks=150)
     assert footprint.counts is not None
     assert footprint.counts.most_met <= most
     assert footprint.stack is not None
-    assert footprint.stack.bytes <= 420
+    assert footprint.stack.bytes <= 480
     assert footprint.forbidden == ()
 
 

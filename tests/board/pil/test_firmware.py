@@ -84,18 +84,18 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
-    ("board", "scalar", "acceleration"),
+    ("board", "scalar"),
     [
-        ("host", "float32", "tracked"),
-        pytest.param("host", "float64", "observed", marks=pytest.mark.long),
-        pytest.param("host", "fixed", "observed", marks=pytest.mark.long),
-        pytest.param("crazyflie", "float32", "observed", marks=pytest.mark.long),
-        pytest.param("mega", "fixed", "tracked", marks=pytest.mark.long),
+        ("host", "float32"),
+        pytest.param("host", "float64", marks=pytest.mark.long),
+        pytest.param("host", "fixed", marks=pytest.mark.long),
+        pytest.param("crazyflie", "float32", marks=pytest.mark.long),
+        pytest.param("mega", "fixed", marks=pytest.mark.long),
     ],
 )
-def test_a_height_flies_bit_for_bit(board: str, scalar: str, acceleration: str, tmp_path: Path) -> None:
+def test_a_height_flies_bit_for_bit(board: str, scalar: str, tmp_path: Path) -> None:
     """On a course in space, from the floor."""
-    settings = height_settings(scalar, acceleration)
+    settings = height_settings(scalar)
     (tmp_path / "height.toml").write_text(to_toml(settings), "utf-8")
     course = ("--trajectory", "take-off-and-landing", "--size-m", "1", "--vehicle", "crazyflie")
     with serial_line(build_firmware(settings, board, tmp_path / "pil")) as line:
@@ -107,7 +107,7 @@ def test_a_height_flies_bit_for_bit(board: str, scalar: str, acceleration: str, 
 @pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
 def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path: Path) -> None:
     """It changes the next step, on the board as on the desk; without one the command stands."""
-    settings = height_settings(scalar, "observed")
+    settings = height_settings(scalar)
     replies = []
     for reported in (False, True):
         draw = np.random.default_rng(3)

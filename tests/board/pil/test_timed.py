@@ -354,7 +354,7 @@ def test_no_step_is_made_on_request_while_the_clock_runs(elf: Path) -> None:
     """Not even the next one; the self-test stops the clock, and the next flight is a new one."""
     with closing(connect(elf)) as board:
         fly(Flight(FLIGHT.trajectory, duration_s=0.1), TimedController(SETTINGS, board))
-        board.tell(Kind.STEP, 11, bytes(48))
+        board.tell(Kind.STEP, 11, bytes(68))
         heard = list[tuple[int, int, bytes]]()
         while len(heard) < 2:
             heard += board.hear()

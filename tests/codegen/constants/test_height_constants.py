@@ -78,9 +78,10 @@ def settings(request: pytest.FixtureRequest) -> Settings:
 
 
 def test_the_law_is_the_minimum_of_a_simulated_cost(settings: Settings) -> None:
-    """Rows, in steps, and the ratio of the second derivatives; and the approach rate that they give."""
+    """Rows less the jerk, in steps, and the ratio of the second derivatives; and their approach rate."""
     like, axis = axis_like_roll(settings)
-    found, kept = height_of(settings), [0, 1, 2, 3, 4, 6, 7]
+    found = height_of(settings)
+    columns, kept = [0, 1, 2, 4, 5, 6], [0, 1, 2, 4, 6, 7]
     if axis.ramp:
         curvature, slope = two_move_cost(axis, settling_steps(like))
         rows, ratio = -np.linalg.solve(curvature, slope), curvature[0, 1] / curvature[0, 0]
@@ -89,7 +90,7 @@ def test_the_law_is_the_minimum_of_a_simulated_cost(settings: Settings) -> None:
             axis.transition, axis.change[:, None], axis.state_cost, np.array([[axis.change_cost]])
         )
         rows, ratio = np.eye(8)[7:] - axis.gain(to_go), 0.0
-    assert found.rows == pytest.approx((rows * axis.scale)[:, kept], rel=1e-7, abs=1e-12)
+    assert found.rows[:, columns] == pytest.approx((rows * axis.scale)[:, kept], rel=1e-7, abs=1e-12)
     assert found.ratio == pytest.approx(ratio, rel=1e-8)
     still_m_s = -rows[0, 0] / rows[0, 1]
     assert still_m_s * found.reach_steps * axis.period_s == pytest.approx(-1.0, rel=1e-7)
@@ -163,7 +164,7 @@ class PointMass:
             state = np.zeros((n, 10))
             state[:, 7], state[:, 8] = self.place_m, self.climb_m_s
             target = np.zeros((n, len(controller._constants.target)))
-            target[:, -2] = target_m
+            target[:, 6] = target_m
             commanded_m_s2 = self._gain * controller.step(state, target).thrust_m_s2
             for _ in range(20):
                 self._step(commanded_m_s2, self._period_s / 20)

@@ -26,10 +26,10 @@ RANGES = {
 REACH_M, FAST_M_S, STEEP_RAD, TURN_RAD, STRONG_M_S2 = 37.0, 11.0, 3.25, 1024.0, 23.0
 
 
-def settings_with(scalar: str, acceleration: str, *, height: bool) -> Settings:
+def settings_with(scalar: str, *, height: bool) -> Settings:
     """Return settings with these ranges."""
     base = CRAZYFLIE if height else TWO_MOVES
-    return settings_of(base | RANGES | {"code.scalar": scalar, "target.acceleration": acceleration})
+    return settings_of(base | RANGES | {"code.scalar": scalar})
 
 
 def statuses(settings: Settings, state: Any, target: Any, thrust_m_s2: Any) -> list[int]:
@@ -40,22 +40,20 @@ def statuses(settings: Settings, state: Any, target: Any, thrust_m_s2: Any) -> l
 
 
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-@pytest.mark.parametrize("acceleration", ["none", "observed"])
 @pytest.mark.parametrize("height", [False, True])
-def test_each_number_is_taken_up_to_its_range(scalar: str, acceleration: str, height: bool) -> None:
+def test_each_number_is_taken_up_to_its_range(scalar: str, height: bool) -> None:
     """Either way to 1 in a thousand; the first number out of range names the status."""
-    settings = settings_with(scalar, acceleration, height=height)
-    observed = acceleration == "observed"
+    settings = settings_with(scalar, height=height)
     state = [REACH_M] * 2 + [FAST_M_S] * 2 + [STEEP_RAD] * 2 + [TURN_RAD]
     state += [REACH_M, FAST_M_S] * height
-    target = [REACH_M] * 2 + [FAST_M_S] * 2 + [STRONG_M_S2] * 2 * observed
-    target += [REACH_M, FAST_M_S] * height + [STRONG_M_S2] * (height and observed)
-    target += [STRONG_M_S2] * (2 + height) * observed
+    target = [REACH_M] * 2 + [FAST_M_S] * 2 + [STRONG_M_S2] * 2
+    target += [REACH_M, FAST_M_S] * height + [STRONG_M_S2] * height
+    target += [STRONG_M_S2] * (2 + height)
     rows = len(state) + len(target)
     largest = np.concatenate([np.diag(state + target), -np.diag(state + target)])
     for factor, bad in ((0.999, False), (1.001, True)):
         states, targets = np.split(factor * largest, [len(state)], axis=1)
-        targets = np.column_stack([targets, *[np.zeros(len(states))] * observed])
+        targets = np.column_stack([targets, np.zeros(len(states))])
         if height:
             states = np.column_stack([states, np.zeros(len(states))])
         expected = [Status.BAD_STATE if bad else Status.OK] * len(state)
@@ -66,17 +64,17 @@ def test_each_number_is_taken_up_to_its_range(scalar: str, acceleration: str, he
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_a_thrust_is_taken_from_the_least_to_the_most(scalar: str) -> None:
     """Of a step without a height."""
-    settings = settings_with(scalar, "none", height=False)
+    settings = settings_with(scalar, height=False)
     thrusts = [1.499, 1.501, 22.99, 23.01]
     expected = [Status.BAD_THRUST, Status.OK, Status.OK, Status.BAD_THRUST]
-    assert statuses(settings, np.zeros((4, 7)), np.zeros((4, 4)), thrusts) == expected
+    assert statuses(settings, np.zeros((4, 7)), np.zeros((4, 9)), thrusts) == expected
 
 
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 @pytest.mark.parametrize("height", [False, True])
 def test_a_command_that_is_set_is_cut_off_at_the_tilt_limit(scalar: str, height: bool) -> None:
     """Of angles that are in their range, else it is refused; with a height it has a thrust too."""
-    settings = settings_with(scalar, "none", height=height)
+    settings = settings_with(scalar, height=height)
     controller: Any = method_of(settings).reference_controller(4)
     angles = np.array([[3.2, -0.1], [0.1, -3.2], [3.3, 0.0], [0.0, 3.3]])
     commands = np.column_stack([angles, np.full(4, 12.0)]) if height else angles
@@ -98,7 +96,7 @@ def test_a_jump_of_the_frame_is_taken_up_to_the_ranges(scalar: str, height: bool
     """Of places, then of velocities, then of the heading."""
     axes = 3 if height else 2
     largest = np.diag([REACH_M] * axes + [FAST_M_S] * axes + [TURN_RAD])
-    method: Any = method_of(settings_with(scalar, "none", height=height))
+    method: Any = method_of(settings_with(scalar, height=height))
     controller = method.reference_controller(len(largest))
     for factor, status in ((0.999, Status.OK), (1.001, Status.BAD_SHIFT)):
         assert controller.shift(factor * largest).tolist() == [status] * len(largest)
@@ -107,14 +105,12 @@ def test_a_jump_of_the_frame_is_taken_up_to_the_ranges(scalar: str, height: bool
 LIMITED = {"limits.speed_m_s": 1.5, "limits.fence.x_min_m": -1.0, "limits.fence.x_max_m": 2.0}
 ONE_NORM = with_option(presets.preset("mambo-1norm"), "limits.speed_m_s", 1.5)
 CASES = {
-    "feedback, tracked": with_option(EVERYTHING, "limits.speed_m_s", 5.0),
-    "observed": settings_of(TWO_MOVES | LIMITED | {"target.acceleration": "observed"}),
+    "feedback": with_option(EVERYTHING, "limits.speed_m_s", 5.0),
     "limits": settings_of(TWO_MOVES | LIMITED),
-    "height, tracked": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "tracked"}),
-    "height, observed": settings_of(CRAZYFLIE | LIMITED | {"target.acceleration": "observed"}),
+    "height, limits": settings_of(CRAZYFLIE | LIMITED),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
     "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
-    "height, guard": settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "guard.tilt_rad_s": 1.0}),
+    "height, guard": settings_of(CRAZYFLIE | {"guard.tilt_rad_s": 1.0}),
     "1-norm": ONE_NORM,
     "1-norm, no tracker": with_option(ONE_NORM, "target.acceleration", "none"),
 }
@@ -129,10 +125,10 @@ def stored(settings: Settings, scalar: str) -> Any:
         time_s, rattle_m_s = 0.01 * step, 0.01 * (step % 2)
         state = [0.4 + 0.3 * time_s, -0.2, 0.3, -0.4, 0.05, -0.03 + 0.1 * time_s, 0.7]
         target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
-        target += [0.3, -0.2] * settings.target.is_observed
+        target += [0.3, -0.2] * (settings.cost.norm == "quadratic")
         target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
         target += [0.1] * (len(method.target) - len(target))
-        if settings.target.is_observed:
+        if settings.cost.norm == "quadratic":
             target[-1] = 2.0
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)
         given = () if heights else ([9.9],)

@@ -15,7 +15,6 @@ from tests.support.height_settings import height_settings
 from tests.support.quadratic import ONE_MOVE, TWO_MOVES, Array, Axis, axis_of, settings_of
 from tests.support.strategies import Values
 
-OBSERVED: Final = {"target.acceleration": "observed"}
 PERIODS_S: Final = (0.005, 0.01, 0.02, 0.05)
 LAWS: Final = {
     ("two moves", "roll"): TWO_MOVES,
@@ -29,16 +28,12 @@ MEAN_CHANGE: Final = 2 / math.sqrt(math.pi)
 
 def observed(**changed: Any) -> Settings:
     """Return settings with an observer; the names of keys have __ for their dots."""
-    return settings_of(
-        TWO_MOVES | OBSERVED | {name.replace("__", "."): value for name, value in changed.items()}
-    )
+    return settings_of(TWO_MOVES | {name.replace("__", "."): value for name, value in changed.items()})
 
 
 def constants_of(settings: Settings) -> TargetObserverConstants:
     """Return the constants of the observer."""
-    found = Quadratic(settings).target_observer
-    assert found is not None
-    return found
+    return Quadratic(settings).target_observer
 
 
 def at_period(update_s: float) -> TargetObserverConstants:
@@ -164,7 +159,7 @@ def test_at_10_ms_belief_falls_as_flown() -> None:
 @pytest.mark.parametrize("update_s", PERIODS_S)
 def test_limits_are_those_of_what_the_drone_can_and_a_half_more(update_s: float) -> None:
     """Along x and y by the tilt limit, up by the thrusts; derivatives by 10/s, 2.1/s^2 and 6.4/s^2."""
-    settings = with_option(height_settings(acceleration="observed"), "horizon.update_period_s", update_s)
+    settings = with_option(height_settings(), "horizon.update_period_s", update_s)
     found, height = constants_of(settings), settings.height
     assert height is not None
     assert found.climb is not None
@@ -174,14 +169,13 @@ def test_limits_are_those_of_what_the_drone_can_and_a_half_more(update_s: float)
         shares = [1, 10 * update_s, 2.1 * update_s**2, 6.4 * update_s**2, 1, 0.1]
         assert limits.row == pytest.approx([update_s * most * share for share in shares], rel=1e-12)
     assert found.limits == [found.level, found.climb]
-    assert found.most_m_s2 == pytest.approx(1.5 * level, rel=1e-12)
 
 
 def test_limits_keep_within_ranges() -> None:
     """The acceleration within that of a thrust, a jump within the largest velocity, a jerk within a step."""
     weak = constants_of(observed(ranges__thrust_acceleration_max_m_s2=5.0, limits__tilt_rad=0.5))
-    assert [weak.most_m_s2, weak.level.acceleration] == pytest.approx([5.0, 0.05], rel=1e-12)
-    values = height_settings(acceleration="observed", thrust_max_m_s2=30.0)
+    assert weak.level.acceleration == pytest.approx(0.05, rel=1e-12)
+    values = height_settings(thrust_max_m_s2=30.0)
     strong = constants_of(with_option(values, "ranges.thrust_acceleration_max_m_s2", 30.0)).climb
     assert strong is not None
     assert strong.acceleration == pytest.approx(0.3, rel=1e-12)
@@ -191,9 +185,8 @@ def test_limits_keep_within_ranges() -> None:
     assert slow.level.jerk == pytest.approx(slow.level.acceleration, rel=1e-12)
 
 
-def test_without_the_option_there_is_no_observer() -> None:
-    """Nor with it a tracker; without a height there are no limits of one."""
-    assert Quadratic(settings_of(TWO_MOVES | {"target.acceleration": "tracked"})).target_observer is None
+def test_without_a_height_there_are_no_limits_of_one() -> None:
+    """And there is no tracker."""
     assert Quadratic(observed()).tracker is None
     found = constants_of(observed())
     assert (found.climb, found.limits) == (None, [found.level])
@@ -261,18 +254,16 @@ def settled(axis: Axis, row: Array, snap_s: float, degree: int) -> float:
 
 @pytest.mark.parametrize(("name", "angle"), LAWS)
 def test_the_first_move_follows_jerk_and_snap_without_a_distance(name: str, angle: str) -> None:
-    """Within 0.1 um of a constant one; with a tracker they leave more than 40 um."""
-    row, snap_s, axis = first_move(LAWS[name, angle] | OBSERVED, angle)
-    former, none, _ = first_move(LAWS[name, angle] | {"target.acceleration": "tracked"}, angle)
+    """Within 0.1 um of a constant one; without the share of the snap that leaves more than 40 um."""
+    row, snap_s, axis = first_move(LAWS[name, angle], angle)
     assert [settled(axis, row, snap_s, degree) < 1e-7 for degree in range(3)] == [True] * 3
-    assert none == 0
-    assert min(settled(axis, former, none, 1), settled(axis, row, none, 2)) > 4e-5
+    assert settled(axis, row, 0.0, 2) > 4e-5
 
 
 @pytest.mark.parametrize("name", ["two moves", "no delay", "slow"])
 def test_the_second_move_looks_ahead_by_a_third_of_the_ramp(name: str) -> None:
     """Of a constant jerk: it is the command that follows, and what the jerk adds to it in that time."""
-    settings = settings_of(LAWS[name, "roll"] | OBSERVED)
+    settings = settings_of(LAWS[name, "roll"])
     axis = axis_of(settings, "roll")
     first, second = (in_si(axis, row) for row in Quadratic(settings).law.rows[0])
     _, seen, command = fly(axis, without_distance(axis, first), 0.0, 1)
@@ -281,7 +272,7 @@ def test_the_second_move_looks_ahead_by_a_third_of_the_ramp(name: str) -> None:
 
 def test_the_height_follows_jerk_and_snap_without_a_distance() -> None:
     """By the lag and the delay of the thrust."""
-    settings = height_settings(acceleration="observed")
+    settings = height_settings()
     height, found = settings.height, Quadratic(settings).height
     assert height is not None
     assert found is not None

@@ -18,81 +18,57 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from tests.support.height import CRAZYFLIE
 from tests.support.quadratic import TWO_MOVES, settings_of
 
-QUADRATIC = settings_of(TWO_MOVES | {"target.acceleration": "tracked", "target.tracker_gain": 0.3})
 ONE_NORM = with_option(presets.preset("mambo-1norm"), "horizon.prediction_step_s", 0.15)
-HEIGHT = settings_of(CRAZYFLIE | {"target.acceleration": "tracked"})
-STRONG = settings_of(CRAZYFLIE | {"target.acceleration": "tracked", "height.thrust_max_m_s2": 30.0})
-WEAK = settings_of(
-    CRAZYFLIE | {"target.acceleration": "tracked", "height.thrust_max_m_s2": 12.0, "height.descent_m_s": 0.2}
-)
+QUADRATIC = settings_of(TWO_MOVES)
 
 
-def tracker_of(settings: Settings, *, climb: bool = False) -> TrackerConstants:
-    """Return the constants of the tracker of a target, or of its height."""
-    constants = method_of(settings)
-    found = constants.climb_tracker if climb else constants.tracker
+def tracker_of(settings: Settings) -> TrackerConstants:
+    """Return the constants of the tracker of a target."""
+    found = method_of(settings).tracker
     assert found is not None
     return found
 
 
-def test_what_is_new_of_a_target_is_doubted_with_a_guard() -> None:
-    """Without one it is believed as it comes, whatever the gain."""
-    settings = with_option(presets.preset("crazyflie"), "target.tracker_gain", 1.0)
-    assert tracker_of(settings).noise is not None
-    assert tracker_of(settings.model_copy(update={"guard": None})).noise is None
-
-
-@pytest.mark.parametrize("settings", [QUADRATIC, ONE_NORM], ids=["quadratic", "1-norm"])
-def test_the_factor_makes_what_is_read_an_acceleration_per_step(settings: Settings) -> None:
+def test_the_factor_makes_what_is_read_an_acceleration_per_step() -> None:
     """Of a target on a parabola: the second difference of its places at steps of the prediction."""
-    acceleration_m_s2, update_s = 0.7, settings.horizon.update_period_s
-    step_s = method_of(settings).step_s
+    acceleration_m_s2, update_s = 0.7, ONE_NORM.horizon.update_period_s
+    step_s = method_of(ONE_NORM).step_s
     places_m = 0.5 * acceleration_m_s2 * (step_s * np.arange(3)) ** 2
     (difference_m,) = np.diff(places_m, n=2)
     change_m_s = acceleration_m_s2 * update_s
-    assert tracker_of(settings).factor_s * change_m_s == pytest.approx(difference_m, rel=1e-12)
+    assert tracker_of(ONE_NORM).factor_s * change_m_s == pytest.approx(difference_m, rel=1e-12)
 
 
-def largest_m_s2(settings: Settings, *, climb: bool) -> float:
-    """Return the largest acceleration of the drone within its limits, by linear programmes for both ways."""
-    height, limit_rad = settings.height, settings.limits.tilt_rad
-    slope, rest, bounds = GRAVITY_M_S2, 0.0, (-limit_rad, limit_rad)
-    if climb and height is not None:
-        slope, rest, bounds = 1.0, -GRAVITY_M_S2, (height.thrust_min_m_s2, height.thrust_max_m_s2)
-    return float(max(sign * rest - linprog([-sign * slope], bounds=[bounds]).fun for sign in (1, -1)))
+def largest_m_s2(settings: Settings) -> float:
+    """Return the drone's largest acceleration at its tilt limit, by linear programmes for both ways."""
+    limit_rad = settings.limits.tilt_rad
+    bounds = [(-limit_rad, limit_rad)]
+    return float(max(-linprog([-sign * GRAVITY_M_S2], bounds=bounds).fun for sign in (1, -1)))
 
 
-@pytest.mark.parametrize(
-    ("settings", "climb"),
-    [(QUADRATIC, False), (ONE_NORM, False), (HEIGHT, False), (HEIGHT, True), (STRONG, True), (WEAK, True)],
-)
-def test_a_target_that_a_drone_cannot_follow_has_jumped(settings: Settings, climb: bool) -> None:
-    """From 1.5 times what the drone can: of the height the larger of what it can upwards and downwards."""
-    most_m_s2, update_s = 1.5 * largest_m_s2(settings, climb=climb), settings.horizon.update_period_s
+def test_a_target_that_a_drone_cannot_follow_has_jumped() -> None:
+    """From 1.5 times what the drone can."""
+    most_m_s2, update_s = 1.5 * largest_m_s2(ONE_NORM), ONE_NORM.horizon.update_period_s
     assert JUMP_MARGIN == 1.5
-    found, step_s = tracker_of(settings, climb=climb), method_of(settings).step_s
+    found, step_s = tracker_of(ONE_NORM), method_of(ONE_NORM).step_s
     assert found.change_limit_m_s == pytest.approx(most_m_s2 * update_s, rel=1e-12)
     assert found.acceleration_limit_m_step2 == pytest.approx(step_s**2 * most_m_s2, rel=1e-12)
     beyond = 1 - found.change_limit_m_s / found.tested_change_m_s
     assert beyond == pytest.approx(1 / 5), "of inputs drawn evenly"
-    assert method_of(QUADRATIC).climb_tracker is None, "without a height"
 
 
 def test_no_input_within_its_range_is_beyond_the_limit_of_a_jump() -> None:
     """The largest change of a velocity leads from one end of its range to the other."""
-    slow = with_option(with_option(QUADRATIC, "ranges.velocity_m_s", 0.1), "horizon.update_period_s", 0.1)
+    slow = with_option(with_option(ONE_NORM, "ranges.velocity_m_s", 0.1), "horizon.update_period_s", 0.1)
     ends_m_s = 0.1 * np.array([-1, 1])
     assert tracker_of(slow).change_limit_m_s == pytest.approx(np.max(np.diff(ends_m_s)), rel=1e-12)
 
 
 def test_the_limit_of_a_target_within_limits_is_what_the_drone_follows_or_the_range() -> None:
     """1.5 times what the tilt limit gives; or the largest thrust over mass that is accepted."""
-    assert target_limit_m_s2(QUADRATIC) == pytest.approx(
-        1.5 * largest_m_s2(QUADRATIC, climb=False), rel=1e-12
-    )
+    assert target_limit_m_s2(QUADRATIC) == pytest.approx(1.5 * largest_m_s2(QUADRATIC), rel=1e-12)
     weak = with_option(QUADRATIC, "ranges.thrust_acceleration_min_m_s2", 1.0)
     assert target_limit_m_s2(with_option(weak, "ranges.thrust_acceleration_max_m_s2", 6.0)) == 6.0
 
@@ -100,7 +76,7 @@ def test_the_limit_of_a_target_within_limits_is_what_the_drone_follows_or_the_ra
 @pytest.mark.parametrize("gain", [0.1, 0.3, 0.8])
 def test_the_bounds_of_the_estimates_are_those_of_the_worst_inputs(gain: float) -> None:
     """Of an acceleration whose jerk is the largest at every step, to 1 %; the jerk is a tenth of it."""
-    found = tracker_of(with_option(QUADRATIC, "target.tracker_gain", gain))
+    found = tracker_of(with_option(ONE_NORM, "target.tracker_gain", gain))
     worst, jerk = 0.0, found.jerk_limit_m_step2_update
     for _ in range(3000):
         worst = (1 - gain) * (worst + jerk) + gain * found.acceleration_limit_m_step2
@@ -116,7 +92,7 @@ def test_the_gain_of_the_jerk_is_the_best_one_beside_that_of_the_acceleration(ga
     So the gradients by both gains, of the variance of the estimate and of the sum of squared errors, which
     are simulated, point in opposite directions.
     """
-    found = tracker_of(with_option(QUADRATIC, "target.tracker_gain", gain))
+    found = tracker_of(with_option(ONE_NORM, "target.tracker_gain", gain))
     assert found.gain == gain
 
     def slopes(cost: Any) -> Any:

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -39,9 +40,9 @@ def test_linear_controller_commands_what_the_c_commands(name: str) -> None:
     memory = np.zeros(len(system.a))
     states = 1e-4 * np.random.default_rng(5).standard_normal((100, 7))
     states[:100, 6] = 0.0
-    controller.step(np.zeros((1, 7)), np.zeros((1, 6)), np.array([GRAVITY_M_S2]))
+    controller.step(np.zeros((1, 7)), np.zeros((1, 9)), np.array([GRAVITY_M_S2]))
     for state in states:
-        sent = controller.step(state[np.newaxis], np.zeros((1, 6)), np.array([GRAVITY_M_S2])).command_rad[0]
+        sent = controller.step(state[np.newaxis], np.zeros((1, 9)), np.array([GRAVITY_M_S2])).command_rad[0]
         assert system.c @ memory + system.d @ state == pytest.approx(sent, abs=1e-8)
         memory = system.a @ memory + system.b @ state
 
@@ -133,11 +134,17 @@ def test_a_narrow_fence_changes_nothing_midway() -> None:
     ids=["thrust without delay", "thrust with delay", "old state"],
 )
 def test_a_load_that_is_learnt_multiplies_the_thrust(settings: Settings, load: float) -> None:
-    """The controller's estimates ask for as many times more thrust as the drone is heavier.
+    """The target's acceleration asks for as many times more thrust as the drone is heavier.
 
     A drone whose thrust or state were not as late as the settings say would not come to rest.
     """
-    light, heavy = (np.abs(linear_controller(settings, one).c[2]).max() for one in (1.0, load))
+    reference = Quadratic(settings).reference_controller(1)
+    motion = reference.parts.target_observer.stored(reference.memory.target)
+    acceleration = (
+        6 + 10 + sum(one.shape[1] for one in motion) + 13
+    )  # behind observer, attitude, target, height
+    light, heavy = (linear_controller(settings, one).c[2, acceleration] for one in (1.0, load))
+    assert light > 1.0
     assert heavy == pytest.approx(load * light, rel=1e-4)
 
 

@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings import controller_toml
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
@@ -247,40 +248,31 @@ def test_a_flow_deck_has_a_noise_of_its_own() -> None:
     assert deck.age_s == 0.01
 
 
-@pytest.mark.parametrize(("ratio", "found"), [(2.49, False), (2.5, True), (2.6, True), (11.0, True)])
-def test_more_tilt_is_of_use_to_a_strong_drone_and_with_a_target_that_says_more(
-    ratio: float, found: bool
-) -> None:
-    """From 2.5 times the weight on; never without a known thrust, nor behind a Mambo's optical flow."""
-    known = strong(ratio, thrust={"lag_s": 0.05})
-    assert wants_exact(known) is found
+@pytest.mark.parametrize("ratio", [1.2, 2.6, 11.0])
+def test_more_tilt_is_of_use_where_the_height_is_held(ratio: float) -> None:
+    """Never without a known thrust, nor behind a Mambo's optical flow."""
     mambo = vehicle_toml.preset("mambo")
     flowing = changed(mambo, altitude={"thrust_max_n": ratio * mambo.weight_n})
-    assert wants_exact(known, "observed")
-    assert not wants_exact(strong(ratio), "observed")
-    assert not wants_exact(flowing, "observed")
+    assert wants_exact(strong(ratio, thrust={"lag_s": 0.05}))
     assert not wants_exact(strong(ratio))
     assert not wants_exact(flowing)
 
 
-def test_a_target_that_says_more_has_more_of_the_possible_tilt() -> None:
-    """0.7 of it with the exact tilt, and half with small angles."""
-    drone = strong(1.6, thrust={"lag_s": 0.05})
-    exact, small = (settings_for(drone, exact=exact, acceleration="observed") for exact in (True, False))
-    assert exact.target.acceleration == small.target.acceleration == "observed"
-    assert exact.limits.tilt_rad == pytest.approx(0.7 * math.acos(1.0 / 1.6), rel=ROUNDED)
-    assert small.limits.tilt_rad == pytest.approx(0.5 * math.acos(1.0 / 1.6), rel=ROUNDED)
-
-
-@pytest.mark.parametrize("ratio", [2.6, 4.0, 10.0])
-def test_exact_settings_have_half_of_the_possible_tilt(ratio: float) -> None:
-    """And brake as small angles do, whose limit is 0.5."""
+@pytest.mark.parametrize("share", [0.5, 0.6, 0.7])
+@pytest.mark.parametrize("ratio", [1.6, 2.6, 10.0])
+def test_exact_settings_have_a_share_of_the_possible_tilt(ratio: float, share: float) -> None:
+    """And brake as small angles do, whose limit is half of it, at most 0.5."""
     drone = strong(ratio, thrust={"lag_s": 0.05})
-    exact = settings_for(drone, exact=True)
+    exact = controller_toml.parse(controller_text(drone, "mine", exact_share=share), "mine")
     small = settings_for(drone)
     assert (exact.model.tilt, small.model.tilt) == ("exact", "small-angle")
-    assert exact.limits.tilt_rad == pytest.approx(math.acos(1.0 / ratio) / 2.0, rel=ROUNDED)
-    assert (small.limits.tilt_rad, exact.limits.braking_m_s2) == (0.5, small.limits.braking_m_s2)
+    possible_rad = math.acos(1.0 / ratio)
+    assert exact.limits.tilt_rad == pytest.approx(share * possible_rad, rel=ROUNDED)
+    assert small.limits.tilt_rad == pytest.approx(min(0.5 * possible_rad, 0.5), rel=ROUNDED)
+    braking_rad = min(exact.limits.tilt_rad, 0.5)
+    assert exact.limits.braking_m_s2 == pytest.approx(
+        BRAKING_SHARE * GRAVITY_M_S2 * braking_rad, rel=2.0 * ROUNDED
+    )
     assert exact.guard is not None
     assert exact.guard.tilt_rad == pytest.approx(3.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
     assert exact.guard.tilt_rad_s == pytest.approx(12.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)

@@ -19,6 +19,7 @@ from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.model.derive import derived_flight
 from mambo_sil.model.derive.derived_flight import (
     _fault,
     choose_settings,
@@ -88,7 +89,7 @@ def test_a_push_is_borne_nearly_as_far_as_the_tilt_limit_holds(
 ) -> None:
     """Flown here once more: what is borne is held within 2 cm, with a smaller limit it is not."""
     drone = vehicle_toml.preset(name)
-    settings = settings_for(drone, exact=exact, acceleration="observed" if exact else "tracked")
+    settings = settings_for(drone, exact=exact)
     found = fly_pushed(settings, drone)
     assert found.good
     assert found.words == f"bears a steady push of {borne_m_s2:g} m/s^2 from every side"
@@ -117,21 +118,33 @@ def test_a_push_that_is_not_learnt_is_seen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "strong", "survives"), [("cf2x-pyflyt", True, True), ("hummingbird", True, False)]
+    ("name", "tilt_rad"),
+    [("crazyflie", 0.638), ("x500", 0.733), ("cf2x-pyflyt", 1.04), ("hummingbird", None)],
 )
-def test_a_flight_chooses_the_exact_thrust_vector(name: str, strong: bool, survives: bool) -> None:
-    """Both have ten times their weight in thrust; the mixer of one loses the height in large swings."""
+def test_a_flight_chooses_the_exact_thrust_vector(name: str, tilt_rad: float | None) -> None:
+    """The quick mixer of a Hummingbird loses the height in large swings, whatever its share of the tilt."""
     drone = vehicle_toml.preset(name)
     exact = settings_for(drone, exact=True)
-    assert (exact.model.tilt, wants_exact(drone)) == ("exact", strong)
-    assert exact.limits.tilt_rad > 0.7
-    assert flies_quick_circle(exact, drone) is survives
+    assert (exact.model.tilt, wants_exact(drone)) == ("exact", True)
+    assert flies_quick_circle(exact, drone) is (tilt_rad is not None)
     written = choose_settings(drone, name)
-    assert (written.small_angles is None) is survives
+    assert (written.small_angles is None) is (tilt_rad is not None)
     chosen = controller_toml.parse(written.text, name)
-    assert chosen == (exact if survives else settings_for(drone))
+    assert chosen == (settings_for(drone) if tilt_rad is None else exact)
     found = (chosen.model.tilt, chosen.limits.tilt_rad)
-    assert found == (("exact", 0.74) if survives else ("small-angle", 0.5))
+    assert found == (("small-angle", 0.5) if tilt_rad is None else ("exact", tilt_rad))
+
+
+def test_a_flight_chooses_the_largest_share_that_is_survived(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the tilt at which the thrust still carries the weight."""
+    drone = vehicle_toml.preset("crazyflie")
+    monkeypatch.setattr(
+        derived_flight, "flies_quick_circle", lambda settings, _: settings.limits.tilt_rad < 0.6
+    )
+    written = controller_toml.parse(choose_settings(drone, "crazyflie").text, "crazyflie")
+    assert written.limits.tilt_rad == pytest.approx(
+        0.6 * math.acos(drone.weight_n / drone.largest_thrust_n), rel=0.01
+    )
 
 
 def test_the_quick_circle_asks_for_more_than_the_tilt_limit() -> None:
@@ -156,21 +169,12 @@ def test_the_quick_circle_has_slower_rotors() -> None:
     assert survives == [True, False]
 
 
-@pytest.mark.parametrize("name", ["crazyflie", "x500", "mambo", "generic"])
-def test_a_drone_with_less_thrust_keeps_small_angles(name: str) -> None:
-    """Below 2.5 times its weight, if its target is tracked."""
+@pytest.mark.parametrize("name", ["crazyflie-flown", "mambo", "generic"])
+def test_a_drone_whose_height_is_not_held_or_behind_optical_flow_keeps_small_angles(name: str) -> None:
+    """And nothing is flown to find that out."""
     drone = vehicle_toml.preset(name)
     assert not wants_exact(drone)
     assert chosen_text(drone, name) == controller_text(drone, name)
-
-
-@pytest.mark.parametrize(("name", "tilt_rad"), [("crazyflie", 0.638), ("x500", 0.733)])
-def test_a_drone_whose_target_says_its_acceleration_flies_with_more_tilt(name: str, tilt_rad: float) -> None:
-    """It survives the quick circle of that tilt."""
-    chosen = controller_toml.parse(
-        chosen_text(vehicle_toml.preset(name), name, acceleration="observed"), name
-    )
-    assert (chosen.model.tilt, chosen.limits.tilt_rad) == ("exact", tilt_rad)
 
 
 TIME_S = np.arange(-1.0, 10.005, 0.01)

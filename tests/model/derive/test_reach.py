@@ -7,7 +7,6 @@ import pytest
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.names import TargetAcceleration
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.model.derive.reach import largest_acceleration_m_s2, reach_words
 from tests.support.derived import settings_for
@@ -23,19 +22,17 @@ TRIMMED = {
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
-    ("name", "attitude", "acceleration"),
+    ("name", "attitude", "exact"),
     [
-        ("generic", TRIMMED, "tracked"),
-        ("crazyflie", {}, "tracked"),
-        ("crazyflie", {}, "observed"),
+        ("generic", TRIMMED, False),
+        ("crazyflie", {}, False),
+        ("crazyflie", {}, True),
     ],
 )
-def test_a_far_target_is_flown_to_with_it(
-    name: str, attitude: dict[str, object], acceleration: TargetAcceleration
-) -> None:
+def test_a_far_target_is_flown_to_with_it(name: str, attitude: dict[str, object], exact: bool) -> None:
     """By the weaker of roll and pitch, forward, back, left and right; without drag, below the speed limit."""
     drone = changed(vehicle_toml.preset(name), attitude=attitude, body={"drag_1_s": 0.0})
-    settings = settings_for(drone, exact=acceleration != "tracked", acceleration=acceleration)
+    settings = settings_for(drone, exact=exact)
     scenarios = [
         Scenario(
             vehicle=drone,

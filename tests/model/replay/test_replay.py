@@ -120,8 +120,11 @@ def crazyflie_log(rows: list[dict[str, str]], commands: str) -> Iterator[list[ob
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("commands", ["nmpc", "mine"])
-def test_a_crazyflie_log_is_replayed_without_options(commands: str, tmp_path: Path) -> None:
+def test_a_crazyflie_log_is_replayed_without_options(
+    commands: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Seven digits, blocks one after the other; an own prefix is named by --columns."""
+    monkeypatch.setattr(loop, "MOST_KNOWN", 0)
     run(*FLOWN, "crazyflie", "--vehicle", "crazyflie", "--push", "0.3,0.2", "--yaw-rad", "0.4")
     with Path("flight.csv").open("w", newline="") as file:
         csv.writer(file).writerows(crazyflie_log(trace_rows(), commands))
@@ -153,7 +156,7 @@ def trace_columns() -> dict[str, NDArray[np.float64]]:
 def test_a_ulog_is_replayed(source: str, target: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """A quaternion costs the last digits; a target's acceleration is known if the log has it."""
     write_observed()
-    monkeypatch.setattr(loop, "MOST_KNOWN", 1)
+    monkeypatch.setattr(loop, "MOST_KNOWN", int(target != TARGET))
     run(*FLOWN, source, "--push", "0.3,0.2")
     Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
     summary = replayed("flight.ulg", source)
@@ -232,8 +235,6 @@ def test_a_ulog_without_the_target_is_refused() -> None:
 def write_observed() -> None:
     """Write preset mambo with an observed target to observed.toml."""
     run("init", "-o", "observed.toml")
-    text = Path("observed.toml").read_text("utf-8")
-    Path("observed.toml").write_text(text.replace('= "tracked"', '= "observed"'), "utf-8")
 
 
 def test_a_log_of_another_rate_is_interpolated() -> None:

@@ -19,7 +19,7 @@ from mambo_sil.board.desk.desk_flight import Desk, DeskConditions
 from mambo_sil.board.desk.desk_library import HEADERS, SOURCES, interface
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.model.derive.derived_settings import controller_text
+from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.results.shared_library import LibrarySource, built_library
 
 HERE: Final = Path(__file__).parent
@@ -34,11 +34,9 @@ _TYPES: Final = {"bool": "bool", "uint": "uint{}_t", "float": "float"}
 _LOGGED: Final = {"bool": "uint8_t", "uint8_t": "uint8_t", "uint16_t": "uint16_t", "float": "float"}
 
 
-def px4_settings(acceleration: str = "observed") -> Settings:
-    """Return the settings that `design crazyflie` writes, with the target observed or tracked."""
-    text = controller_text(vehicle_toml.load("crazyflie"), "crazyflie")
-    found = text.replace('acceleration = "tracked"', f'acceleration = "{acceleration}"')
-    return parse(found, "controller.toml")
+def px4_settings() -> Settings:
+    """Return the settings that `design crazyflie` writes."""
+    return parse(chosen_text(vehicle_toml.load("crazyflie"), "crazyflie"), "controller.toml")
 
 
 def status_fields(message: str) -> tuple[dict[str, str], list[tuple[str, str, int]]]:
