@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.methods.quadratic.target_observer import ObservedMotion, level_observer, unknown_target
 from mambo_codegen.methods.quadratic.tilt_gain import TiltGain, TiltGainState, unknown_gain
 from mambo_codegen.methods.shared.inputs import FrameShift, Rows, choose
-from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw, LimitsMemory
+from mambo_codegen.methods.shared.limits import OF_HEIGHT, ActiveLimit, LimitsLaw, LimitsMemory
 from mambo_codegen.methods.shared.math import Real, clamp
 
 _GROUNDED: Final = 9
@@ -35,14 +35,14 @@ REST_M_S: Final = 0.02
 class QuadraticMemory:
     """State of n controllers between two steps.
 
-    target is of a tracker or an observer. tilt_rad and command_rad are (n, 2), missed (n,) counts control
-    steps since the last good state. height_bounds are zeros without a height, as are, without a guard,
-    budget_rad (n, 2), how much the commands may vary, and is_coarse (n,), whether no position is measured.
+    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state.
+    height_bounds are zeros without a height, as are, without a guard, budget_rad (n, 2), how much the
+    commands may vary, and is_coarse (n,), whether no position is measured.
     """
 
     estimate: Estimate
     attitude: AttitudeState
-    target: Any
+    target: ObservedMotion
     limits: LimitsMemory
     tilt_rad: Real
     command_rad: Real
@@ -65,10 +65,6 @@ class CheckedInputs:
     has_state: Rows
     target: Real
     allows_command: Rows
-
-
-_OF_HEIGHT: Final = ActiveLimit.HEIGHT | ActiveLimit.THRUST
-"""Limits that do not change the target along x and y."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +100,7 @@ class _Aim:
     """
 
     target: Real
-    motion: Any
+    motion: ObservedMotion
     limits: LimitsMemory
     height: HeightState
     weight: Real | None
@@ -324,9 +320,9 @@ class ControlStep:
             seen.lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
         )
         weight = self.height.command_weight(height)
-        limits, _, within = self.limits.aim(
-            memory.limits, memory.target, seen.estimate.position_m, level, follows
-        )
+        limits, within = self.limits.limit(memory.limits, seen.estimate.position_m, level)
+        limits = choose(follows, limits, memory.limits)
+        within = np.where(follows[:, None], within, level[:, : within.shape[1]])
         motion, target = self._track_target(memory, level, within, limits, follows)
         aim = _Aim(
             target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
@@ -338,7 +334,7 @@ class ControlStep:
     ) -> tuple[ObservedMotion, Real]:
         """Return how the programs' targets move that are followed (n,), and the aims (n, 4 or more)."""
         motion = memory.target
-        was_active, active = (one.active & ~_OF_HEIGHT for one in (memory.limits, limits))
+        was_active, active = (one.active & ~OF_HEIGHT for one in (memory.limits, limits))
         found, fitted = self.target_observer.follow(motion, program, aim, active != 0)
         was_limited = (was_active != 0) & motion.is_known
         by_limits = (active & ActiveLimit.FENCE != 0) | self.limits.is_slow(limits.bounds, program)
@@ -472,7 +468,7 @@ class ControlStep:
         """Return the limits with those of the thrust, which limits the last moves or not (n,)."""
         kept = np.where(aim.rests, 0, before.active & ActiveLimit.THRUST)
         thrust = np.where(aim.has_command, np.where(by_thrust, ActiveLimit.THRUST, 0), kept)
-        others = aim.limits.active & ~_OF_HEIGHT
+        others = aim.limits.active & ~OF_HEIGHT
         height = np.where(aim.limit_active, ActiveLimit.HEIGHT, 0)
         return replace(aim.limits, active=others + height + thrust)
 

@@ -6,6 +6,7 @@ for the target's, and the limited desired velocity for the target's velocity. `l
 
 from dataclasses import dataclass, replace
 from enum import IntFlag
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +31,10 @@ class ActiveLimit(IntFlag):
     TILT = 8
     HEIGHT = 16
     THRUST = 32
+
+
+OF_HEIGHT: Final = ActiveLimit.HEIGHT | ActiveLimit.THRUST
+"""Limits that leave the target along x and y as it is."""
 
 
 @dataclass(frozen=True)
@@ -320,7 +325,7 @@ class LimitsLaw:
         """Return what is known of targets (n, 4 or more), nothing where braking ends."""
         if not self._forgets:
             return motion
-        was = before.active & ~(ActiveLimit.HEIGHT | ActiveLimit.THRUST)
+        was = before.active & ~OF_HEIGHT
         ends = (was == ActiveLimit.BRAKING) & (after.active == 0) & self.is_slow(after.bounds, target)
         return choose(ends, unknown_motion(motion.velocity_m_s), motion)
 
