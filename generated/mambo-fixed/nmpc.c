@@ -1263,10 +1263,8 @@ static void tracker_shift(nmpc_tracker_t *tracker, const nmpc_real_t change_m_s[
 /* Turn a component along x and one along y, which stay within a limit. */
 static void turn_components(nmpc_real_t *x, nmpc_real_t *y, nmpc_real_t sine, nmpc_real_t cosine, nmpc_real_t limit)
 {
-    nmpc_real_t vector[2];
+    nmpc_real_t vector[2] = { *x, *y };
 
-    vector[0] = *x;
-    vector[1] = *y;
     turn_vector(vector, sine, cosine);
     *x = clamp(vector[0], limit);
     *y = clamp(vector[1], limit);
