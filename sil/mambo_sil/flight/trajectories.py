@@ -44,7 +44,10 @@ Point = tuple[float, float, float]
 
 
 class Trajectory(Protocol):
-    """The interface of a trajectory to the closed loop, for one flight or for n."""
+    """The interface of a trajectory to the closed loop, for one flight or for n.
+
+    A trajectory may have an attribute `known`, what its targets know of their acceleration; 2 without it.
+    """
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] in m and m/s.
