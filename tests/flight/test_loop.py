@@ -12,13 +12,22 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.table2.table2 import CASES, PRINTED_PD
-from mambo_sil.flight.columns import LEVEL
+from mambo_sil.flight.columns import LEVEL, TARGET
 from mambo_sil.flight.controllers.pd import PdController, PdOutcome
 from mambo_sil.flight.engine import simulate
+from mambo_sil.flight.height_profiles import Swing
 from mambo_sil.flight.loop import Flight, Offset, fly
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.traces import SensedTrace
-from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
+from mambo_sil.flight.trajectories import (
+    Bernoulli,
+    Circle,
+    Hover,
+    InSpace,
+    PositionStep,
+    Trajectories,
+    Waypoints,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -245,3 +254,16 @@ def test_progress_is_called_with_the_share_done() -> None:
     shares: list[float] = []
     fly(Flight(Hover(), duration_s=0.5), PdController(), shares.append)
     np.testing.assert_allclose(shares, np.arange(1, 52) / 51.0)
+
+
+def test_a_flight_says_what_its_trajectory_knows_of_the_acceleration() -> None:
+    """All of a curve, nothing between waypoints, whose velocity jumps; for each of several, and in space."""
+    kinked, curve = Waypoints(((0.0, 0.0, 0.0), (1.0, 1.0, 0.0))), Circle(1.0, 1.0)
+    for trajectory, known in (
+        (curve, 2),
+        (kinked, 0),
+        (InSpace(kinked, Swing(0.1, 1.0)), 0),
+        (Trajectories((curve, kinked)), [2, 0]),
+    ):
+        flight = Flight(trajectory, duration_s=0.1, flights=2)
+        assert (flight.given_targets[..., TARGET["known"]] == np.reshape(known, (-1, 1))).all()

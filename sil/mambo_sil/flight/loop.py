@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.port.taken import AHEAD_S, MOST_KNOWN
+from mambo_codegen.port.taken import AHEAD_S
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
@@ -44,7 +44,7 @@ from mambo_sil.flight.controllers.thrust_controller import (
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace
-from mambo_sil.flight.trajectories import Trajectory, is_spatial, vertical_of
+from mambo_sil.flight.trajectories import Trajectory, is_spatial, known_of, vertical_of
 
 HEIGHT_REFERENCE_M = -HOVER_HEIGHT_M
 """Altitude reference of a flight on a level course: z points down."""
@@ -185,7 +185,7 @@ class Flight:
             given[..., TARGET[name]] = self._for_each_flight(
                 "acceleration", self.trajectory.acceleration(when_s), 2
             )
-        given[..., TARGET["known"]] = getattr(self.trajectory, "known", MOST_KNOWN)
+        given[..., TARGET["known"]] = known_of(self.trajectory)
         if spatial:
             now, ahead = (
                 self._for_each_flight("vertical", vertical_of(self.trajectory, when_s), 3)

@@ -8,11 +8,12 @@ Half-width and radius are in metres, the angular rate in rad/s.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, Self, TypeGuard
+from typing import Any, ClassVar, Final, Protocol, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mambo_codegen.port.taken import MOST_KNOWN
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.errors import TrajectoryError
@@ -195,11 +196,15 @@ class PositionStep:
 class Waypoints:
     """Straight lines between waypoints, each at constant speed; the target rests before and after them.
 
+    Its velocity jumps at a waypoint, so no acceleration is known.
+
     Raises `TrajectoryError` unless times increase and all numbers are within `LARGEST`.
     """
 
     points: tuple[Point, ...]
     """Rows of time in s, x and y in m."""
+
+    known: ClassVar = 0
 
     def __post_init__(self) -> None:
         _check([f"point {number}" for number in range(1, len(self.points) + 1)], self.points)
@@ -228,6 +233,12 @@ class Waypoints:
         return np.zeros((*np.shape(time_s), 2))
 
 
+def known_of(trajectory: Trajectory) -> ArrayLike:
+    """Return what the targets of a trajectory know of their acceleration, of n flights perhaps (n,)."""
+    found: ArrayLike = getattr(trajectory, "known", MOST_KNOWN)
+    return found
+
+
 def _check(places: Sequence[str], points: Sequence[Point]) -> None:
     """Raise `TrajectoryError` for points that cannot be flown; `places` names each point in the message."""
     if not points:
@@ -252,6 +263,11 @@ class InSpace:
 
     plan: Trajectory
     profile: HeightProfile
+
+    @property
+    def known(self) -> ArrayLike:
+        """What is known of the plan's acceleration."""
+        return known_of(self.plan)
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -286,6 +302,11 @@ class Trajectories:
         """Return [height, climb, vertical acceleration] (..., n, 3)."""
         found = {id(one): vertical_of(one, time_s) for one in self._different}
         return np.stack([found[id(one)] for one in self.each], axis=-2)
+
+    @property
+    def known(self) -> ArrayLike:
+        """What is known of the acceleration of each (n,)."""
+        return np.array([known_of(one) for one in self.each])
 
     @property
     def spatial(self) -> bool:

@@ -43,7 +43,7 @@ def test_a_flow_deck_is_no_lost_position_whenever_it_measures(phase_ms: int, flo
 def test_a_camera_lost_in_the_climb_brings_the_drone_down(
     case: tuple[float, float, float], at_ms: int, app: Path, preset_app: Path
 ) -> None:
-    """It climbs a tenth higher than the plan at most, a sixth with a bias, and touches at 1.52 m/s at most."""
+    """It climbs a tenth higher than the plan at most, a fifth with a bias, and touches at 1.52 m/s."""
     mass_kg, bias_g, most_m = case
     conditions = DeskConditions(
         seed=at_ms, camera_offset_ms=3, mass_kg=mass_kg, accelerometer_bias_g=(0.0, 0.0, bias_g)

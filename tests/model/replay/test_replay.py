@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_sil.flight import loop
+from mambo_sil.flight import trajectories
 from mambo_sil.flight.trajectories import Bernoulli
 from mambo_sil.model.identify.signals import TARGET, TARGET_ACCELERATION
 from tests.support.command import run
@@ -124,7 +124,7 @@ def test_a_crazyflie_log_is_replayed_without_options(
     commands: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seven digits, blocks one after the other; an own prefix is named by --columns."""
-    monkeypatch.setattr(loop, "MOST_KNOWN", 0)
+    monkeypatch.setattr(trajectories, "MOST_KNOWN", 0)
     run(*FLOWN, "crazyflie", "--vehicle", "crazyflie", "--push", "0.3,0.2", "--yaw-rad", "0.4")
     with Path("flight.csv").open("w", newline="") as file:
         csv.writer(file).writerows(crazyflie_log(trace_rows(), commands))
@@ -156,7 +156,7 @@ def trace_columns() -> dict[str, NDArray[np.float64]]:
 def test_a_ulog_is_replayed(source: str, target: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """A quaternion costs the last digits; a target's acceleration is known if the log has it."""
     write_observed()
-    monkeypatch.setattr(loop, "MOST_KNOWN", int(target != TARGET))
+    monkeypatch.setattr(trajectories, "MOST_KNOWN", int(target != TARGET))
     run(*FLOWN, source, "--push", "0.3,0.2")
     Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
     summary = replayed("flight.ulg", source)
