@@ -185,7 +185,7 @@ class Flight:
             given[..., TARGET[name]] = self._for_each_flight(
                 "acceleration", self.trajectory.acceleration(when_s), 2
             )
-        given[..., TARGET["known"]] = known_of(self.trajectory)
+        given[..., TARGET["known"]] = np.reshape(known_of(self.trajectory), (-1, 1))
         if spatial:
             now, ahead = (
                 self._for_each_flight("vertical", vertical_of(self.trajectory, when_s), 3)
