@@ -147,7 +147,7 @@ def test_another_update_period_changes_the_delay_of_the_thrust() -> None:
         ({"height": "firm"}, 'height = "firm" must be "stock" or "feedforward" or "pid"'),
         ({"update_period_s": 0.0}, r"update_period_s = 0\.0 must lie in"),
         ({"update_period_s": "slow"}, 'update_period_s = "slow" must be a number'),
-        ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "acceleration"'),
+        ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "tilt_rad"'),
     ],
 )
 def test_a_wrong_option_is_refused_by_name(options: dict[str, Any], message: str) -> None:

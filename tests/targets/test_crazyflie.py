@@ -4,18 +4,14 @@ import itertools
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.flight.columns import TARGET
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
@@ -33,6 +29,7 @@ from tests.support.crazyflie import (
     flown_since,
     send,
 )
+from tests.support.knowing import Knowing
 
 SETTINGS = presets.preset("crazyflie")
 
@@ -65,19 +62,6 @@ KNOWN_MUTANTS = {
 }
 
 
-class WithoutAhead:
-    """The controller alone: its targets know their acceleration, not the one ahead, as those of the app."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._controller = CompiledController(settings)
-
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
-        """Return the next commands."""
-        changed = target.copy()
-        changed[:, TARGET["ahead_m_s2"]], changed[:, TARGET["known"]] = 0.0, 1.0
-        return self._controller.step(state, changed, thrust_acceleration_m_s2)
-
-
 def flight_of(apps: int) -> Flight:
     """Return flights of a circle, at a heading at which every sign counts."""
     drone = Vehicle.of(vehicle_toml.load("crazyflie"))
@@ -92,25 +76,27 @@ def flown_by(apps: list[Crazyflie], updates_per_setpoint: int = 1) -> Trace:
 
 @pytest.fixture(scope="module")
 def alone() -> Trace:
-    """Fly the circle with the controller alone."""
-    return fly(flight_of(1), CompiledController(SETTINGS))
+    """Fly the circle with the controller alone, which knows what the app tells it."""
+    return fly(flight_of(1), Knowing(SETTINGS, 1))
 
 
 @pytest.mark.long
 def test_every_sign_of_the_frames_counts(built: Built, alone: Trace) -> None:
     """Through the app the drone flies as with the controller alone; a wrong sign takes it away from there."""
     trace = flown_by([built.app(), *(built.mutant(name, *mutant) for name, mutant in FRAME_MUTANTS.items())])
-    right, *wrong = np.abs(trace.position_m - alone.position_m).max(axis=(0, 2))
-    assert right < 0.002  # set-points are rounded to a millimetre
+    distances = np.abs(trace.position_m - alone.position_m).max(axis=2)
+    right, *wrong = distances.max(axis=0)
+    assert right < 0.005  # the first jump of the acceleration fades: set-points may be 500 ms apart
+    assert distances[300:, 0].max() < 0.002  # set-points are rounded to a millimetre
     assert not {name for name, value in zip(FRAME_MUTANTS, wrong, strict=True) if value < 0.04}
 
 
 @pytest.mark.long
-def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built, alone: Trace) -> None:
-    """With 10 set-points a second it flies as by itself; without their age or acceleration it does not."""
+def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built) -> None:
+    """With 10 set-points a second it flies as well as with 100; without age or acceleration it does not."""
     apps = [built.app(), *(built.mutant(name, *mutant) for name, mutant in AGE_MUTANTS.items())]
     right, *wrong = measure(flown_by(apps, updates_per_setpoint=10)).iae_m_s
-    assert right == pytest.approx(measure(alone).iae_m_s[0], rel=0.05)
+    assert right < 1.05 * measure(flown_by([built.app()])).iae_m_s[0]
     assert not {name for name, value in zip(AGE_MUTANTS, wrong, strict=True) if value < 1.2 * right}
 
 
@@ -127,7 +113,7 @@ def test_a_known_acceleration_is_that_of_the_set_point(tmp_path: Path) -> None:
     settings = SETTINGS
     observed = build(write_target("crazyflie", settings, tmp_path))
     apps = [observed.app(), *(observed.mutant(name, *mutant) for name, mutant in KNOWN_MUTANTS.items())]
-    alone = fly(flight_of(1), WithoutAhead(settings))
+    alone = fly(flight_of(1), Knowing(settings, 1))
     distances = np.abs(flown_by(apps).position_m - alone.position_m).max(axis=2)
     right, *wrong = distances.max(axis=0)
     assert right < 0.005  # the first jump of the acceleration fades: set-points may be 500 ms apart

@@ -24,6 +24,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place, write_target
 from tests.support.height_settings import height_settings
+from tests.support.knowing import Knowing
 from tests.support.shell import shell
 from tests.support.tools import require
 
@@ -141,7 +142,7 @@ def flight_of(flights: int) -> Flight:
 
 def distances_m(folders: Sequence[Path]) -> FloatArray:
     """Fly the libraries in `folders`; return how far each (n,) was at most from the controller alone."""
-    alone = fly(flight_of(1), CompiledController(presets.preset("mambo")))
+    alone = fly(flight_of(1), Knowing(presets.preset("mambo"), 0))
     with ExitStack() as stack:
         processes = [stack.enter_context(flight_process(folder)) for folder in folders]
         trace = fly(flight_of(len(folders)), Processes(processes))

@@ -51,7 +51,7 @@ def test_a_slower_controller_is_told_in_control_terms() -> None:
         assert quick["delay_s"] < late["delay_s"]
     assert "roll: delay margin at the motors" in said
     assert a["observer"] == b["observer"]
-    assert a["instance_bytes"] == b["instance_bytes"] == 156
+    assert a["instance_bytes"] == b["instance_bytes"] == 236
 
 
 def test_the_same_controller_does_not_fly() -> None:
