@@ -853,8 +853,8 @@ static const nmpc_real_t motion_limits[1][NMPC_WIDTH_OF_LIMITS] = {
 };
 
 /* K of v, a, j and s for 18 to 76 set-points. */
-#define NMPC_MEMORY_ROWS 59
-static const nmpc_real_t motion_gains[NMPC_MEMORY_ROWS][4] = {
+#define NMPC_MEMORY_LAST_ROW 58
+static const nmpc_real_t motion_gains[][4] = {
     { 646756771, 275237914, 62791920, 6279192 },
     { 624575729, 251616192, 54310933, 5137521 },
     { 603744838, 230895922, 47290718, 4244039 },
@@ -917,8 +917,8 @@ static const nmpc_real_t motion_gains[NMPC_MEMORY_ROWS][4] = {
 };
 
 /* K of a, j and s for 8 to 20 accelerations. */
-#define NMPC_KNOWN_ROWS 13
-static const nmpc_real_t known_gains[NMPC_KNOWN_ROWS][3] = {
+#define NMPC_KNOWN_LAST_ROW 12
+static const nmpc_real_t known_gains[][3] = {
     { 760567125, 402653184, 89478485 },
     { 709320356, 331883837, 65075262 },
     { 663767673, 278196745, 48806447 },
@@ -1065,7 +1065,7 @@ NMPC_INLINE void motion_correct_velocity(nmpc_motion_t *motion, nmpc_real_t velo
         const nmpc_real_t *gains;
 
         motion_remember(motion);
-        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_ROWS - 1)];
+        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_LAST_ROW)];
         motion->velocity_m_s = motion->velocity_m_s + tracker_product(gains[0], innovation);
         motion->acceleration = motion->acceleration + tracker_product(gains[1], innovation);
         motion->jerk = motion->jerk + tracker_product(gains[2], innovation);
@@ -1089,7 +1089,7 @@ NMPC_INLINE void motion_correct_acceleration(nmpc_motion_t *motion, nmpc_real_t 
     if (judged > 0) {
         const nmpc_real_t wanted = NMPC_KNOWN_LEAST + count_product(NMPC_KNOWN_PER_NOISE, motion->noise);
         const nmpc_real_t memory = (NMPC_KNOWN_MOST < wanted) ? NMPC_KNOWN_MOST : wanted;
-        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_ROWS - 1)];
+        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_LAST_ROW)];
 
         motion->acceleration = motion->acceleration + tracker_product(gains[0], innovation);
         motion->jerk = motion->jerk + tracker_product(gains[1], innovation);

@@ -706,8 +706,8 @@ static const nmpc_real_t motion_limits[1][NMPC_WIDTH_OF_LIMITS] = {
 };
 
 /* K of v, a, j and s for 18 to 76 set-points. */
-#define NMPC_MEMORY_ROWS 59
-static const nmpc_real_t motion_gains[NMPC_MEMORY_ROWS][4] = {
+#define NMPC_MEMORY_LAST_ROW 58
+static const nmpc_real_t motion_gains[][4] = {
     { 0.6023392f, 0.2563353f, 0.058479533f, 0.0058479533f },
     { 0.5816815f, 0.23433584f, 0.050580997f, 0.004784689f },
     { 0.5622812f, 0.21503858f, 0.044042915f, 0.0039525693f },
@@ -770,8 +770,8 @@ static const nmpc_real_t motion_gains[NMPC_MEMORY_ROWS][4] = {
 };
 
 /* K of a, j and s for 8 to 20 accelerations. */
-#define NMPC_KNOWN_ROWS 13
-static const nmpc_real_t known_gains[NMPC_KNOWN_ROWS][3] = {
+#define NMPC_KNOWN_LAST_ROW 12
+static const nmpc_real_t known_gains[][3] = {
     { 0.7083333f, 0.375f, 0.083333336f },
     { 0.6606061f, 0.3090909f, 0.060606062f },
     { 0.6181818f, 0.2590909f, 0.045454547f },
@@ -916,7 +916,7 @@ NMPC_INLINE void motion_correct_velocity(nmpc_motion_t *motion, nmpc_real_t velo
         const nmpc_real_t *gains;
 
         motion_remember(motion);
-        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_ROWS - 1)];
+        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_LAST_ROW)];
         motion->velocity_m_s = motion->velocity_m_s + (gains[0] * innovation);
         motion->acceleration = motion->acceleration + (gains[1] * innovation);
         motion->jerk = motion->jerk + (gains[2] * innovation);
@@ -940,7 +940,7 @@ NMPC_INLINE void motion_correct_acceleration(nmpc_motion_t *motion, nmpc_real_t 
     if (judged > 0) {
         const nmpc_real_t wanted = NMPC_KNOWN_LEAST + (NMPC_KNOWN_PER_NOISE * motion->noise);
         const nmpc_real_t memory = (NMPC_KNOWN_MOST < wanted) ? NMPC_KNOWN_MOST : wanted;
-        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_ROWS - 1)];
+        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_LAST_ROW)];
 
         motion->acceleration = motion->acceleration + (gains[0] * innovation);
         motion->jerk = motion->jerk + (gains[1] * innovation);

@@ -12,7 +12,7 @@ _PLACES: Final = {"state": STATE, "target": TARGET, "command": COMMAND}
 
 _WHOLE_OF: Final = (
     "#define WHOLE_OF(number) "
-    "(((number) >= 0) && ((number) < 100) && !((number) > (int)(number)) ? (int)(number) : 100)"
+    "(((number) >= 0) && ((number) < 100) && !((double)(number) > (int)(number)) ? (int)(number) : 100)"
 )
 """An integer. A fraction, NaN, and what is less than 0 or large become 100, which no `known` is."""
 

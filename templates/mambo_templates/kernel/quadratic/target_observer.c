@@ -164,7 +164,7 @@ NMPC_INLINE void motion_correct_velocity(nmpc_motion_t *motion, nmpc_real_t velo
         const nmpc_real_t *gains;
 
         motion_remember(motion);
-        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_ROWS - 1)];
+        gains = motion_gains[motion_row(motion->memory - NMPC_MEMORY_LEAST, NMPC_MEMORY_LAST_ROW)];
         motion->velocity_m_s = motion->velocity_m_s + tracker_product(gains[0], innovation);
         motion->acceleration = motion->acceleration + tracker_product(gains[1], innovation);
         motion->jerk = motion->jerk + tracker_product(gains[2], innovation);
@@ -188,7 +188,7 @@ NMPC_INLINE void motion_correct_acceleration(nmpc_motion_t *motion, nmpc_real_t 
     if (judged > 0) {
         const nmpc_real_t wanted = NMPC_KNOWN_LEAST + count_product(NMPC_KNOWN_PER_NOISE, motion->noise);
         const nmpc_real_t memory = (NMPC_KNOWN_MOST < wanted) ? NMPC_KNOWN_MOST : wanted;
-        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_ROWS - 1)];
+        const nmpc_real_t *const gains = known_gains[motion_row(memory - NMPC_KNOWN_LEAST, NMPC_KNOWN_LAST_ROW)];
 
         motion->acceleration = motion->acceleration + tracker_product(gains[0], innovation);
         motion->jerk = motion->jerk + tracker_product(gains[1], innovation);
