@@ -208,11 +208,11 @@ def test_a_command_of_others_moves_the_model() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("values", "largest_m"), [(TWO_MOVES, 5e-4), (ONE_MOVE, 0.012)])
+@pytest.mark.parametrize(("values", "largest_m"), [(TWO_MOVES, 5e-4), (ONE_MOVE, 1.1e-3)])
 def test_a_target_on_a_circle_is_followed_closely(values: Values, largest_m: float) -> None:
-    """By its velocity alone, and by its acceleration too; rate feedback, which resists, costs 1 % of 1 m."""
+    """By its velocity alone, and by its acceleration too; this drone has its lag after rate feedback."""
     for known in (0.0, 1.0):
-        settings = settings_of(values | {"code.scalar": "float64"})
+        settings = settings_of(values | {"damping.roll_rate_feedback_s": 0.0, "code.scalar": "float64"})
         drone, controller = LinearDrone(settings), QuadraticController(Quadratic(settings))
         largest = 0.0
         for step in range(1500):
