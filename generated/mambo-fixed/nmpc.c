@@ -854,7 +854,7 @@ static const nmpc_real_t motion_limits[1][NMPC_WIDTH_OF_LIMITS] = {
 
 /* K of v, a, j and s for 18 to 76 set-points. */
 #define NMPC_MEMORY_LAST_ROW 58
-static const nmpc_real_t motion_gains[][4] = {
+static const nmpc_real_t motion_gains[59][4] = {
     { 646756771, 275237914, 62791920, 6279192 },
     { 624575729, 251616192, 54310933, 5137521 },
     { 603744838, 230895922, 47290718, 4244039 },
@@ -918,7 +918,7 @@ static const nmpc_real_t motion_gains[][4] = {
 
 /* K of a, j and s for 8 to 20 accelerations. */
 #define NMPC_KNOWN_LAST_ROW 12
-static const nmpc_real_t known_gains[][3] = {
+static const nmpc_real_t known_gains[13][3] = {
     { 760567125, 402653184, 89478485 },
     { 709320356, 331883837, 65075262 },
     { 663767673, 278196745, 48806447 },

@@ -707,7 +707,7 @@ static const nmpc_real_t motion_limits[1][NMPC_WIDTH_OF_LIMITS] = {
 
 /* K of v, a, j and s for 18 to 76 set-points. */
 #define NMPC_MEMORY_LAST_ROW 58
-static const nmpc_real_t motion_gains[][4] = {
+static const nmpc_real_t motion_gains[59][4] = {
     { 0.6023392f, 0.2563353f, 0.058479533f, 0.0058479533f },
     { 0.5816815f, 0.23433584f, 0.050580997f, 0.004784689f },
     { 0.5622812f, 0.21503858f, 0.044042915f, 0.0039525693f },
@@ -771,7 +771,7 @@ static const nmpc_real_t motion_gains[][4] = {
 
 /* K of a, j and s for 8 to 20 accelerations. */
 #define NMPC_KNOWN_LAST_ROW 12
-static const nmpc_real_t known_gains[][3] = {
+static const nmpc_real_t known_gains[13][3] = {
     { 0.7083333f, 0.375f, 0.083333336f },
     { 0.6606061f, 0.3090909f, 0.060606062f },
     { 0.6181818f, 0.2590909f, 0.045454547f },
