@@ -111,6 +111,9 @@ def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, 
             given_m_s2 = min(1.25 * limits.acceleration / observer.update_s, most_m_s2)
             found[f"{name or 'TARGET_'}M_S2"] = (given_m_s2, "thrust")
             found[f"{name}CHANGE_M_S"] = (min(1.25 * limits.jump, change_m_s), "velocity")
+        # With half of it the memory is the longest.
+        noise_m_s = 2.0 * (observer.longest - observer.least) / observer.memory_slopes[0]
+        found["NOISE_M_S"] = (min(noise_m_s, observer.most_noise), "velocity")
     elif method.tracker is not None:
         found["CHANGE_M_S"] = (min(method.tracker.tested_change_m_s, change_m_s), "velocity")
     return found

@@ -205,7 +205,8 @@ class Episodes:
             return [((drawn.choice >> 14) & 7 == 0).astype(self._numbers.computed)]
         if row.draw is COUNT:
             count, kept = (drawn.choice >> 17) & 3, (drawn.choice >> 19) & 7 == 0
-            return [np.where((count == 3) & ~kept, 0, count).astype(self._numbers.computed)]
+            refused = np.where((drawn.choice >> 22) & 1 == 1, -1, 3)
+            return [np.where(count < 3, count, np.where(kept, refused, 0)).astype(self._numbers.computed)]
         scale = self._numbers.constant(*self._scales.of[row.draw.scale])
         if row.draw.rests:
             scale = np.where(drawn.is_there, np.zeros_like(scale), scale)
@@ -279,6 +280,8 @@ class Episodes:
         if method.guard is not None:
             measured = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
             calls |= dict.fromkeys((4, 12), measured)
+        if method.target_observer is not None:
+            calls |= dict.fromkeys((7, 13), ("set_memories", self._memories))
         turn, before = index % CALLS_IN_TURN, self._draws.last
         if turn not in calls:
             return None
@@ -286,6 +289,15 @@ class Episodes:
         values = arguments()
         self._draws.restore(self._is_lost, before)
         return OtherCall(name, values)
+
+    def _memories(self) -> Real:
+        """Draw memory and noise along each axis (n, 2 axes): few steps in a row would not reach every row."""
+        observer, columns = self._method.target_observer, list[Real]()
+        rows = np.uint32(observer.longest - observer.least + 1)
+        for _ in range(self._method.port.axes):
+            counted = observer.least - 1 + (self._draws.next() % rows)
+            columns += [counted.astype(self._numbers.computed), self._share(*self._scales.of["NOISE_M_S"])]
+        return self._numbers.to_si(np.stack(columns, axis=1), *("whole", "velocity") * self._method.port.axes)
 
     def _command(self) -> Real:
         return self._drawn_record("command")

@@ -30,7 +30,7 @@ class Draw:
     largest: of the scale in SI units; None where the settings say it.
     way:     SIGNED, or SHARE, without a sign. Without a scale: of AIM, where the target is; of BESIDE, near
              the target's member of the same name; of CHANCE, 1 in one input of eight, else 0;
-             of COUNT, 0 to 2, or, in one of 32, a 3, which is refused.
+             of COUNT, 0 to 2, or, in one of 32, a 3 or -1, which is refused.
     rests:   whether it is 0 of a drone that is at its target.
     """
 

@@ -99,6 +99,22 @@ class QuadraticController:
         self.memory = replace(self.memory, is_coarse=np.logical_not(is_measured))
         return np.full(len(is_measured), Status.OK)
 
+    def set_memories(self, memories: ArrayLike) -> NDArray[np.int64]:
+        """Write memory and noise of the target's observer along each axis (n, 2 axes), as the self-test does.
+
+        Returns a status (n,).
+        """
+        values = np.asarray(memories)
+        found = self._numbers.quantize(values, ("whole", "velocity") * (values.shape[1] // 2))
+        found = found.astype(self._numbers.computed)
+        memory, rest = self.memory, found[:, 4:]
+        target = replace(memory.target, memory=found[:, 0:4:2], noise=found[:, 1:4:2])
+        height = memory.height
+        if rest.shape[1]:
+            height = replace(height, target=replace(height.target, memory=rest[:, 0:1], noise=rest[:, 1:2]))
+        self.memory = replace(memory, target=target, height=height)
+        return np.full(len(found), Status.OK)
+
     def shift(self, change: ArrayLike) -> NDArray[np.int64]:
         """Tell the controllers that their frames have jumped: `change` (n, 5), with a height (n, 7).
 
