@@ -114,6 +114,7 @@ def _motion_scales(method: Method, change_m_s: float) -> dict[str, tuple[float, 
         # With half of it the memory is the longest.
         noise_m_s = 2.0 * (observer.longest - observer.least) / observer.memory_slopes[0]
         found["NOISE_M_S"] = (min(noise_m_s, observer.most_noise), "velocity")
+        found["MOST_NOISE_M_S"] = (observer.most_noise, "velocity")
     elif method.tracker is not None:
         found["CHANGE_M_S"] = (min(method.tracker.tested_change_m_s, change_m_s), "velocity")
     return found

@@ -296,7 +296,9 @@ class Episodes:
         rows = np.uint32(observer.longest - observer.least + 1)
         for _ in range(self._method.port.axes):
             counted = observer.least - 1 + (self._draws.next() % rows)
-            columns += [counted.astype(self._numbers.computed), self._share(*self._scales.of["NOISE_M_S"])]
+            few, many = (self._scales.of[name] for name in ("NOISE_M_S", "MOST_NOISE_M_S"))
+            scale = np.where(counted & 1 == 0, *(self._numbers.constant(*one) for one in (few, many)))
+            columns += [counted.astype(self._numbers.computed), self._draws.share(scale)]
         return self._numbers.to_si(np.stack(columns, axis=1), *("whole", "velocity") * self._method.port.axes)
 
     def _command(self) -> Real:
