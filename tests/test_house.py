@@ -18,7 +18,7 @@ _MANY = ("campaign", "faults", "table2")
 EXACT_ROOMS = ("api", "drone", "flight", "board.pil", *(f"experiment.{name}" for name in _MANY))
 ROUNDED = {
     "mambo_sil.flight.animation",
-    "mambo_sil.api.frames",
+    "mambo_sil.flight.frames",
     "mambo_sil.experiment.faults.faults_report",
 }
 # NumPy and math have these with other bits on other processors.

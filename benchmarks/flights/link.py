@@ -20,10 +20,10 @@ import numpy as np
 from benchmarks.flights.wire import Faults, WiredLink
 from mambo_codegen.settings import controller_toml
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.states import TargetState
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
+from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Circle, Gerono, Trajectory
 from mambo_sil.link.pilot import Pilot
 from mambo_sil.link.records import STACKS, EstimatedState

@@ -36,9 +36,9 @@ from benchmarks.simulators.missions import (
 )
 from benchmarks.simulators.pilots import Challenger, Designed, Preset, Sight, SimulatorPilot, through
 from benchmarks.simulators.raptor_flights import MOTOR_N, fly_raptor
-from mambo_sil.api.frames import command_in_frame
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.frames import command_in_frame
 
 SEEDS: Final = (101, 102, 103, 104, 105)
 SEARCH_SEED, CANDIDATES = 201, 30

@@ -12,11 +12,11 @@ from crazyflow.sim import Sim
 
 from benchmarks.simulators.missions import STEP_S
 from benchmarks.simulators.pilots import Sight, as_seen
-from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
+from mambo_sil.flight.frames import attitude_of_quaternion
 
 FREQ_HZ: Final = 500
 CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")

@@ -9,11 +9,11 @@ from mambo_codegen.settings import controller_toml, presets
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.options import with_options
 from mambo_sil.api.set_points import HeightHold
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.states import DroneState, TargetState
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 

@@ -21,10 +21,10 @@ from scipy.spatial.transform import Rotation
 from benchmarks.simulators.missions import MISSIONS, STEP_S
 from benchmarks.simulators.pilots import Challenger, Designed, Sight, SimulatorPilot
 from benchmarks.simulators.single import fly_alone, measure, search
-from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
+from mambo_sil.flight.frames import attitude_of_quaternion
 
 HUMMINGBIRD: Final = vehicle_toml.preset("hummingbird")
 MASS_KG: Final = float(quad_params["mass"])

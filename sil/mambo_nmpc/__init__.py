@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from mambo_codegen.errors import MamboNmpcError
     from mambo_sil.api.api_controller import Controller
     from mambo_sil.api.flights import Flown, fly
-    from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.api.options import ControllerOptions
-    from mambo_sil.api.states import DroneState, StepOutcome, TargetState
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
+    from mambo_sil.flight.frames import attitude_of_quaternion, command_in_frame
+    from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
     from mambo_sil.link.pilot import Pilot
 
 __all__ = [
@@ -41,15 +41,15 @@ _HOMES: Final = {
     "ArgumentError": "mambo_sil.errors",
     "Controller": "mambo_sil.api.api_controller",
     "ControllerOptions": "mambo_sil.api.options",
-    "DroneState": "mambo_sil.api.states",
+    "DroneState": "mambo_sil.flight.states",
     "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
     "Pilot": "mambo_sil.link.pilot",
-    "StepOutcome": "mambo_sil.api.states",
-    "TargetState": "mambo_sil.api.states",
+    "StepOutcome": "mambo_sil.flight.states",
+    "TargetState": "mambo_sil.flight.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
-    "attitude_of_quaternion": "mambo_sil.api.frames",
-    "command_in_frame": "mambo_sil.api.frames",
+    "attitude_of_quaternion": "mambo_sil.flight.frames",
+    "command_in_frame": "mambo_sil.flight.frames",
     "fly": "mambo_sil.api.flights",
 }
 """The module of each name: imported at its first use, so that the command line starts at once."""

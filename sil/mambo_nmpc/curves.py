@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mambo_sil.api.frames import FrameName, vectors_to_ned
 from mambo_sil.arguments import as_numbers, require, require_choice, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.frames import FrameName, vectors_to_ned
 from mambo_sil.flight.names import CURVE_NAMES, CurveName
 from mambo_sil.flight.polynomials import Piece, Pieces, PiecesInSpace
 from mambo_sil.flight.trajectories import (

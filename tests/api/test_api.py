@@ -28,10 +28,10 @@ from mambo_nmpc import (
     command_in_frame,
     fly,
 )
-from mambo_sil.api.frames import FrameName, attitude_to_ned, vectors_to_ned
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.frames import FrameName, attitude_to_ned, vectors_to_ned
 from mambo_sil.flight.trajectories import Circle
 from tests.support.one_norm import ONE_NORM
 

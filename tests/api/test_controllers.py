@@ -20,8 +20,8 @@ from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
 from mambo_nmpc.curves import CurvePoint, Trajectory, curve, sample
 from mambo_sil.api import set_points
-from mambo_sil.api.frames import FRAMES, FrameName
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.frames import FRAMES, FrameName
 from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
 from tests.support.derived import settings_for
 from tests.support.one_norm import ONE_NORM

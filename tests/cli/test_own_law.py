@@ -20,6 +20,10 @@ class Pd:
         return y / 9.81, -x / 9.81
 
 
+class Own(Pd):
+    pass
+
+
 class Ending(Pd):
     steps = 0
 
@@ -66,7 +70,7 @@ def test_a_law_that_raises_loses_the_drone() -> None:
     """With the sentence that says why."""
     said, why = run("fly", "--controller", "laws.py:Ending", *LINE, code=1)
     assert "LOST: the drone diverged" in said
-    assert "flight 0, 1 s: law.step: RuntimeError: no more" in unwrapped(why)
+    assert "1 s: law.step: RuntimeError: no more" in unwrapped(why)
 
 
 @pytest.mark.parametrize(
@@ -98,3 +102,82 @@ def test_settings_beside_a_law_are_refused() -> None:
     """It has none."""
     _, said = run("fly", "mambo", "--controller", "laws.py:Pd", code=2)
     assert "mambo: --controller laws.py:Pd has no settings; leave it out" in unwrapped(said)
+
+
+CAMPAIGN = """
+controllers = ["pd", "laws.py:Own", "laws.py:Ending"]
+[flight]
+vehicle = "crazyflie"
+duration_s = 3.0
+rate_rad_s = 0.5
+[draws]
+yaw_rad = {uniform = [-3.0, 3.0]}
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Fly a campaign of three controllers, one of which fails in each flight."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "gains.py").write_text("POSITION, VELOCITY = 6.0, 4.0\n", "utf-8")
+    (folder / "laws.py").write_text(LAWS, "utf-8")
+    (folder / "campaign.toml").write_text(CAMPAIGN, "utf-8")
+    said, why = run("campaign", str(folder / "campaign.toml"), "--flights", "6", "-o", str(folder / "out"))
+    assert "Own: " in said
+    assert "0 of 6 crashed" in said
+    assert "in the mean, 6 of 6 crashed" in said
+    assert "Ending failed in 6 flights, as in flight 0, 1.02 s: law.step: RuntimeError: no more" in unwrapped(
+        why
+    )
+    return folder
+
+
+def test_a_campaign_flies_it_beside_others(whole: Path) -> None:
+    """One that fails ends its own flights, the same seeds of the others go on."""
+    summary = json.loads((whole / "out/summary.json").read_text("utf-8"))
+    crashed = {name: one["crashed"]["count"] for name, one in summary["controllers"].items()}
+    assert crashed == {"pd": 0, "Own": 0, "Ending": 6}
+    of_pd, of_law = (summary["controllers"][name]["quantiles"]["iae_m_s"]["0.5"] for name in ("pd", "Own"))
+    assert of_law < 0.5 * of_pd
+    header, *rows = (whole / "out/flights.csv").read_text("utf-8").splitlines()
+    assert len(rows) == 6
+    assert len({len(row.split(",")) for row in (header, *rows)}) == 1
+
+
+def test_a_flight_of_a_campaign_is_repeated(whole: Path) -> None:
+    """From its record, and from the database; of a law that fails with the reason."""
+    record = min((whole / "out/flights").glob("*-Own.json"))
+    other = record.with_name(record.name.replace("-Own", "-Ending"))
+    other.unlink()
+    said, _ = run("fly", "--repeat", str(record), "--no-pictures")
+    assert "repetition: the trace equals the recorded one, bit for bit" in said
+    said, why = run("fly", "--repeat", str(other), "--no-pictures", "-o", "again", code=1)
+    assert "repetition: the trace equals the recorded one, bit for bit" in said
+    assert "s: law.step: RuntimeError: no more" in unwrapped(why)
+
+
+def test_a_changed_law_is_another_campaign(whole: Path) -> None:
+    """What is in the folder was flown by the file as it was."""
+    laws = whole / "laws.py"
+    laws.write_text(LAWS + "\n", "utf-8")
+    _, why = run("campaign", str(whole / "campaign.toml"), "--flights", "6", "-o", str(whole / "out"), code=2)
+    laws.write_text(LAWS, "utf-8")
+    assert "holds another campaign, with controllers[1].law.sha256" in unwrapped(why)
+
+
+@pytest.mark.parametrize(
+    ("named", "sentence"),
+    [
+        ("gone.py:Pd", "there is no file"),
+        ("laws.py:Idle", "Idle has no method step(state, target)"),
+        ("laws.py:Odd", "update_period_s = 0.0071 must be a whole multiple"),
+        ("laws.py:Own", "two are called Own"),
+    ],
+)
+def test_a_campaign_names_a_bad_one(named: str, sentence: str) -> None:
+    """With its place in the file, before anything flies."""
+    text = CAMPAIGN.replace("laws.py:Ending", named)
+    Path("campaign.toml").write_text(text, "utf-8")
+    _, why = run("campaign", "campaign.toml", "--flights", "2", code=2)
+    assert unwrapped(why).startswith("campaign.toml: controllers: ")
+    assert sentence in unwrapped(why)

@@ -12,11 +12,11 @@ from benchmarks.flights.wire import Faults, WiredLink
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import wrapped
-from mambo_sil.api.states import TargetState
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
+from mambo_sil.flight.frames import wrapped
+from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Circle, Gerono
 from mambo_sil.link.phases import Phase
 from mambo_sil.link.pilot import Pilot

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from mambo_sil.api.frames import turned_tilt
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
+from mambo_sil.flight.frames import turned_tilt
 from mambo_sil.link.records import EstimatedState
 from mambo_sil.link.steady_frame import LONGEST_S, SteadyFrame
 

@@ -14,11 +14,11 @@ import numpy as np
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_nmpc import Controller, DroneState, TargetState
 from mambo_nmpc.adapters.rotorpy import RotorpyController
-from mambo_sil.api.frames import vectors_to_ned
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.campaign.campaign_flights import DIGEST, fly_scenarios
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.frames import vectors_to_ned
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.link.pilot import Pilot
 from mambo_sil.model.replay.log_replay import replay_log

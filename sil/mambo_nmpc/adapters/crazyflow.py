@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_nmpc.adapters import touches_floor
 from mambo_nmpc.curves import Trajectory, sample
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import attitude_of_quaternion, yaw_to_ned
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import require
 from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import attitude_of_quaternion, yaw_to_ned
+from mambo_sil.flight.states import DroneState, TargetState
 
 States = tuple[Any, Any, Any]
 """Positions (worlds, drones, 3), quaternions (worlds, drones, 4) and velocities, as in `sim.data.states`."""

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from mambo_nmpc.adapters import demand_period, load, touches_floor
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import attitude_of_quaternion
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import attitude_of_quaternion
+from mambo_sil.flight.states import DroneState, TargetState
 
 INSTALL: Final = "pip install git+https://github.com/utiasDSL/gym-pybullet-drones"
 """It is not on PyPI."""

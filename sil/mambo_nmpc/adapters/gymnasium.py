@@ -7,14 +7,14 @@ import numpy as np
 from mambo_nmpc.adapters import load
 from mambo_nmpc.curves import CurvePoint, curve, sample
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import command_in_frame, vectors_to_ned
 from mambo_sil.api.options import ControllerOptions
 from mambo_sil.api.simulated import LOST_M, SimulatedDrone
-from mambo_sil.api.states import TargetState
 from mambo_sil.arguments import of_shape, require, require_choice, require_number
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import Vertical
+from mambo_sil.flight.frames import command_in_frame, vectors_to_ned
 from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.states import TargetState
 
 gymnasium: Any = load("gymnasium", "pip install gymnasium")
 Environment: Any = gymnasium.Env

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from mambo_nmpc.adapters import demand_period
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import wrapped
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import require_number
 from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import wrapped
+from mambo_sil.flight.states import DroneState, TargetState
 
 BASE_MODE: Final = 0
 """The mode below: rates of roll, pitch and yaw, and a throttle; no mode takes attitude and thrust."""

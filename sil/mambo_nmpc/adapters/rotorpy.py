@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from mambo_nmpc.adapters import touches_floor
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import attitude_of_quaternion
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import require_kind, require_number
 from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import attitude_of_quaternion
+from mambo_sil.flight.states import DroneState, TargetState
 
 
 class RotorpyController:

@@ -16,7 +16,6 @@ from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.api.options import ControllerOptions, with_options
 from mambo_sil.api.set_points import Heading, HeightHold
-from mambo_sil.api.states import DroneState, StepOutcome, TargetState
 from mambo_sil.arguments import (
     as_numbers,
     is_whole,
@@ -37,6 +36,7 @@ from mambo_sil.flight.names import (
     SENSORS_KINDS,
     SensorsKind,
 )
+from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 LARGEST_N: Final = 1_000_000

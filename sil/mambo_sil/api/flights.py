@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mambo_codegen.settings.key import spell
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.own_law import Law, OwnLaws, period_of
 from mambo_sil.arguments import (
     is_whole,
     require,
@@ -23,6 +22,7 @@ from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.own_law import Law, OwnLaws, period_of
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight
@@ -49,7 +49,7 @@ class Flown:
     trace:   k samples of n flights, with units in the names of its arrays.
     metrics: of the true positions, each (n,).
     crashed: which flights (n,) were lost, tilted too far or touched the ground.
-    failures: of a law of one's own, why it was lost, by the number of the flight.
+    failures: of a law of one's own, when and why it was lost, by the number of the flight.
     """
 
     trace: Trace
@@ -117,8 +117,8 @@ def fly(
         return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
     laws = OwnLaws(controller, flight)
     trace = simulate.fly(flight, laws)
-    for failure in laws.failures.values():
-        warnings.warn(failure, stacklevel=2)
+    for number, failure in laws.failures.items():
+        warnings.warn(f"flight {number}, {failure}", stacklevel=2)
     return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone), laws.failures)
 
 

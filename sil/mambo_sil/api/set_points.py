@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from mambo_codegen.numbers.representation import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
-from mambo_sil.api.frames import wrapped
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.frames import wrapped
 from mambo_sil.flight.names import AltitudeName
+from mambo_sil.flight.states import DroneState, TargetState
 
 HEADING_RATE_RAD_S: Final = 4.0
 """Fastest turn of the heading: a jump of it takes from the motors the thrust that carries the drone."""

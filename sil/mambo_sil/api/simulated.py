@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from mambo_sil.api.states import DroneState
 from mambo_sil.arguments import require
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -13,6 +12,7 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.controllers.thrust_controller import ThrustDelivery
 from mambo_sil.flight.crashes import least_level
+from mambo_sil.flight.states import DroneState
 
 LOST_M = 100.0
 """A drone this far from the origin along any axis is lost."""

@@ -6,7 +6,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 import difflib
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args, get_origin
 
@@ -20,6 +20,8 @@ from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.controllers.own_law import LawFile
 from mambo_sil.flight.names import PD_NAMES, PdName
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -38,21 +40,34 @@ File = TypeVar("File", bound=FileSection)
 
 @dataclass(frozen=True)
 class Entrant:
-    """One controller of a campaign: a PD, or generated C."""
+    """One controller of a campaign: a PD, generated C, or a law of the user's own."""
 
     name: str
-    kind: Literal[PdName, "nmpc"]
+    kind: Literal[PdName, "nmpc", "law"]
     settings: Settings
-    """A PD uses their update period only."""
+    """A PD uses their update period only, a law nothing."""
+    law: LawFile | None = None
+
+    @property
+    def update_period_s(self) -> float:
+        """Time from one control step to the next."""
+        return self.settings.horizon.update_period_s if self.law is None else self.law.update_period_s
+
+    @property
+    def controller(self) -> str:
+        """What a record of a flight calls it."""
+        return self.kind if self.law is None else self.law.named
 
     def document(self) -> dict[str, Any]:
         """Return the controller as plain values, for other processes and for files."""
-        return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump()}
+        law = {} if self.law is None else {"law": asdict(self.law)}
+        return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump(), **law}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> "Entrant":
         """Return the controller that `document` describes."""
-        return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]))
+        law = LawFile(**document["law"]) if "law" in document else None
+        return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]), law)
 
 
 def read_as(model: type[File], path: Path) -> File:
@@ -114,6 +129,23 @@ def load_entrant(named: str, folder: Path, place: str) -> Entrant:
             )
         )
     return Entrant(name, "nmpc", settings)
+
+
+def load_any_entrant(named: str, folder: Path, place: str) -> Entrant:
+    """Return the same, or a law of the user's own, FILE.py:CLASS, with the name of the class.
+
+    Raises InvalidSettingsError, whose lines begin with `place`.
+    """
+    if ".py:" not in named:
+        return load_entrant(named, folder, place)
+    try:
+        law = LawFile.of(named, folder)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{place}: {error}",)) from None
+    name = named.rpartition(":")[2]
+    if not _NAME.fullmatch(name):
+        raise InvalidSettingsError((f"{place}: {echo(named)}: its class must have at most 40 letters",))
+    return Entrant(name, "law", Settings(), law)
 
 
 def _explain(details: ErrorDetails, model: type[FileSection]) -> str:

@@ -8,7 +8,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -56,6 +56,8 @@ LARGEST_RATE_RAD_S: Final = 100.0
 LONGEST_S: Final = 3600.0
 LARGEST_YAW_RAD: Final = 1000.0
 
+OwnLawName = Annotated[str, Field(pattern=r"^.*\.py:[A-Za-z_]\w*$")]
+"""A law of the user's own, FILE.py:CLASS."""
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 
@@ -240,9 +242,9 @@ class Record(_Record):
 
     format: Literal[2] = FORMAT
     scenario: Scenario
-    controller: ControllerName = "nmpc"
+    controller: ControllerName | OwnLawName = "nmpc"
     settings: Settings
-    """Settings of the NMPC; a PD uses their update period only."""
+    """Settings of the NMPC; a PD uses their update period only, a law of the user's own nothing."""
     trace_sha256: str | None = None
     """`Trace.digest` of the original flight, if known."""
 

@@ -8,8 +8,8 @@ from typing import Final, Protocol
 import numpy as np
 
 from mambo_codegen.port.taken import AHEAD_S
-from mambo_sil.api.states import TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Trajectory, vertical_of
 
 SOFT_S: Final = 4.0

@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_sil.api.frames import attitude_of_quaternion
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import attitude_of_quaternion
 from mambo_sil.link.records import (
     COMPANION,
     SET_MODE,

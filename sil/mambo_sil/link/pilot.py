@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.options import ControllerOptions
-from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import of_shape, require_choice, require_number, require_path
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import ArgumentError, PilotError
+from mambo_sil.flight.states import DroneState, TargetState
 from mambo_sil.flight.trajectories import Trajectory
 from mambo_sil.link.courses import Along, Place, TargetCourse, TargetProgram
 from mambo_sil.link.life_cycle import FARTHEST_M, LifeCycle

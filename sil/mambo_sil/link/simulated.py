@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_sil.api.frames import turned_tilt, wrapped
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.ground import carry_on_ground
@@ -18,6 +17,7 @@ from mambo_sil.drone.plant.vehicle import Seen, Vehicle, truth
 from mambo_sil.drone.sensors.autopilot import EstimatorErrors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
+from mambo_sil.flight.frames import turned_tilt, wrapped
 from mambo_sil.flight.loop import Flight, suite_of
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import choose_sensors

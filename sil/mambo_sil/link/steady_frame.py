@@ -16,9 +16,9 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.api.frames import wrapped
-from mambo_sil.api.states import TargetState
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.frames import wrapped
+from mambo_sil.flight.states import TargetState
 from mambo_sil.link.records import EstimatedState
 
 JUMP_M, JUMP_RAD = 0.03, 0.1

@@ -9,9 +9,9 @@ import numpy as np
 
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.api.frames import turned_tilt, wrapped
-from mambo_sil.api.states import DroneState, StepOutcome, TargetState
 from mambo_sil.errors import LinkError
+from mambo_sil.flight.frames import turned_tilt, wrapped
+from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
 from mambo_sil.model.identify.signals import UPDATES

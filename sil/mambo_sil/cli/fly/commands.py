@@ -26,6 +26,7 @@ from mambo_sil.cli.options import (
 from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
 from mambo_sil.errors import FlightError
 from mambo_sil.results.folders import SUMMARY, new_results
+from mambo_sil.results.terminal import sentence
 
 if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
@@ -107,13 +108,21 @@ def _fly_campaign(
     workers: int | None,
     scheduler: str | None,
 ) -> "CampaignSummary":
-    """Fly the missing flights and write the results; if interrupted print how many are finished."""
+    """Fly the missing flights and write the results; if interrupted print how many are finished.
+
+    Says of each law of the user's own in how many of these flights it failed, and why in one of them.
+    """
     from mambo_sil.experiment.campaign import campaign_file
     from mambo_sil.experiment.campaign.campaign_report import finish
     from mambo_sil.experiment.campaign.campaign_run import fly_missing, missing_flights, open_campaign
     from mambo_sil.experiment.campaign.executors import cluster, processes
 
     chosen = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
+    failures = dict[str, list[str]]()
+
+    def failed(name: str, flight: int, reason: str) -> None:
+        failures.setdefault(name, []).append(f"flight {flight}, {reason}")
+
     with (
         open_campaign(chosen, output) as store,
         continued_later(output, lambda: len(store.finished), flights, "flights"),
@@ -124,12 +133,15 @@ def _fly_campaign(
                 pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
                 with pool as open_pool:
                     bar.stage("flying")
-                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
-            return finish(chosen, store, bar.stage)
+                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running, failed=failed)
+            summary = finish(chosen, store, bar.stage)
         except KeyboardInterrupt:
             with contextlib.suppress(UnwritableError):
                 store.export()
             raise
+    for name, reasons in failures.items():
+        typer.echo(sentence(f"{name} failed in {len(reasons)} flights, as in {min(reasons)}"), err=True)
+    return summary
 
 
 FAULTS_FILES = ("faults.csv", "faults.png", "faults.svg")

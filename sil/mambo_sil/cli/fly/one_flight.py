@@ -15,7 +15,6 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.messages import degrees_hint
 from mambo_codegen.settings.model import Settings
-from mambo_sil.api.own_law import Law, OwnLaws, load_law, period_of
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
 from mambo_sil.cli.fly.target_columns import target_columns
 from mambo_sil.cli.options import load, load_drone, show_result
@@ -29,6 +28,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.errors import FlightError, TrajectoryError
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.own_law import Law, OwnLaws, load_law, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import Walls, walls_m
@@ -87,9 +87,14 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         summary = FlySummary(**fields)
         write_flight(trace, summary, settings, output, folder, flight=flight)
         summary.write(folder)
+    tell_failures(laws)
+    finish(summary, output, written(output))
+
+
+def tell_failures(laws: OwnLaws | None) -> None:
+    """Say when and why laws failed."""
     for failure in laws.failures.values() if laws else ():
         typer.echo(sentence(failure), err=True)
-    finish(summary, output, written(output))
 
 
 def load_settings(runner: Runner) -> Settings:

@@ -5,17 +5,25 @@ from pathlib import Path
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
 from mambo_sil.cli.fly.fly_options import OtherFlight, Output
-from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
+from mambo_sil.cli.fly.one_flight import (
+    FLIGHT_FILES,
+    TRACE_FILES,
+    draw_flight,
+    finish,
+    tell_failures,
+    write_trace,
+)
 from mambo_sil.cli.fly.target_columns import target_columns
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
+from mambo_sil.flight.controllers.own_law import OwnLaws, load_law, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.fences import fenced, walls_m
 from mambo_sil.flight.flight_report import RepeatSummary, flight_title, judge
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.names import PD_TITLES
+from mambo_sil.flight.names import flies_settings
 from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results
 
@@ -33,33 +41,38 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
     """
     other.refuse(ALLOWED, f"--repeat {echo(str(file))} contains the whole flight")
     record = (None if file.exists() else campaign_record(file)) or read_record(file)
-    flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
-    watched, flies = _controllers(record, flight)
-    controller = fenced(flies, record.settings, [record.scenario], flight)
+    law = load_law(record.controller) if ".py:" in record.controller else None
+    period_s = record.settings.horizon.update_period_s if law is None else period_of(law)
+    flight = flight_of([record.scenario], period_s)
+    laws = None if law is None else OwnLaws(law, flight)
+    watched, flies = (None, laws) if laws else _controllers(record, flight)
+    controller = laws or fenced(flies, record.settings, [record.scenario], flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(output.output, RepeatSummary.command, files) as folder:
         with progress_bar("repeating") as progress:
             trace = simulate(flight, controller, progress)
-        write_trace(trace, folder, target_columns(flight, record.settings))
+        has_settings = flies_settings(record.controller)
+        write_trace(trace, folder, target_columns(flight, record.settings) if has_settings else {})
         if not output.no_pictures:
-            limits = record.settings.limits
+            limit_m_s = record.settings.limits.speed_m_s if has_settings else 0.0
             walls = walls_m(record.settings, record.scenario.fence_m)
             title = flight_title(file.name, record.scenario)
-            draw_flight(trace, title, folder, walls, limits.speed_m_s)
+            draw_flight(trace, title, folder, walls, limit_m_s)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
-        limited = None if record.controller in PD_TITLES else record.scenario
+        limited = record.scenario if has_settings else None
         summary = RepeatSummary(
             repeat=str(file),
             same_bits_as_recorded=None if recorded is None else trace.digest() == recorded,
             same_bits_as_host=None,
             controller=record.controller,
             scenario=record.scenario,
-            settings=None if record.controller in PD_TITLES else record.settings.digest,
+            settings=record.settings.digest if has_settings else None,
             **judge(trace, record.settings, record.scenario.vehicle, limited),
         )
         summary.write(folder)
+    tell_failures(laws)
     written = TRACE_FILES if output.no_pictures else FLIGHT_FILES
     finish(summary, output, written if watched is None else (*written, INNER_STEPS))
 

@@ -21,7 +21,7 @@ from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.errors import FlightError
+from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.experiment.campaign.distributions import Distribution, parse
 from mambo_sil.experiment.campaign.parameters import (
     OF_THE_CURVE,
@@ -31,7 +31,8 @@ from mambo_sil.experiment.campaign.parameters import (
     draw,
     scenario_values,
 )
-from mambo_sil.experiment.inputs import Entrant, File, FileSection, load_drone, load_entrant, read_as
+from mambo_sil.experiment.inputs import Entrant, File, FileSection, load_any_entrant, load_drone, read_as
+from mambo_sil.flight.controllers.own_law import LawFile, columns_of_law, load_law
 from mambo_sil.flight.names import IN_SPACE, SENSORS_OF, AltitudeName, SensorsName, Start
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
@@ -163,7 +164,7 @@ def names_drone(path: Path) -> bool:
 def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None) -> Campaign:
     """Load drone and controllers and check that each can be simulated."""
     file, drone = load_its_drone(file, folder, source, vehicle)
-    entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
+    entrants = tuple(load_any_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
     names = [entrant.name for entrant in entrants]
     for name, other in itertools.combinations(names, 2):
         if name == other:
@@ -179,9 +180,11 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
             )
     campaign = Campaign(file, entrants, drone)
     for entrant, named in zip(entrants, file.controllers, strict=True):
-        demand_flyable(
-            entrant.settings, campaign.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
-        )
+        place, drawn = f"{source}: controllers: {echo(named)}", campaign.draw(0)
+        if entrant.law is None:
+            demand_flyable(entrant.settings, campaign.flight, drawn, place)
+        else:
+            _demand_command(entrant.law, campaign.flight, drawn, place)
     return campaign
 
 
@@ -199,6 +202,14 @@ def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, plac
         flight_of([scenario(flight, drawn)], settings.horizon.update_period_s)
     except FlightError as error:
         raise InvalidSettingsError((f"{place}: horizon.{error}",)) from None
+
+
+def _demand_command(law: LawFile, flight: dict[str, Any], drawn: Draw, place: str) -> None:
+    """Raise InvalidSettingsError unless a law returns a command at the start of a random flight."""
+    try:
+        columns_of_law(load_law(law.named), flight_of([scenario(flight, drawn)], law.update_period_s))
+    except (ArgumentError, FlightError) as error:
+        raise InvalidSettingsError((f"{place}: {error}",)) from None
 
 
 def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -> tuple[File, VehicleFile]:

@@ -6,6 +6,7 @@ Arguments and results are plain values, which can be sent to other processes and
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import cache
 from typing import Any, Final
 
 from mambo_codegen import __version__
@@ -17,12 +18,14 @@ from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.own_law import Law, LawFile, OwnLaws, load_law
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
-from mambo_sil.flight.engine.simulate import fly_groups, part_of
+from mambo_sil.flight.engine.simulate import fly, fly_groups, part_of
 from mambo_sil.flight.fences import LIMIT_METRICS, fenced, measure_limits
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
+from mambo_sil.flight.names import PD_NAMES
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.results.metric_names import SEEN
@@ -34,6 +37,8 @@ SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
 """Metrics of the error that are also computed from the estimates."""
 
 CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
+FAILURE: Final = "failure"
+"""When and why a law of the user's own failed; not a column of a campaign."""
 SATURATED: Final = "saturated_share"
 """Share of the commands with roll or pitch at the tilt limit of the settings; not a column of a campaign."""
 
@@ -95,11 +100,11 @@ def fly_scenarios(
     compiler, FlightError for flights that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
-    periods = dict.fromkeys(entrant.settings.horizon.update_period_s for entrant in entrants)
+    compiled = [one for one in entrants if one.law is None]
     flown = 0
-    for period_s in periods:
+    for period_s in dict.fromkeys(entrant.update_period_s for entrant in compiled):
         flight = flight_of(scenarios, period_s)
-        these = [one for one in entrants if one.settings.horizon.update_period_s == period_s]
+        these = [one for one in compiled if one.update_period_s == period_s]
         share = part_of(report, flown, len(entrants), len(these))
         for group in fly_groups(flight, [_controller(one, scenarios, flight) for one in these], share):
             entrant, last = these[group.controller], group.first + group.trace.flights
@@ -109,12 +114,35 @@ def fly_scenarios(
                 for row, value in zip(rows[group.first : last], values, strict=True):
                     row[f"{entrant.name}_{key}"] = value
         flown += len(these)
+    for entrant in (one for one in entrants if one.law is not None):
+        _fly_law(entrant, scenarios, rows, part_of(report, flown, len(entrants)))
+        flown += 1
     report(0.0)
     return rows
 
 
+def _fly_law(entrant: Entrant, scenarios: Sequence[Scenario], rows: list[Row], report: Report) -> None:
+    """Fly a law of the user's own, and write its results to the rows."""
+    assert entrant.law is not None
+    flight = flight_of(scenarios, entrant.update_period_s)
+    laws = OwnLaws(_load(entrant.law), flight)
+    trace = fly(flight, laws, report)
+    limit_rad = method_of(entrant.settings).tilt_limit_rad
+    for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle).items():
+        for row, value in zip(rows, values, strict=True):
+            row[f"{entrant.name}_{key}"] = value
+    for number, failure in laws.failures.items():
+        rows[number][f"{entrant.name}_{FAILURE}"] = failure
+
+
+@cache
+def _load(law: LawFile) -> Law:
+    """Return a law; a worker reads its file once."""
+    return load_law(law.named)
+
+
 def _controller(entrant: Entrant, scenarios: Sequence[Scenario], flight: Flight) -> PositionController:
-    if entrant.kind != "nmpc":
+    if entrant.kind in PD_NAMES:
         return pd_controller(entrant.kind, flight)
     with _BUILDING:
         compiled = CompiledController(entrant.settings, flight.flights)

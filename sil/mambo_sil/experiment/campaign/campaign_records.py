@@ -19,6 +19,7 @@ from mambo_sil.experiment.campaign.campaign_flights import DIGEST
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import DATABASE, FlightStore, Value, convert_os_errors, read_flight
 from mambo_sil.experiment.inputs import Entrant
+from mambo_sil.flight.controllers.own_law import LawFile
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import GENERATOR
 
@@ -62,10 +63,10 @@ def campaign_record(path: Path) -> Record | None:
     except (OSError, ValueError, TypeError, KeyError, sqlite3.Error):
         return None
     settings = Settings.model_validate_json(json.dumps(document["settings"]))
+    law = LawFile(**document["law"]) if "law" in document else None
     vehicle = VehicleFile.model_validate_json(json.dumps(held["vehicle"])).model_dump()
-    return _record(
-        held["flight"] | {"vehicle": vehicle}, Entrant(document["name"], document["kind"], settings), row
-    )
+    entrant = Entrant(document["name"], document["kind"], settings, law)
+    return _record(held["flight"] | {"vehicle": vehicle}, entrant, row)
 
 
 def _record(section: dict[str, Any], entrant: Entrant, row: dict[str, Value]) -> Record:
@@ -73,7 +74,7 @@ def _record(section: dict[str, Any], entrant: Entrant, row: dict[str, Value]) ->
     drawn: Draw = {name: row[name] for name in ("seed", *PARAMETERS)}
     return Record(
         scenario=scenario(section, drawn),
-        controller=entrant.kind,
+        controller=entrant.controller,
         settings=entrant.settings,
         trace_sha256=str(row[f"{entrant.name}_{DIGEST}"]),
     )

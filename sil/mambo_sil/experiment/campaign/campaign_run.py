@@ -9,7 +9,7 @@ from typing import Any, Final
 from mambo_codegen import __version__
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_file import Campaign
-from mambo_sil.experiment.campaign.campaign_flights import columns, fly_batch
+from mambo_sil.experiment.campaign.campaign_flights import FAILURE, columns, fly_batch
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import FlightStore, open_store
@@ -69,11 +69,13 @@ def fly_missing(
     progress: Callable[[int], None],
     *,
     running: Callable[[float], None] = lambda _: None,
+    failed: Callable[[str, int, str], None] = lambda *_: None,
     batch: int = FIRST_BATCH,
 ) -> None:
     """Fly the missing flights and store them.
 
-    Calls `progress` with the number of finished flights, `running` with what the unfinished amount to.
+    Calls `progress` with the number of finished flights, `running` with what the unfinished amount to,
+    `failed` with name, flight and reason of each law of the user's own that failed.
     """
     left = missing_flights(store, flights)
     sizes = list(batch_sizes(len(left), pool.workers, batch))
@@ -93,6 +95,10 @@ def fly_missing(
 
     progress(len(store.finished))
     for number, rows in pool.run(fly_batch, tasks(), report):
-        flown = zip(drawn.pop(number).items(), rows, strict=True)
+        flown = list(zip(drawn.pop(number).items(), rows, strict=True))
         store.add({flight: draws | row for (flight, draws), row in flown})
+        for (flight, _), row in flown:
+            for entrant in campaign.entrants:
+                if failure := row.get(f"{entrant.name}_{FAILURE}"):
+                    failed(entrant.name, flight, str(failure))
         progress(len(store.finished))

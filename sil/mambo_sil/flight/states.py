@@ -6,7 +6,10 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_sil.api.frames import (
+from mambo_sil.arguments import of_shape, require, require_number
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.frames import (
     FrameName,
     attitude_to_ned,
     command_in_frame,
@@ -14,9 +17,6 @@ from mambo_sil.api.frames import (
     with_columns,
     yaw_to_ned,
 )
-from mambo_sil.arguments import of_shape, require, require_number
-from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.errors import ArgumentError
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -1,8 +1,10 @@
 """Laws of a program's own, which fly in place of a controller's C."""
 
 import copy
+import hashlib
 import importlib.util
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, cast
 
@@ -10,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mambo_codegen.errors import echo
-from mambo_sil.api.states import DroneState, TargetState, unchecked
 from mambo_sil.arguments import require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
 from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.states import DroneState, TargetState, unchecked
 
 RULE: Final = "return roll and pitch in rad, or these and the thrust over mass in m/s^2"
 
@@ -38,6 +40,35 @@ class Law(Protocol):
         altitude loop of the vehicle holds the height.
         """
         ...
+
+
+@dataclass(frozen=True)
+class LawFile:
+    """A law in a file.
+
+    named:           FILE.py:CLASS, with the whole path of the file.
+    sha256:          of the file.
+    update_period_s: time from one call of the law to the next.
+    """
+
+    named: str
+    sha256: str
+    update_period_s: float
+
+    @classmethod
+    def of(cls, named: str, folder: Path = Path()) -> "LawFile":
+        """Return the law that FILE.py:CLASS names, beside `folder`.
+
+        Raises FlightError as `load_law`, and for a law whose update period is no number in 0.001..1.
+        """
+        file, _, name = named.rpartition(":")
+        whole = f"{(folder / file).resolve()}:{name}"
+        law = load_law(whole)
+        try:
+            period_s = period_of(law)
+        except ArgumentError as error:
+            raise FlightError(f"{echo(named)}: {error}") from error
+        return cls(whole, hashlib.sha256((folder / file).read_bytes()).hexdigest(), period_s)
 
 
 def load_law(named: str) -> Law:
@@ -77,11 +108,11 @@ class OwnLaw:
     """A law of one flight, as the closed loop calls it.
 
     Once the law has failed, that is raised, or returned what is no command, its commands are NaN: the flight
-    is lost. `failure` says why.
+    is lost. `failure` says when and why.
     """
 
-    def __init__(self, law: Law, columns: Columns, flight: int, update_period_s: float) -> None:
-        self._law, self.columns, self._flight, self._period_s = law, columns, flight, update_period_s
+    def __init__(self, law: Law, columns: Columns, update_period_s: float) -> None:
+        self._law, self.columns, self._period_s = law, columns, update_period_s
         self._calls = 0
         self.failure: str | None = None
 
@@ -98,7 +129,7 @@ class OwnLaw:
                 numbers[0] = command_of(self._law.step(*_seen(state[0], target[0])), self.columns)
             except Exception as error:
                 said = str(error) if isinstance(error, ArgumentError) else f"{type(error).__name__}: {error}"
-                self.failure = f"flight {self._flight}, {self._calls * self._period_s:g} s: law.step: {said}"
+                self.failure = f"{self._calls * self._period_s:g} s: law.step: {said}"
         self._calls += 1
         return Applied.of(numbers, np.zeros(1, np.int64))
 
@@ -109,7 +140,7 @@ class OwnLaws:
     def __init__(self, law: Law, flight: Flight) -> None:
         self.columns = columns_of_law(_copy(law), flight)
         period_s = flight.update_period_s
-        self.laws = [OwnLaw(_copy(law), self.columns, each, period_s) for each in range(flight.flights)]
+        self.laws = [OwnLaw(_copy(law), self.columns, period_s) for _ in range(flight.flights)]
 
     def of_flight(self, flight: int) -> OwnLaw:
         """Return the law of a flight."""
@@ -128,7 +159,7 @@ class OwnLaws:
 
     @property
     def failures(self) -> dict[int, str]:
-        """Why laws failed, by the number of the flight."""
+        """When and why laws failed, by the number of the flight."""
         return {each: law.failure for each, law in enumerate(self.laws) if law.failure is not None}
 
 
