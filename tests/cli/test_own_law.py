@@ -111,7 +111,7 @@ vehicle = "crazyflie"
 duration_s = 3.0
 rate_rad_s = 0.5
 [draws]
-yaw_rad = {uniform = [-3.0, 3.0]}
+yaw_rad = 0.0
 """
 
 
