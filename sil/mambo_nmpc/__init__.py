@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from mambo_codegen.errors import MamboNmpcError
     from mambo_sil.api.api_controller import Controller
+    from mambo_sil.api.campaigns import CampaignFlights, campaign, draw_vehicles
     from mambo_sil.api.flights import Flown, fly
     from mambo_sil.api.options import ControllerOptions
     from mambo_sil.drone.plant.vehicle import Vehicle
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArgumentError",
+    "CampaignFlights",
     "Controller",
     "ControllerOptions",
     "DroneState",
@@ -33,12 +35,15 @@ __all__ = [
     "TargetState",
     "Vehicle",
     "attitude_of_quaternion",
+    "campaign",
     "command_in_frame",
+    "draw_vehicles",
     "fly",
 ]
 
 _HOMES: Final = {
     "ArgumentError": "mambo_sil.errors",
+    "CampaignFlights": "mambo_sil.api.campaigns",
     "Controller": "mambo_sil.api.api_controller",
     "ControllerOptions": "mambo_sil.api.options",
     "DroneState": "mambo_sil.flight.states",
@@ -49,7 +54,9 @@ _HOMES: Final = {
     "TargetState": "mambo_sil.flight.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
     "attitude_of_quaternion": "mambo_sil.flight.frames",
+    "campaign": "mambo_sil.api.campaigns",
     "command_in_frame": "mambo_sil.flight.frames",
+    "draw_vehicles": "mambo_sil.api.campaigns",
     "fly": "mambo_sil.api.flights",
 }
 """The module of each name: imported at its first use, so that the command line starts at once."""

@@ -50,7 +50,7 @@ AXES: dict[FrameName, NDArray[np.float64]] = {
 def test_the_examples_of_the_document_run() -> None:
     """One after another, as a reader types them; their assertions hold."""
     blocks = [block.partition("```")[0] for block in DOCUMENT.read_text("utf-8").split("```python\n")[1:]]
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, str(DOCUMENT), "exec"), names)

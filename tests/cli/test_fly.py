@@ -125,7 +125,7 @@ def test_polynomial_pieces_fly(tmp_path: Path) -> None:
         (["--trajectory", "none.CSV"], "none.CSV: cannot be read: No such file or directory\n"),
         (
             ["--wind", "0.5,0"],
-            "--wind 0.5,0 must be none or gusts; a steady acceleration is --push X,Y, in m/s^2",
+            "--wind 0.5,0 must be none, gusts or a speed in m/s; a steady acceleration is --push X,Y",
         ),
         (["--push", "strong"], "--push strong must be two numbers, as in 0.5,0"),
         (["--seed", "-1"], "--seed = -1 must lie in 0.."),

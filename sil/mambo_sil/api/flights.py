@@ -1,5 +1,6 @@
 """Flights for programs: the closed loop of a controller's C and a simulated vehicle."""
 
+import math
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -32,17 +33,19 @@ from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
     LARGEST_SIZE_M,
+    LARGEST_WIND_M_S,
     LARGEST_YAW_RAD,
     LONGEST_S,
     choose_sensors,
 )
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Trajectory, is_trajectory
+from mambo_sil.results.number_format import distance
 
 LARGEST_PUSH_M_S2: Final = 100.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Flown:
     """n simulated flights.
 
@@ -56,6 +59,12 @@ class Flown:
     metrics: Metrics
     crashed: NDArray[np.bool_]
     failures: dict[int, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Return how many flights there are, how close they are, and how many crashed."""
+        rms_m = [distance(value) for value in np.quantile(self.metrics.rms_error_m, (0.5, 1.0)).tolist()]
+        shown = " to ".join(dict.fromkeys(rms_m))
+        return f"Flown({len(self.crashed)} flights: rms error {shown}, {int(self.crashed.sum())} crashed)"
 
 
 def fly(
@@ -71,6 +80,8 @@ def fly(
     seeds: Sequence[int] = (0,),
     start: Start = "hover",
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0),
+    wind_speed_m_s: PerFlight = 0.0,
+    wind_direction_rad: PerFlight = 0.0,
 ) -> Flown:
     """Fly the settings of a controller, or a law of your own, on a vehicle, once for each seed.
 
@@ -85,6 +96,8 @@ def fly(
     seeds:      of sensor noise, one for each of n flights.
     start:      hovering at the first point, or on the ground 5 s earlier ("take-off").
     push_m_s2:  steady acceleration along x and y of the world, each one number or an array (n,).
+    wind_speed_m_s, wind_direction_rad: mean wind 6 m above the ground, of which 0.65 is left at 1.1 m, with
+                its gusts, and the heading towards which it blows; each one number or an array (n,).
 
     Raises ArgumentError for a wrong argument, FlightError if they do not fit together.
     """
@@ -100,6 +113,8 @@ def fly(
     require_per_flight("yaw_rad", yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD, len(given))
     vehicle.require_flights(len(given))
     _require_push(push_m_s2, len(given))
+    require_per_flight("wind_speed_m_s", wind_speed_m_s, 0.0, LARGEST_WIND_M_S, len(given))
+    require_per_flight("wind_direction_rad", wind_direction_rad, -math.tau, math.tau, len(given))
     flight = Flight(
         _curve(trajectory, size_m, rate_rad_s),
         duration_s=duration_s,
@@ -109,7 +124,7 @@ def fly(
         vehicle=vehicle,
         update_period_s=period_of(controller),
         seeds=given,
-        disturbances=Disturbances(push_m_s2=push_m_s2),
+        disturbances=Disturbances(wind_speed_m_s, wind_direction_rad, push_m_s2=push_m_s2),
         sensors=choose_sensors(sensors, vehicle.drone),
     )
     if isinstance(controller, Controller):

@@ -5,7 +5,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args, get_origin
@@ -24,7 +24,7 @@ from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.own_law import LawFile
 from mambo_sil.flight.names import PD_NAMES, PdName
 
-_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 Found = TypeVar("Found")
 
@@ -76,7 +76,14 @@ def read_as(model: type[File], path: Path) -> File:
     Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors.
     """
     source = echo(str(path))
-    document = parse_document(read_text(path), source)
+    return as_sections(model, parse_document(read_text(path), source), source)
+
+
+def as_sections(model: type[File], document: Mapping[str, Any], source: str) -> File:
+    """Return a document as a `model` with sections like campaign.toml.
+
+    Raises InvalidSettingsError, whose lines begin with `source`, with all errors.
+    """
     try:
         return model.model_validate(document)
     except ValidationError as error:
@@ -121,7 +128,7 @@ def load_entrant(named: str, folder: Path, place: str) -> Entrant:
             return Entrant(pd, pd, Settings())
     settings = load_settings(named, folder, place)
     name = named if named in presets.names() else Path(named).stem
-    if not _NAME.fullmatch(name) or name in PD_NAMES:
+    if not NAME.fullmatch(name) or name in PD_NAMES:
         raise InvalidSettingsError(
             (
                 f"{place}: {echo(named)} must have a name of at most 40 letters, digits, - and "
@@ -143,7 +150,7 @@ def load_any_entrant(named: str, folder: Path, place: str) -> Entrant:
     except FlightError as error:
         raise InvalidSettingsError((f"{place}: {error}",)) from None
     name = named.rpartition(":")[2]
-    if not _NAME.fullmatch(name):
+    if not NAME.fullmatch(name):
         raise InvalidSettingsError((f"{place}: {echo(named)}: its class must have at most 40 letters",))
     return Entrant(name, "law", Settings(), law)
 

@@ -55,6 +55,7 @@ LARGEST_SIZE_M: Final = 1000.0
 LARGEST_RATE_RAD_S: Final = 100.0
 LONGEST_S: Final = 3600.0
 LARGEST_YAW_RAD: Final = 1000.0
+LARGEST_WIND_M_S: Final = 50.0
 
 OwnLawName = Annotated[str, Field(pattern=r"^.*\.py:[A-Za-z_]\w*$")]
 """A law of the user's own, FILE.py:CLASS."""
@@ -119,7 +120,7 @@ class Scenario(_Record):
 
     push_m_s2: Two = (0.0, 0.0)
     """Steady acceleration along x and y of the world."""
-    wind_speed_m_s: float = Field(0.0, ge=0.0, le=50.0)
+    wind_speed_m_s: float = Field(0.0, ge=0.0, le=LARGEST_WIND_M_S)
     """Mean wind 20 ft above the ground, with gusts; 0 is still air."""
     wind_direction_rad: float = 0.0
     """Heading towards which the air moves."""

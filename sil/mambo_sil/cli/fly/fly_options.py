@@ -106,7 +106,7 @@ class Conditions:
     ] = "0,0"
     wind: Annotated[
         str,
-        typer.Option(help="none, or gusts: light turbulence and a mean wind to north.", metavar="WIND"),
+        typer.Option(help="Mean wind to north 6 m high in m/s, with its gusts; gusts: 7.7.", metavar="WIND"),
     ] = "none"
     seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.", metavar="N")] = 0
 

@@ -40,6 +40,7 @@ from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
     LARGEST_SIZE_M,
+    LARGEST_WIND_M_S,
     LONGEST_S,
     Scenario,
     choose_sensors,
@@ -334,11 +335,18 @@ def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
 
 
 def _wind_speed_m_s(wind: str) -> float:
-    if wind not in (CALM, GUSTS):
+    for word, speed_m_s in ((CALM, 0.0), (GUSTS, LIGHT_M_S)):
+        if wind == word:
+            return speed_m_s
+    try:
+        speed_m_s = float(wind)
+    except ValueError:
         raise FlightError(
-            f"--wind {echo(wind)} must be {CALM} or {GUSTS}; a steady acceleration is --push X,Y, in m/s^2"
-        )
-    return LIGHT_M_S if wind == GUSTS else 0.0
+            f"--wind {echo(wind)} must be {CALM}, {GUSTS} or a speed in m/s; a steady acceleration is "
+            "--push X,Y, in m/s^2"
+        ) from None
+    _within("--wind", speed_m_s, 0.0, LARGEST_WIND_M_S)
+    return speed_m_s
 
 
 def _push_m_s2(text: str) -> tuple[float, float]:

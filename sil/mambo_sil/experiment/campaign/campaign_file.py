@@ -223,12 +223,21 @@ def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -
         if vehicle is None
         else vehicle_toml.load(vehicle)
     )
-    flight = _with_drone(content.flight, drone, source, replaced=vehicle is not None)
+    return completed(file, drone, source, replaced=vehicle is not None), drone
+
+
+def completed(file: File, drone: VehicleFile, source: str, *, replaced: bool) -> File:
+    """Return a file with what depends on the drone, which may be `replaced` by another than the file's.
+
+    Raises InvalidSettingsError.
+    """
+    content: Any = file
+    flight = _with_drone(content.flight, drone, source, replaced=replaced)
     given = content.draws.model_fields_set
     own = {name: found for name, found in defaults_of(drone).items() if name not in given}
     draws = content.draws.model_copy(update=own)
     _demand_mass(draws, source)
-    return file.model_copy(update={"flight": flight, "draws": draws}), drone
+    return file.model_copy(update={"flight": flight, "draws": draws})
 
 
 def _demand_mass(draws: Any, source: str) -> None:

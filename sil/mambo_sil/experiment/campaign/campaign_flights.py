@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from mambo_codegen import __version__
 from mambo_codegen.methods import method_of
+from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import WorkerError
 from mambo_sil.experiment.campaign.campaign_file import scenario
@@ -18,7 +19,7 @@ from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.own_law import Law, LawFile, OwnLaws, load_law
+from mambo_sil.flight.controllers.own_law import Law, LawFile, OwnLaws, load_law, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly, fly_groups, part_of
@@ -114,25 +115,33 @@ def fly_scenarios(
                 for row, value in zip(rows[group.first : last], values, strict=True):
                     row[f"{entrant.name}_{key}"] = value
         flown += len(these)
-    for entrant in (one for one in entrants if one.law is not None):
-        _fly_law(entrant, scenarios, rows, part_of(report, flown, len(entrants)))
-        flown += 1
+    for entrant in entrants:
+        if entrant.law is not None:
+            found = fly_law(
+                entrant.name, _load(entrant.law), scenarios, part_of(report, flown, len(entrants))
+            )
+            rows = [row | of_law for row, of_law in zip(rows, found, strict=True)]
+            flown += 1
     report(0.0)
     return rows
 
 
-def _fly_law(entrant: Entrant, scenarios: Sequence[Scenario], rows: list[Row], report: Report) -> None:
-    """Fly a law of the user's own, and write its results to the rows."""
-    assert entrant.law is not None
-    flight = flight_of(scenarios, entrant.update_period_s)
-    laws = OwnLaws(_load(entrant.law), flight)
+def fly_law(name: str, law: Law, scenarios: Sequence[Scenario], report: Report = report_share) -> list[Row]:
+    """Fly flights together with a law of the user's own; return one row per flight, with why it failed.
+
+    Raises as `fly_scenarios`, and ArgumentError for what is no law.
+    """
+    flight = flight_of(scenarios, period_of(law))
+    laws = OwnLaws(law, flight)
     trace = fly(flight, laws, report)
-    limit_rad = method_of(entrant.settings).tilt_limit_rad
-    for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle).items():
-        for row, value in zip(rows, values, strict=True):
-            row[f"{entrant.name}_{key}"] = value
+    results = _evaluate(trace, method_of(Settings()).tilt_limit_rad, scenarios[0].vehicle)
+    rows: list[Row] = [
+        {f"{name}_{key}": values[number] for key, values in results.items()}
+        for number in range(len(scenarios))
+    ]
     for number, failure in laws.failures.items():
-        rows[number][f"{entrant.name}_{FAILURE}"] = failure
+        rows[number][f"{name}_{FAILURE}"] = failure
+    return rows
 
 
 @cache
