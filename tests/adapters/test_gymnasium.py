@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods.shared.inputs import Status
-from mambo_nmpc import ArgumentError
-from mambo_sil.api.simulated import SimulatedDrone
-from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_nmpc import ArgumentError, Vehicle
+from mambo_sil.api.simulated import SimulatedDrones
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.flight.scenario import choose_sensors
 from tests.support.tools import require_module
 
 NAME = "mambo_nmpc.adapters.gymnasium:MamboNmpc-v0"
@@ -66,12 +68,14 @@ def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
 
 def test_a_thrust_that_the_mixer_caps_is_reported() -> None:
     """Beside a large tilt the Crazyflie's motors do not give all that is commanded; at rest they do."""
-    drone = SimulatedDrone(vehicle_toml.load("crazyflie"), 0.01)
-    drone.advance(np.zeros(2), 9.81)
-    assert np.isnan(drone.report_thrust())
-    drone.advance(np.array([0.5, 0.0]), 15.9)
-    assert 9.0 < drone.report_thrust() < 15.9
-    assert np.isnan(drone.report_thrust())
+    drones = SimulatedDrones(Vehicle.from_preset("crazyflie"), 0.01, (0, 1))
+    drones.advance(np.zeros((2, 2)), np.array([9.81, 9.81]))
+    assert np.isnan(drones.report_thrust()).all()
+    drones.advance(np.array([[0.0, 0.0], [0.5, 0.0]]), np.array([9.81, 15.9]))
+    calm, capped = drones.report_thrust()
+    assert np.isnan(calm)
+    assert 9.0 < capped < 15.9
+    assert np.isnan(drones.report_thrust()).all()
 
 
 @pytest.mark.long
@@ -122,3 +126,80 @@ def test_wrong_arguments_are_refused() -> None:
     ):
         with pytest.raises(ArgumentError, match=message):
             make(**wrong)
+
+
+def make_many(n: int, **options: Any) -> Any:
+    """Return n environments that are simulated together."""
+    require_module("gymnasium")
+    return importlib.import_module("gymnasium").make_vec(
+        NAME, num_envs=n, vectorization_mode="vector_entry_point", **options
+    )
+
+
+@pytest.mark.parametrize("sensors", ["true", "mocap"])
+def test_drones_that_fly_together_fly_as_each_alone(sensors: str) -> None:
+    """Bit for bit, in gusts and through cameras with noise, after one of them was placed anew."""
+    crazyflie = Vehicle.from_preset("crazyflie")
+    chosen = choose_sensors("mocap", crazyflie.drone) if sensors == "mocap" else None
+    assert not isinstance(chosen, Sensors)
+    wind = Disturbances(wind_speed_m_s=3.0)
+    rng, seeds = np.random.default_rng(1), (5, 6, 7)
+    starts, commands = rng.uniform(-2.0, -1.0, (2, 3, 3)), rng.uniform(-0.1, 0.1, (40, 3, 2))
+    found = []
+    for group in (seeds, *((seed,) for seed in seeds)):
+        rows = [seeds.index(seed) for seed in group]
+        drones = SimulatedDrones(crazyflie, 0.01, group, sensors=chosen, disturbances=wind)
+        drones.place(starts[0, rows])
+        for step, command in enumerate(commands[:, rows]):
+            if step == 20:
+                drones.place(starts[1, rows], np.array([seed == 6 for seed in group]))
+            drones.advance(command, np.full(len(group), 9.9))
+        found.append(np.column_stack([drones.state.position_m, drones.true_state.velocity_m_s]))
+    assert np.array_equal(found[0], np.concatenate(found[1:]))
+    assert len(np.unique(found[0][:, 0])) == 3
+
+
+def test_an_environment_that_ends_begins_anew_alone() -> None:
+    """At the next step, whose action it does not take; the others fly on, and long ones are cut."""
+    many = make_many(3, action="attitude", trajectory="hover", max_episode_steps=60)
+    first, info = many.reset(seed=2)
+    assert first.shape == (3, 15)
+    assert info["distance_m"].shape == (3,)
+    assert (first == many.reset(seed=2)[0]).all()
+    assert (first != many.reset(seed=3)[0]).any()
+    actions, ended = np.zeros((3, 2), np.float32), []
+    for step in range(59):
+        actions[1] = np.nan if step == 10 else 0.0
+        _, reward, crashed, truncated, info = many.step(actions)
+        assert not truncated.any()
+        if step == 10:
+            assert crashed.tolist() == [False, True, False]
+            assert reward[1] == -10.0 - info["distance_m"][1]
+        if step == 11:
+            assert reward[1] == 0.0
+            assert info["distance_m"][1] < 0.5
+        ended += [step] if crashed.any() else []
+    assert ended == [10]
+    assert many.step(actions)[3].tolist() == [True, False, True]
+
+
+def test_many_are_seen_through_cameras_in_wind() -> None:
+    """The C flies to the targets; what is seen has noise, the distance is the true one."""
+    many = make_many(
+        4, sensors="mocap", wind_speed_m_s=2.0, trajectory="hover", vehicle=Vehicle.from_preset("crazyflie")
+    )
+    seen, _ = many.reset(seed=1)
+    for _ in range(300):
+        seen, _, crashed, _, info = many.step((seen[:, :2] + seen[:, 9:11]) / 5.0)
+        assert not crashed.any()
+    assert info["distance_m"].max() < 0.1
+    assert (info["status"] == 0).all()
+    assert (np.linalg.norm(seen[:, 9:12], axis=1) != info["distance_m"]).all()
+    for wrong, message in (
+        ({"sensors": "flow-deck"}, 'sensors = "flow-deck" must be "true" or "mocap"'),
+        ({"wind_speed_m_s": -1.0}, r"wind_speed_m_s = -1\.0 must lie in"),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            make_many(2, **wrong)
+    with pytest.raises(ArgumentError, match=r"actions: has shape \(2,\); it must be \(4, 2\)"):
+        many.step(np.zeros(2))

@@ -114,7 +114,7 @@ def test_a_law_that_fails_loses_its_own_flights(both: CampaignFlights) -> None:
 )
 def test_a_wrong_argument_is_named(arguments: dict[str, Any], error: type[Exception], words: str) -> None:
     """Before anything flies."""
-    given = {"laws": {"pd": Pd()}, "vehicle": CRAZYFLIE} | arguments
+    given: dict[str, Any] = {"laws": {"pd": Pd()}, "vehicle": CRAZYFLIE} | arguments
     with pytest.raises(error, match=words):
         campaign(**given)
 

@@ -1,27 +1,147 @@
-"""Gymnasium: the plant as an environment, `gymnasium.make("mambo_nmpc.adapters.gymnasium:MamboNmpc-v0")`."""
+"""Gymnasium: the plant as environments, `gymnasium.make("mambo_nmpc.adapters.gymnasium:MamboNmpc-v0")`.
 
+`gymnasium.make_vec` of the same name makes n of them, whose drones are simulated together.
+"""
+
+from pathlib import Path
 from typing import Any, Final, Literal, Unpack
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_nmpc.adapters import load
 from mambo_nmpc.curves import CurvePoint, curve, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.options import ControllerOptions
-from mambo_sil.api.simulated import LOST_M, SimulatedDrone
+from mambo_sil.api.simulated import LOST_M, SimulatedDrones
 from mambo_sil.arguments import of_shape, require, require_choice, require_number
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.frames import command_in_frame, vectors_to_ned
 from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.scenario import LARGEST_WIND_M_S, choose_sensors
 from mambo_sil.flight.states import TargetState
 
 gymnasium: Any = load("gymnasium", "pip install gymnasium")
 Environment: Any = gymnasium.Env
+VectorEnvironment: Any = gymnasium.vector.VectorEnv
 
 HEIGHT_M: Final = 1.0
 SCATTER_M: Final = 0.3
 CRASH_REWARD: Final = -10.0
+MOST_STEPS: Final = 2000
+
+
+class _Flights:
+    """What the environments of n drones have in common, in arrays (n, ...)."""
+
+    def __init__(
+        self,
+        n: int,
+        action: Literal["attitude", "target"],
+        vehicle: str | Path | Vehicle,
+        trajectory: CurveName,
+        *,
+        size_m: float,
+        rate_rad_s: float,
+        reach_m: float,
+        sensors: Literal["true", "mocap"],
+        wind_speed_m_s: float,
+        **options: Unpack[ControllerOptions],
+    ) -> None:
+        require_choice("action", action, ("attitude", "target"))
+        require_choice("sensors", sensors, ("true", "mocap"))
+        require_number("reach_m", reach_m, 0.1, LOST_M)
+        require_number("wind_speed_m_s", wind_speed_m_s, 0.0, LARGEST_WIND_M_S)
+        require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
+        if not isinstance(vehicle, Vehicle):
+            vehicle = Vehicle.of(vehicle_toml.load(str(vehicle)))
+        self._vehicle = vehicle
+        self.n, self._action, self._curve = n, action, curve(trajectory, size_m, rate_rad_s)
+        self._controller = Controller.from_vehicle(self._vehicle, n, sensors=sensors, **options)
+        chosen = choose_sensors(sensors, self._vehicle.drone)
+        self._sensors = chosen if isinstance(chosen, MotionCapture) else None
+        self._disturbances = Disturbances(wind_speed_m_s)
+        self._limits = self._controller.settings.limits
+        self._scale = self._limits.tilt_rad if action == "attitude" else reach_m
+        self._drones = self._seeded(range(n))
+        self.steps = np.zeros(n, np.int64)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = gymnasium.spaces.Box(-10.0 * LOST_M, 10.0 * LOST_M, (15,), np.float32)
+
+    def seed(self, rng: np.random.Generator) -> None:
+        """Draw the seeds of noise and gusts."""
+        self._drones = self._seeded(rng.integers(0, 2**62, self.n).tolist())
+
+    def start(self, rng: np.random.Generator, chosen: NDArray[np.bool_]) -> None:
+        """Let the chosen drones (n,) hover near the start of the curve."""
+        self.steps = np.where(chosen, 0, self.steps)
+        start_m = vectors_to_ned("NWU", self._now().position_m).copy()
+        start_m[:, :2] += rng.uniform(-SCATTER_M, SCATTER_M, (self.n, 2))
+        self._drones.place(start_m, chosen)
+        self._controller.reset(which=chosen)
+
+    def step(self, action: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], dict[str, Any]]:
+        """Return observation, reward, whether it crashed, and info, after an update period of each."""
+        scaled, said = self._scale * np.clip(action, -1.0, 1.0), dict[str, Any]()
+        command_rad = command_in_frame("NWU", scaled)
+        now = self._now()
+        height_m, climb_m_s, acceleration_m_s2 = (part[:, 2] for part in now)
+        lift: Vertical | FloatArray = Vertical(-height_m, climb_m_s, acceleration_m_s2)
+        if self._action == "target":
+            zeros = np.zeros((self.n, 2))
+            target = TargetState.in_frame(
+                "NWU", np.column_stack([scaled, height_m]), np.column_stack([zeros, climb_m_s])
+            )
+            if has_height := self._controller.settings.height is not None:
+                self._controller.set_thrust(self._drones.report_thrust())
+            known_m_s2 = None if has_height else self._drones.thrust_m_s2
+            outcome = self._controller.step(self._drones.state, target, known_m_s2)
+            command_rad = outcome.command_rad
+            if outcome.thrust_m_s2 is not None:
+                lift = np.asarray(outcome.thrust_m_s2, np.float64)
+            said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
+        flies = np.asarray(~np.isnan(command_rad).any(axis=1))
+        self._drones.advance(np.where(flies[:, np.newaxis], command_rad, 0.0), lift)
+        self.steps = self.steps + 1
+        observation, info = self.observe({name: x for name, x in said.items() if x is not None})
+        crashed = self._drones.crashed | ~flies
+        return observation, CRASH_REWARD * crashed - info["distance_m"], crashed, info
+
+    def observe(self, said: dict[str, Any]) -> tuple[FloatArray, dict[str, Any]]:
+        """Return observations (n, 15) and info, of each an array (n,), with what the C said."""
+        now = self._now()
+        seen, true = (
+            [np.nan_to_num(part, nan=10.0 * LOST_M) for part in state.as_in_frame("NWU")]
+            for state in (self._drones.state, self._drones.true_state)
+        )
+        parts = *seen, now.position_m - seen[0], now.velocity_m_s - seen[1]
+        info = {
+            "distance_m": np.linalg.norm(now.position_m - true[0], axis=1),
+            "speed_m_s": np.linalg.norm(true[1][:, :2], axis=1),
+            "tilt_limit_rad": np.full(self.n, self._limits.tilt_rad),
+            "speed_limit_m_s": np.full(self.n, self._limits.speed_m_s),
+            "braking_limit_m_s2": np.full(self.n, self._limits.braking_m_s2),
+        }
+        bounds = self.observation_space.low, self.observation_space.high
+        return np.clip(np.concatenate(parts, axis=1), *bounds).astype(np.float32), info | said
+
+    def _now(self) -> CurvePoint:
+        times_s = self.steps * self._controller.update_period_s
+        return sample(self._curve, times_s, "NWU", height_m=HEIGHT_M)
+
+    def _seeded(self, seeds: Any) -> SimulatedDrones:
+        return SimulatedDrones(
+            self._vehicle,
+            self._controller.update_period_s,
+            tuple(seeds),
+            sensors=self._sensors,
+            disturbances=self._disturbances,
+        )
 
 
 class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package that need not be installed
@@ -31,6 +151,9 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
                  x and y of a position at rest, as shares of `reach_m`, to which the generated C flies. The
                  height is that of the curve: held by the C with "target" and `[height]` in the settings, else
                  by an altitude loop.
+    vehicle:     a shipped drone, a vehicle.toml, or a Vehicle.
+    sensors:     through which the drone is seen: "true", or "mocap" with its noise and delay.
+    wind_speed_m_s: mean wind to north 6 m above the ground, with its gusts.
     observation: (15,) position, velocity, roll, pitch, yaw, then position and velocity of the curve less
                  those of the drone, in NWU: x ahead, y left, z up.
     reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode. An
@@ -42,78 +165,120 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
     def __init__(
         self,
         action: Literal["attitude", "target"] = "target",
-        vehicle: str = "crazyflie",
+        vehicle: str | Path | Vehicle = "crazyflie",
         trajectory: CurveName = "bernoulli",
         *,
         size_m: float = 2.0,
         rate_rad_s: float = 0.5,
         reach_m: float = 5.0,
+        sensors: Literal["true", "mocap"] = "true",
+        wind_speed_m_s: float = 0.0,
         **options: Unpack[ControllerOptions],
     ) -> None:
-        require_choice("action", action, ("attitude", "target"))
-        require_number("reach_m", reach_m, 0.1, LOST_M)
-        require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
-        self._action, self._curve = action, curve(trajectory, size_m, rate_rad_s)
-        self._controller = Controller.from_vehicle(vehicle, sensors="true", **options)
-        self._drone = SimulatedDrone(vehicle_toml.load(vehicle), self._controller.update_period_s)
-        self._limits = self._controller.settings.limits
-        self._scale = self._limits.tilt_rad if action == "attitude" else reach_m
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observation_space = gymnasium.spaces.Box(-10.0 * LOST_M, 10.0 * LOST_M, (15,), np.float32)
+        self._flights = _Flights(
+            1,
+            action,
+            vehicle,
+            trajectory,
+            size_m=size_m,
+            rate_rad_s=rate_rad_s,
+            reach_m=reach_m,
+            sensors=sensors,
+            wind_speed_m_s=wind_speed_m_s,
+            **options,
+        )
+        self.action_space = self._flights.action_space
+        self.observation_space = self._flights.observation_space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Hover near the start of the curve; the seed draws where."""
+        """Hover near the start of the curve; the seed draws where, and noise and gusts."""
         super().reset(seed=seed, options=options)
-        self._steps = 0
-        start_m = vectors_to_ned("NWU", self._now.position_m)
-        start_m[:2] += self.np_random.uniform(-SCATTER_M, SCATTER_M, 2)
-        self._drone.place(start_m)
-        self._controller.reset()
-        return self._observe({})
+        self._flights.seed(self.np_random)
+        self._flights.start(self.np_random, np.ones(1, np.bool_))
+        observation, info = self._flights.observe({})
+        return observation[0], _first(info)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Hold a command, or fly to a target, for one update period; raises ArgumentError for a shape."""
-        scaled, said = self._scale * np.clip(of_shape("action", action, (2,)), -1.0, 1.0), {}
-        command_rad = command_in_frame("NWU", scaled)
-        height_m, climb_m_s, acceleration_m_s2 = (float(part[2]) for part in self._now)
-        lift: Vertical | float = Vertical(-height_m, climb_m_s, acceleration_m_s2)
-        if self._action == "target":
-            target = TargetState.in_frame("NWU", [*scaled, height_m], [0.0, 0.0, climb_m_s])
-            if has_height := self._controller.settings.height is not None:
-                self._controller.set_thrust(self._drone.report_thrust())
-            known_m_s2 = None if has_height else self._drone.thrust_m_s2
-            outcome = self._controller.step(self._drone.state, target, known_m_s2)
-            command_rad = outcome.command_rad
-            if outcome.thrust_m_s2 is not None:
-                lift = float(outcome.thrust_m_s2)
-            said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
-        flies = not np.isnan(command_rad).any()
-        if flies:
-            self._drone.advance(command_rad, lift)
-        self._steps += 1
-        observation, info = self._observe({name: int(x) for name, x in said.items() if x is not None})
-        crashed = self._drone.crashed or not flies
-        return observation, CRASH_REWARD * crashed - info["distance_m"], crashed, False, info
-
-    @property
-    def _now(self) -> CurvePoint:
-        return sample(self._curve, self._steps * self._controller.update_period_s, "NWU", height_m=HEIGHT_M)
-
-    def _observe(self, said: dict[str, int]) -> tuple[Any, dict[str, Any]]:
-        """Return observation and info, with what the C said."""
-        state = self._drone.state.as_in_frame("NWU")
-        position_m, velocity_m_s, attitude_rad = (np.nan_to_num(part, nan=10.0 * LOST_M) for part in state)
-        error_m, slowness_m_s = self._now.position_m - position_m, self._now.velocity_m_s - velocity_m_s
-        parts = position_m, velocity_m_s, attitude_rad, error_m, slowness_m_s
-        bounds = self.observation_space.low, self.observation_space.high
-        info = {
-            "distance_m": float(np.linalg.norm(error_m)),
-            "speed_m_s": float(np.linalg.norm(velocity_m_s[:2])),
-            "tilt_limit_rad": self._limits.tilt_rad,
-            "speed_limit_m_s": self._limits.speed_m_s,
-            "braking_limit_m_s2": self._limits.braking_m_s2,
-        }
-        return np.clip(np.concatenate(parts), *bounds).astype(np.float32), info | said
+        given = of_shape("action", action, (2,))
+        observation, reward, crashed, info = self._flights.step(given[np.newaxis])
+        return observation[0], float(reward[0]), bool(crashed[0]), False, _first(info)
 
 
-gymnasium.register("MamboNmpc-v0", entry_point=MamboNmpcEnv, max_episode_steps=2000)
+class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
+    """n such environments, whose drones are simulated together: actions (n, 2), observations (n, 15).
+
+    An environment that has ended begins anew at the next step, whose action it does not take.
+    """
+
+    metadata: Final = {"autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        action: Literal["attitude", "target"] = "target",
+        vehicle: str | Path | Vehicle = "crazyflie",
+        trajectory: CurveName = "bernoulli",
+        *,
+        size_m: float = 2.0,
+        rate_rad_s: float = 0.5,
+        reach_m: float = 5.0,
+        sensors: Literal["true", "mocap"] = "true",
+        wind_speed_m_s: float = 0.0,
+        max_episode_steps: int = MOST_STEPS,
+        **options: Unpack[ControllerOptions],
+    ) -> None:
+        self._flights = _Flights(
+            num_envs,
+            action,
+            vehicle,
+            trajectory,
+            size_m=size_m,
+            rate_rad_s=rate_rad_s,
+            reach_m=reach_m,
+            sensors=sensors,
+            wind_speed_m_s=wind_speed_m_s,
+            **options,
+        )
+        self.num_envs, self._most_steps = num_envs, max_episode_steps
+        self.single_action_space = self._flights.action_space
+        self.single_observation_space = self._flights.observation_space
+        self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
+        self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
+        self._ended = np.zeros(num_envs, np.bool_)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Let all drones hover near the start of the curve; the seed draws where, and noise and gusts."""
+        super().reset(seed=seed, options=options)
+        self._flights.seed(self.np_random)
+        self._ended = np.zeros(self.num_envs, np.bool_)
+        self._flights.start(self.np_random, ~self._ended)
+        return self._flights.observe({})
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Hold commands, or fly to targets, for one update period; raises ArgumentError for a shape."""
+        given, begins = of_shape("actions", actions, (self.num_envs, 2)), self._ended
+        observation, reward, crashed, info = self._flights.step(given)
+        if begins.any():
+            self._flights.start(self.np_random, begins)
+            observation, info = self._flights.observe({name: x for name, x in info.items() if name in _SAID})
+            reward, crashed = np.where(begins, 0.0, reward), crashed & ~begins
+        truncated = (self._flights.steps >= self._most_steps) & ~crashed
+        self._ended = crashed | truncated
+        return observation, reward, crashed, truncated, info
+
+
+_SAID: Final = ("status", "saturated", "active")
+
+
+def _first(info: dict[str, Any]) -> dict[str, Any]:
+    """Return the info of a single environment."""
+    return {name: (int if name in _SAID else float)(values[0]) for name, values in info.items()}
+
+
+gymnasium.register(
+    "MamboNmpc-v0",
+    entry_point=MamboNmpcEnv,
+    vector_entry_point=MamboNmpcVectorEnv,
+    max_episode_steps=MOST_STEPS,
+)

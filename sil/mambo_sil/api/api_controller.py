@@ -26,6 +26,7 @@ from mambo_sil.arguments import (
     require_path,
 )
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError
@@ -69,20 +70,21 @@ class Controller:
     @classmethod
     def from_vehicle(
         cls,
-        vehicle: str | Path,
+        vehicle: str | Path | Vehicle,
         n: int = 1,
         *,
         sensors: SensorsKind | None = None,
         **options: Unpack[ControllerOptions],
     ) -> Self:
-        """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
+        """Return controllers with the settings that `design` derives from a drone.
 
+        vehicle: a name, a vehicle.toml, or a Vehicle.
         sensors: what measures, in place of the sensors in the file; "true" for the state of a simulator.
 
         Raises ArgumentError for sensors of another name, SourceNotFoundError, UnreadableFileError, and
         InvalidSettingsError with all broken rules, also for sensors that the file has no figures of.
         """
-        drone = _read_vehicle(vehicle)
+        drone = vehicle.drone if isinstance(vehicle, Vehicle) else _read_vehicle(vehicle)
         if sensors is not None:
             require_choice("sensors", sensors, SENSORS_KINDS)
             drone = drone.with_sensors(sensors)

@@ -64,7 +64,8 @@ class Flown:
         """Return how many flights there are, how close they are, and how many crashed."""
         rms_m = [distance(value) for value in np.quantile(self.metrics.rms_error_m, (0.5, 1.0)).tolist()]
         shown = " to ".join(dict.fromkeys(rms_m))
-        return f"Flown({len(self.crashed)} flights: rms error {shown}, {int(self.crashed.sum())} crashed)"
+        flights = f"{len(self.crashed)} flight{'' if len(self.crashed) == 1 else 's'}"
+        return f"Flown({flights}: rms error {shown}, {int(self.crashed.sum())} crashed)"
 
 
 def fly(

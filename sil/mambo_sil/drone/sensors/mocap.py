@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.elementary import exponential
@@ -66,6 +67,12 @@ class MocapSuite:
         self._position_m = start.position_m
         self._velocity_m_s = start.velocity_m_s
         self._tick = 0
+
+    def place(self, start: Seen, put: NDArray[np.bool_]) -> None:
+        """Begin anew with those drones that are `put` (n,) elsewhere, at their true state."""
+        self._late_m = [np.where(put, start.position_m, late_m) for late_m in self._late_m]
+        self._position_m = np.where(put, start.position_m, self._position_m)
+        self._velocity_m_s = np.where(put, start.velocity_m_s, self._velocity_m_s)
 
     def estimate(self, true: Seen) -> Seen:
         """Return what the controllers receive at this tick."""

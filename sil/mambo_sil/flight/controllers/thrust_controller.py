@@ -130,6 +130,10 @@ class ThrustDelivery:
         self._ticks, self._sum_n = 0, np.zeros(self._flights)
         self._capped = np.zeros(self._flights, np.bool_)
 
+    def forget(self, chosen: NDArray[np.bool_]) -> None:
+        """Report no thrust of the drones that are `chosen` (n,) for this period."""
+        self._capped &= ~chosen
+
     def note(self, wanted_n: FloatArray, given_n: FloatArray) -> None:
         """Note the thrusts (n,) that arrived at a tick, and those that the motors were commanded."""
         self._ticks += 1
