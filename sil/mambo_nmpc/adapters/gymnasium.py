@@ -73,15 +73,23 @@ class _Flights:
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = gymnasium.spaces.Box(-10.0 * LOST_M, 10.0 * LOST_M, (15,), np.float32)
 
-    def seed(self, rng: np.random.Generator) -> None:
-        """Draw the seeds of noise and gusts."""
+    def begin(self, rng: np.random.Generator) -> None:
+        """Let all drones hover near the start of the curve, with other noise and gusts."""
+        scatter_m = self._scatter_m(rng)
         self._drones = self._seeded(rng.integers(0, 2**62, self.n).tolist())
+        self._put(scatter_m, np.ones(self.n, np.bool_))
 
-    def start(self, rng: np.random.Generator, chosen: NDArray[np.bool_]) -> None:
-        """Let the chosen drones (n,) hover near the start of the curve."""
+    def begin_again(self, rng: np.random.Generator, chosen: NDArray[np.bool_]) -> None:
+        """Let the chosen drones (n,) hover there; noise and gusts go on."""
+        self._put(self._scatter_m(rng), chosen)
+
+    def _scatter_m(self, rng: np.random.Generator) -> FloatArray:
+        return rng.uniform(-SCATTER_M, SCATTER_M, (self.n, 2))
+
+    def _put(self, scatter_m: FloatArray, chosen: NDArray[np.bool_]) -> None:
         self.steps = np.where(chosen, 0, self.steps)
         start_m = vectors_to_ned("NWU", self._now().position_m).copy()
-        start_m[:, :2] += rng.uniform(-SCATTER_M, SCATTER_M, (self.n, 2))
+        start_m[:, :2] += scatter_m
         self._drones.place(start_m, chosen)
         self._controller.reset(which=chosen)
 
@@ -193,8 +201,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Hover near the start of the curve; the seed draws where, and noise and gusts."""
         super().reset(seed=seed, options=options)
-        self._flights.seed(self.np_random)
-        self._flights.start(self.np_random, np.ones(1, np.bool_))
+        self._flights.begin(self.np_random)
         observation, info = self._flights.observe({})
         return observation[0], _first(info)
 
@@ -250,9 +257,8 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Let all drones hover near the start of the curve; the seed draws where, and noise and gusts."""
         super().reset(seed=seed, options=options)
-        self._flights.seed(self.np_random)
+        self._flights.begin(self.np_random)
         self._ended = np.zeros(self.num_envs, np.bool_)
-        self._flights.start(self.np_random, ~self._ended)
         return self._flights.observe({})
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -260,7 +266,7 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
         given, begins = of_shape("actions", actions, (self.num_envs, 2)), self._ended
         observation, reward, crashed, info = self._flights.step(given)
         if begins.any():
-            self._flights.start(self.np_random, begins)
+            self._flights.begin_again(self.np_random, begins)
             observation, info = self._flights.observe({name: x for name, x in info.items() if name in _SAID})
             reward, crashed = np.where(begins, 0.0, reward), crashed & ~begins
         truncated = (self._flights.steps >= self._most_steps) & ~crashed
