@@ -21,12 +21,14 @@ NEEDED = {
     "train.py": ["gymnasium"],
     "tune.sh": ["optuna"],
     "crazyflow_flight.py": ["crazyflow"],
+    "mujoco_flight.py": ["mujoco"],
+    "drake_flight.py": ["pydrake"],
 }
 TOOLS = {
     "own_loop/main.c": [("cmake", "cmake"), ("cc", "gcc")],
     "stm32/main.c": [("arm-none-eabi-gcc", "gcc-arm-none-eabi")],
 }
-OF_OTHERS = ("crazyflow_flight.py",)
+OF_OTHERS = ("crazyflow_flight.py", "drake_flight.py", "mujoco_flight.py")
 """Those that need a simulator of others."""
 QUICK = ("flight.py",)
 MOST_LINES = 60

@@ -12,7 +12,7 @@ import numpy as np
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.loops import Demand
-from mambo_sil.drone.plant.rotors import distribute
+from mambo_sil.drone.plant.rotors import distribute, wrench_per_command
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, CascadeGains
 
@@ -41,6 +41,16 @@ class CascadeLoop:
 
     def command_motors(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the motor commands (4, n), and the memory (9, n) one tick later."""
+        shares, later = self._shares(demand, memory)
+        return distribute(self._nominal, shares), later
+
+    def demand_wrench(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return thrust and torques (4, n), and the memory (9, n) one tick later."""
+        shares, later = self._shares(demand, memory)
+        return shares * wrench_per_command(self._nominal), later
+
+    def _shares(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what thrust, roll, pitch and yaw take of the motor commands (4, n), and the memory."""
         gains, step_s = self._gains, self._step_s
         rates_rad_s = demand.rates_rad_s
         reference_rad = np.empty_like(rates_rad_s)
@@ -62,7 +72,7 @@ class CascadeLoop:
         shares = np.empty((4, rates_rad_s.shape[1]))
         shares[0] = demand.thrust_n / (4.0 * self._nominal.thrust_per_command_n)
         shares[1:] = _limited(output, self._attitude.output_max)
-        return distribute(self._nominal, shares), np.concatenate([angle_integral, rate_integral, rates_rad_s])
+        return shares, np.concatenate([angle_integral, rate_integral, rates_rad_s])
 
 
 def _limited(value: FloatArray, limit: FloatArray | float) -> FloatArray:

@@ -61,6 +61,10 @@ class MotorLoop(Protocol):
         """Return the motor commands (4, n), and the memory (rows, n) one tick later."""
         ...
 
+    def demand_wrench(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return thrust and torques (4, n) that it asks the motors for, and the same memory."""
+        ...
+
 
 class StockLoop:
     """The Mambo's loop: a PID of each angle demands a torque; its memory is the integrals of roll and pitch.
@@ -80,13 +84,17 @@ class StockLoop:
 
     def command_motors(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the motor commands (4, n), and the integrals (2, n) one tick later."""
+        wrench, integral = self.demand_wrench(demand, memory)
+        return mix(self._nominal, wrench), integral
+
+    def demand_wrench(self, demand: Demand, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return thrust and torques (4, n), and the integrals (2, n) one tick later."""
         angles_rad, rates_rad_s = demand.angles_rad, demand.rates_rad_s
         wrench = np.empty((4, angles_rad.shape[1]))
         wrench[0] = demand.thrust_n
         wrench[1:3] = self.attitude_torque(demand.command_rad, angles_rad[:2], rates_rad_s[:2], memory)
         wrench[3] = self.yaw_torque(demand.yaw_rad, angles_rad[2], rates_rad_s[2])
-        integral = self.attitude_integral(demand.command_rad, angles_rad[:2], memory)
-        return mix(self._nominal, wrench), integral
+        return wrench, self.attitude_integral(demand.command_rad, angles_rad[:2], memory)
 
     def attitude_torque(
         self,

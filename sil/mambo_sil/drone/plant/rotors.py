@@ -49,13 +49,20 @@ def distribute(nominal: Airframe, shares: FloatArray) -> FloatArray:
     Mixer `yaw-last` takes of yaw what thrust, roll and pitch leave, but at least `LEAST_YAW`. Mixers `lower`
     and `yaw-last` lower all four commands by the excess of the largest one. All of them clip what is left.
     """
-    signed = WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :]
+    return limit_commands(nominal, WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :])
+
+
+def limit_commands(nominal: Airframe, signed: FloatArray) -> FloatArray:
+    """Return motor commands (4, n) within their limits, the sums of those of thrust, roll, pitch and yaw.
+
+    signed: (4, 4, n) by what asks for them and by motor; the mixer changes those of yaw.
+    """
     if nominal.mixer == "yaw-last":
         others = np.add.reduce(signed[:3], axis=0)
         above, below = nominal.command_max - others.max(axis=0), others.min(axis=0) - nominal.command_min
         room = np.maximum(np.minimum(above, below), LEAST_YAW * nominal.command_max)
         with np.errstate(divide="ignore"):
-            signed[3] *= np.minimum(room / np.abs(shares[3]), 1.0)
+            signed[3] *= np.minimum(room / np.abs(signed[3]).max(axis=0), 1.0)
     commands: FloatArray = np.add.reduce(signed, axis=0)
     if nominal.mixer != "clip":
         commands = commands - np.maximum(commands.max(axis=0) - nominal.command_max, 0.0)
