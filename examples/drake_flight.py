@@ -1,7 +1,7 @@
 """Fly the generated C in Drake's QuadrotorPlant, whose four rotors stand as a plus; needs the extra drake.
 
 $ python drake_flight.py
-from 6 s on 6.0 mm off (rms)
+from 6 s on 1.1 mm off (rms)
 """
 
 import numpy as np

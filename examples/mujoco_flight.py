@@ -1,7 +1,7 @@
 """Fly the generated C in MuJoCo, where a drone has four motors and nothing else; needs the extra mujoco.
 
 $ python mujoco_flight.py
-from 6 s on 6.3 mm off (rms)
+from 6 s on 1.2 mm off (rms)
 """
 
 import mujoco

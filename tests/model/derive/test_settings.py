@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+import numpy as np
 import pytest
 
 from mambo_codegen.settings import presets
@@ -100,6 +101,22 @@ def test_a_loop_without_integrator_gets_none() -> None:
         for name in ("roll", "pitch")
     }
     assert all(fit.integral_1_s == 0.0 for fit in fit_steps(changed(CRAZYFLIE, attitude=axes)))
+
+
+def test_a_loop_whose_step_an_integrator_would_fit_better_gets_none_either() -> None:
+    """A PD with an overshoot: what mends the shape of the step would leave a circle by 6 mm."""
+    inertia_kg_m2 = 0.003
+    roll = {"p_n_m": 200.0 * inertia_kg_m2, "d_n_m_s": 24.0 * inertia_kg_m2}
+    hummingbird = vehicle_toml.preset("hummingbird")
+    gains = hummingbird.attitude.model_dump() | {"roll": roll, "pitch": roll}
+    body = hummingbird.body.model_dump() | {f"inertia_{axis}_kg_m2": inertia_kg_m2 for axis in "xy"}
+    document = hummingbird.model_dump(exclude_none=True) | {"attitude": gains, "body": body}
+    drone = VehicleFile.model_validate(document)
+    assert [fit.integral_1_s for fit in fit_steps(drone)] == [0.0, 0.0]
+    trace = flown(settings_for(drone.with_sensors("true")), drone, "circle", noisy=False)
+    late = trace.time_s > 8.0
+    off_m = np.abs(trace.position_m[late, :, :2] - trace.target[late, :, :2]).max()
+    assert off_m < 0.003
 
 
 def test_a_first_order_drone_is_copied() -> None:

@@ -12,6 +12,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.rigid_body import EULER
 from mambo_sil.drone.plant.vehicle import Vehicle, truth
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.model.identify.axis import WORTH
 from mambo_sil.model.identify.response import FittedResponse, fit_response, residuals, root_mean_square
 from mambo_sil.model.identify.segments import PERIOD_S, SETTLE_S, HeldCommand, Segment
@@ -37,8 +38,20 @@ class StepFit:
 @lru_cache(maxsize=64)  # a program derives the same drone with several options
 def fit_steps(drone: VehicleFile) -> tuple[StepFit, StepFit]:
     """Return the models of roll and pitch of a drone that hovers without disturbance."""
-    answers = _answers(drone)
-    return _fit(answers[0], drone.step_s), _fit(answers[1], drone.step_s)
+    roll, pitch = _answers(drone)
+    return (
+        _fit(roll, drone.step_s, integrates=_integrates(drone, "roll")),
+        _fit(pitch, drone.step_s, integrates=_integrates(drone, "pitch")),
+    )
+
+
+def _integrates(drone: VehicleFile, axis: str) -> bool:
+    """Return whether the loop of an axis has an integral part."""
+    attitude = drone.attitude
+    if isinstance(attitude, FirstOrderAttitude):
+        return False
+    gains = getattr(attitude, axis).model_dump()
+    return any(gains.get(name, 0.0) > 0.0 for name in ("i_n_m_s", "i_1_s2", "rate_i_1_rad"))
 
 
 def _answers(drone: VehicleFile) -> FloatArray:
@@ -55,8 +68,12 @@ def _answers(drone: VehicleFile) -> FloatArray:
     return np.stack(answers, axis=1)
 
 
-def _fit(answer: FloatArray, step_s: float) -> StepFit:
-    """Return the model of an axis; with an integrator if that lowers the error as in an identification."""
+def _fit(answer: FloatArray, step_s: float, *, integrates: bool) -> StepFit:
+    """Return the model of an axis.
+
+    With an integrator if the loop `integrates` and that lowers the error as in an identification: of a loop
+    without one it mends the shape of the step, and bends slow curves.
+    """
     first, last = -round(_BEFORE_S / PERIOD_S), round(DURATION_S / PERIOD_S)
     time_s = PERIOD_S * np.arange(first, last + 1, dtype=np.float64)
     tilt = np.interp(time_s, step_s * np.arange(len(answer)), answer)
@@ -68,6 +85,9 @@ def _fit(answer: FloatArray, step_s: float) -> StepFit:
         found = fit_response([segment], 0, [segment.counted], integrator=integrator)
         return found, root_mean_square(residuals(found, [segment], 0, [segment.counted]))
 
-    (plain, plain_error), (richer, richer_error) = fit(integrator=False), fit(integrator=True)
-    chosen, error = (richer, richer_error) if richer_error < WORTH * plain_error else (plain, plain_error)
+    chosen, error = fit(integrator=False)
+    if integrates:
+        richer, richer_error = fit(integrator=True)
+        if richer_error < WORTH * error:
+            chosen, error = richer, richer_error
     return StepFit(chosen.lag_s, chosen.delay_s, chosen.integral_1_s, error)
