@@ -1,4 +1,4 @@
-"""My PID against this MPC: 100 random Crazyflies, in winds of up to 4 m/s.
+"""My PID against this MPC: 100 random Crazyflies, in winds of up to 4 m/s 6 m above the ground.
 
 $ python campaign_in_wind.py
 mean distance  median    95 %   worst   crashed

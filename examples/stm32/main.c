@@ -28,7 +28,6 @@ void read_target(nmpc_target_t *target);
 float thrust_over_mass(void);
 void fly_attitude(float roll_rad, float pitch_rad);
 void TIM6_DAC_IRQHandler(void);
-
 static nmpc_t controller;
 
 void TIM6_DAC_IRQHandler(void)
@@ -50,6 +49,7 @@ int main(void)
     }
     nmpc_init(&controller);
     RCC_APB1ENR |= 1U << 4;
+    (void)RCC_APB1ENR; /* the timer has its clock two cycles later */
     TIM6_PSC = 8400U - 1U; /* 84 MHz to 10 kHz */
     TIM6_ARR = 100U - 1U;  /* to 100 Hz: NMPC_UPDATE_PERIOD_S */
     TIM6_DIER = 1U;

@@ -71,6 +71,11 @@ def test_a_thrust_that_the_mixer_caps_is_reported() -> None:
     drones = SimulatedDrones(Vehicle.from_preset("crazyflie"), 0.01, (0, 1))
     drones.advance(np.zeros((2, 2)), np.array([9.81, 9.81]))
     assert np.isnan(drones.report_thrust()).all()
+    drones.advance(np.full((2, 2), 0.5), np.array([15.9, 15.9]))
+    drones.place(np.array([[0.0, 0.0, -1.0]] * 2), np.array([True, False]))
+    placed, other = drones.report_thrust()
+    assert np.isnan(placed)
+    assert other < 15.9
     drones.advance(np.array([[0.0, 0.0], [0.5, 0.0]]), np.array([9.81, 15.9]))
     calm, capped = drones.report_thrust()
     assert np.isnan(calm)
@@ -169,7 +174,7 @@ def test_an_environment_that_ends_begins_anew_alone() -> None:
     assert (first != many.reset(seed=3)[0]).any()
     actions, ended = np.zeros((3, 2), np.float32), []
     for step in range(59):
-        actions[1] = np.nan if step == 10 else 0.0
+        actions[1] = np.nan if step in (10, 11) else 0.0
         _, reward, crashed, truncated, info = many.step(actions)
         assert not truncated.any()
         if step == 10:
@@ -177,6 +182,7 @@ def test_an_environment_that_ends_begins_anew_alone() -> None:
             assert reward[1] == -10.0 - info["distance_m"][1]
         if step == 11:
             assert reward[1] == 0.0
+            assert not crashed.any()
             assert info["distance_m"][1] < 0.5
         ended += [step] if crashed.any() else []
     assert ended == [10]
@@ -194,7 +200,7 @@ def test_many_are_seen_through_cameras_in_wind() -> None:
         assert not crashed.any()
     assert info["distance_m"].max() < 0.1
     assert (info["status"] == 0).all()
-    assert (np.linalg.norm(seen[:, 9:12], axis=1) != info["distance_m"]).all()
+    assert (np.abs(np.linalg.norm(seen[:, 9:12], axis=1) - info["distance_m"]) > 1e-4).all()
     for wrong, message in (
         ({"sensors": "flow-deck"}, 'sensors = "flow-deck" must be "true" or "mocap"'),
         ({"wind_speed_m_s": -1.0}, r"wind_speed_m_s = -1\.0 must lie in"),

@@ -49,6 +49,14 @@ class Ending(Pd):
         return super().step(state, target)
 
 
+class Broken(Pd):
+    """Never returns a command."""
+
+    def step(self, state: DroneState, target: TargetState) -> Any:
+        """Raise."""
+        raise KeyError(f"x of {state} and {target}")
+
+
 def flown(**laws: Any) -> CampaignFlights:
     """Fly 21 flights of 8 s: more than are flown together."""
     return campaign(laws, CRAZYFLIE, flights=21, seed=3, duration_s=8.0, draws=STRAIGHT)
@@ -76,6 +84,7 @@ def test_the_flights_are_those_of_the_command(both: CampaignFlights) -> None:
 def test_the_table_has_a_value_for_each_flight(both: CampaignFlights) -> None:
     """Of each column; errors are those over the time of a flight."""
     assert {len(column) for column in both.table.values()} == {21}
+    assert not [name for name in both.table if name.endswith(("_saturated_share", "_failure"))]
     assert both.failures == {}
     assert both.mean_error_m("pd")[5] == both.table["pd_iae_m_s"][5] / 8.0
     heads, *rows = repr(both).splitlines()
@@ -93,6 +102,8 @@ def test_a_law_that_fails_loses_its_own_flights(both: CampaignFlights) -> None:
     assert 0 < len(lost) <= 21
     assert found.failures["ending"][lost[0]].endswith(" s: law.step: RuntimeError: far, and left")
     assert list(found.failures) == ["ending"]
+    assert f"ending failed in {len(lost)} of 21, as in flight {lost[0]}, " in repr(found)
+    assert "ending failed" in found._repr_markdown_()
     assert np.isinf(np.array(found.mean_error_m("ending"))[lost]).all()
     assert found.table["pd_trace_sha256"] == both.table["pd_trace_sha256"]
 
@@ -101,6 +112,9 @@ def test_a_law_that_fails_loses_its_own_flights(both: CampaignFlights) -> None:
     ("arguments", "error", "words"),
     [
         ({"laws": {}}, ArgumentError, "laws = {} must have a controller or a law"),
+        ({"laws": {"a": Pd(), "A_seen": Pd()}}, InvalidSettingsError, "would have the same names"),
+        ({"draws": [1]}, ArgumentError, r"draws = \[1\] must be a mapping"),
+        ({"laws": {"a": Broken()}}, ArgumentError, r"laws\['a'\]: law.step: KeyError"),
         ({"laws": {"a b": Pd()}}, ArgumentError, 'laws = "a b" must have names of at most 40 letters'),
         ({"laws": {"a": 3}}, ArgumentError, r"laws\['a'\] = 3 must be a Controller or an object with"),
         ({"laws": [Pd()]}, ArgumentError, "laws = .* must be a mapping of names"),
@@ -126,17 +140,19 @@ def test_drawn_vehicles_are_those_of_a_campaign(both: CampaignFlights) -> None:
     found = fly(Controller.from_preset("crazyflie"), drones, "circle", duration_s=4.0, seeds=range(3))
     assert len(set(found.metrics.rms_error_m.tolist())) == 3
     assert repr(found).startswith("Flown(3 flights: rms error ")
-    with pytest.raises(ArgumentError, match="3"):
+    with pytest.raises(ArgumentError, match=r"has shape \(3,\); it must be \(1,\)"):
         fly(Controller.from_preset("crazyflie"), drones, "circle", duration_s=4.0)
 
 
 def test_wind_blows_where_it_is_told() -> None:
-    """The gusts differ from seed to seed; a drone that learns nothing is pushed the way the air goes."""
+    """A drone that learns nothing is pushed the way the air goes; the gusts differ from seed to seed."""
     west_rad = -0.5 * np.pi
     found = fly(Pd(), CRAZYFLIE, "hover", duration_s=6.0, wind_speed_m_s=4.0, wind_direction_rad=west_rad)
     off_m = found.trace.position_m[300:, 0, :2].mean(axis=0)
     assert off_m[1] < -0.01
     assert abs(off_m[0]) < 0.3 * abs(off_m[1])
+    many = fly(Pd(), CRAZYFLIE, "hover", duration_s=6.0, wind_speed_m_s=4.0, seeds=(1, 2))
+    assert many.metrics.rms_error_m[0] != many.metrics.rms_error_m[1]
     calm = fly(Pd(), CRAZYFLIE, "hover", duration_s=6.0)
     assert np.abs(calm.trace.position_m[300:, 0, :2]).max() < 1e-6
     with pytest.raises(ArgumentError, match=r"wind_speed_m_s = -1\.0 must"):

@@ -1,6 +1,7 @@
 """A law of a program's own flies in place of the C, and a bad one loses its own flight alone."""
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -181,3 +182,52 @@ def test_what_is_no_law_is_refused(law: Any, words: str) -> None:
     """Before anything flies."""
     with pytest.raises(ArgumentError, match=words):
         flown(law)
+
+
+class Noisy(Pd):
+    """Adds noise of its own, of the seed of its flight."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._rng = np.random.default_rng()
+
+    def reset(self, seed: int) -> None:
+        """Begin a flight."""
+        self._rng = np.random.default_rng(seed)
+
+    def step(self, state: DroneState, target: TargetState) -> Any:
+        """Return roll and pitch."""
+        return np.array(super().step(state, target)) + 0.01 * self._rng.standard_normal(2)
+
+
+class Refusing(Noisy):
+    """Cannot begin."""
+
+    def reset(self, seed: int) -> None:
+        """Raise."""
+        raise OSError(f"no {seed}")
+
+
+def test_a_law_is_given_the_seed_of_its_flight() -> None:
+    """Before the first step: its noise differs from flight to flight, and is the same again."""
+    found = flown(Noisy(), seeds=(4, 5))
+    assert len(set(found.metrics.rms_error_m.tolist())) == 2
+    assert found.trace.same_bits(flown(Noisy(), seeds=(4, 5)).trace)
+    with pytest.raises(ArgumentError, match=r"law\.reset: OSError: no 4"):
+        flown(Refusing(), seeds=(4, 5))
+
+
+def test_metrics_may_leave_out_the_start() -> None:
+    """They are those of the rest of the trace; a crashed flight hides no other."""
+    whole, late = flown(Pd()), flown(Pd(), measured_from_s=2.0)
+    assert whole.trace.same_bits(late.trace)
+    assert late.metrics.max_error_m[0] < whole.metrics.max_error_m[0]
+    off_m = np.linalg.norm(late.trace.position_m[200:, 0, :2] - late.trace.target[200:, 0, :2], axis=1)
+    assert late.metrics.max_error_m[0] == off_m.max()
+    with pytest.raises(ArgumentError, match=r"measured_from_s = 4\.0 must lie in 0\.\.3\.99"):
+        flown(Pd(), measured_from_s=4.0)
+    with pytest.warns(UserWarning, match="law.step"):
+        some = flown(Breaking(lambda: None), seeds=(0, 1, 2), yaw_rad=np.array([0.0, 0.2, 0.2]))
+    assert repr(some).startswith("Flown(3 flights: rms error ")
+    assert re.search(r"rms error [\d.]+ cm in the median", repr(some))
+    assert repr(some).endswith(" at most, 1 crashed)")

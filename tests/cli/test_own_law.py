@@ -1,6 +1,7 @@
 """`fly --controller FILE.py:CLASS`: a class of a file flies."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -163,6 +164,39 @@ def test_a_changed_law_is_another_campaign(whole: Path) -> None:
     _, why = run("campaign", str(whole / "campaign.toml"), "--flights", "6", "-o", str(whole / "out"), code=2)
     laws.write_text(LAWS, "utf-8")
     assert "holds another campaign, with controllers[1].law.sha256" in unwrapped(why)
+    (whole / "gains.py").write_text("POSITION, VELOCITY = 6.0, 4.5\n", "utf-8")
+    _, why = run("campaign", str(whole / "campaign.toml"), "--flights", "6", "-o", str(whole / "out"), code=2)
+    (whole / "gains.py").write_text("POSITION, VELOCITY = 6.0, 4.0\n", "utf-8")
+    assert "holds another campaign, with controllers[1].law.sha256" in unwrapped(why)
+
+
+def test_a_campaign_may_be_moved(whole: Path, tmp_path: Path) -> None:
+    """With its law: the same command goes on there, and its flights are repeated from there."""
+    moved = shutil.copytree(whole, tmp_path / "moved")
+    before = (moved / "out/flights.csv").read_bytes()
+    run("campaign", str(moved / "campaign.toml"), "--flights", "6", "-o", str(moved / "out"))
+    assert (moved / "out/flights.csv").read_bytes() == before
+    assert json.loads((moved / "out/campaign.json").read_text("utf-8"))["laws"]["Own"].startswith(str(moved))
+
+
+def test_laws_in_two_folders_have_helpers_of_their_own(tmp_path: Path) -> None:
+    """Of the same name: each flies with the gains beside it."""
+    means = {}
+    for name, gain in (("a", 6.0), ("b", 2.0)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "gains.py").write_text(f"POSITION, VELOCITY = {gain}, 4.0\n", "utf-8")
+        (tmp_path / name / "laws.py").write_text(LAWS.replace("class Own", f"class Own{name}"), "utf-8")
+        text = CAMPAIGN.replace('"laws.py:Own", "laws.py:Ending"', f'"{name}/laws.py:Own{name}"')
+        Path("one.toml").write_text(text, "utf-8")
+        run("campaign", "one.toml", "--flights", "2", "-o", name * 2)
+        found = json.loads(Path(name * 2, "summary.json").read_text("utf-8"))
+        means[name] = found["controllers"][f"Own{name}"]["quantiles"]["iae_m_s"]["0.5"]
+    both = '"a/laws.py:Owna", "b/laws.py:Ownb"'
+    Path("both.toml").write_text(CAMPAIGN.replace('"laws.py:Own", "laws.py:Ending"', both), "utf-8")
+    run("campaign", "both.toml", "--flights", "2", "-o", "both")
+    found = json.loads(Path("both/summary.json").read_text("utf-8"))["controllers"]
+    assert {name: found[f"Own{name}"]["quantiles"]["iae_m_s"]["0.5"] for name in "ab"} == means
+    assert means["a"] < 0.8 * means["b"]
 
 
 @pytest.mark.parametrize(

@@ -295,7 +295,7 @@ class Episodes:
         observer, columns = self._method.target_observer, list[Real]()
         rows = np.uint32(observer.longest - observer.least + 1)
         for _ in range(self._method.port.axes):
-            counted = observer.least - 1 + (self._draws.next() % rows)
+            counted = observer.least_drawn + (self._draws.next() % rows)
             few, many = (self._scales.of[name] for name in ("NOISE_M_S", "MOST_NOISE_M_S"))
             scale = np.where(counted & 1 == 0, *(self._numbers.constant(*one) for one in (few, many)))
             columns += [counted.astype(self._numbers.computed), self._draws.share(scale)]

@@ -14,7 +14,7 @@ from mambo_nmpc.curves import CurvePoint, curve, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.api.options import ControllerOptions
 from mambo_sil.api.simulated import LOST_M, SimulatedDrones
-from mambo_sil.arguments import of_shape, require, require_choice, require_number
+from mambo_sil.arguments import is_whole, of_shape, require, require_choice, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -60,6 +60,7 @@ class _Flights:
         require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
         if not isinstance(vehicle, Vehicle):
             vehicle = Vehicle.of(vehicle_toml.load(str(vehicle)))
+        vehicle.require_flights(n)
         self._vehicle = vehicle
         self.n, self._action, self._curve = n, action, curve(trajectory, size_m, rate_rad_s)
         self._controller = Controller.from_vehicle(self._vehicle, n, sensors=sensors, **options)
@@ -215,7 +216,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
 class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
     """n such environments, whose drones are simulated together: actions (n, 2), observations (n, 15).
 
-    An environment that has ended begins anew at the next step, whose action it does not take.
+    An environment that has ended starts again at the next step, whose action it does not take.
     """
 
     metadata: Final = {"autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
@@ -247,6 +248,8 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
             wind_speed_m_s=wind_speed_m_s,
             **options,
         )
+        rule = "be a whole number of 1 or more"
+        require(is_whole(max_episode_steps, 1, 2**62), "max_episode_steps", max_episode_steps, rule)
         self.num_envs, self._most_steps = num_envs, max_episode_steps
         self.single_action_space = self._flights.action_space
         self.single_observation_space = self._flights.observation_space
@@ -267,7 +270,8 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
         observation, reward, crashed, info = self._flights.step(given)
         if begins.any():
             self._flights.begin_again(self.np_random, begins)
-            observation, info = self._flights.observe({name: x for name, x in info.items() if name in _SAID})
+            said = {name: np.where(begins, 0, x) for name, x in info.items() if name in _SAID}
+            observation, info = self._flights.observe(said)
             reward, crashed = np.where(begins, 0.0, reward), crashed & ~begins
         truncated = (self._flights.steps >= self._most_steps) & ~crashed
         self._ended = crashed | truncated

@@ -9,9 +9,11 @@ import numpy as np
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.arguments import is_whole, require, require_kind
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.errors import ArgumentError
 from mambo_sil.experiment.campaign.campaign_file import (
     CampaignFile,
     completed,
+    demand_own_names,
     distributions,
     scenario,
 )
@@ -19,13 +21,14 @@ from mambo_sil.experiment.campaign.campaign_flights import (
     CRASHED,
     FAILURE,
     MOST_TOGETHER,
+    columns,
     fly_law,
     fly_scenarios,
 )
-from mambo_sil.experiment.campaign.parameters import Draw, draw
+from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw, draw
 from mambo_sil.experiment.inputs import NAME, Entrant, as_sections
 from mambo_sil.flight.controllers.own_law import Law
-from mambo_sil.flight.names import SensorsName
+from mambo_sil.flight.names import IN_SPACE, SensorsName
 from mambo_sil.flight.scenario import LARGEST_SEED, Scenario, flight_of
 from mambo_sil.results.blocks import ResultTable
 from mambo_sil.results.number_format import distance
@@ -33,7 +36,6 @@ from mambo_sil.results.terminal import table as in_lines
 
 MOST_FLIGHTS: Final = 1_000_000
 _SOURCE: Final = "campaign"
-_PERIOD_S: Final = 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,9 +43,9 @@ class CampaignFlights:
     """Random flights of several laws; `print` shows how close each flew.
 
     names:      of the laws.
-    table:      columns by name, each a list with a value for each flight, as pandas.DataFrame takes them: the
-                seed and the parameters that were drawn, and of each law NAME_crashed, NAME_iae_m_s and the
-                other metrics of flights.csv.
+    table:      columns by name, each a list with a value for each flight, as pandas.DataFrame takes them:
+                those of flights.csv, the seed and the parameters that were drawn, and of each law
+                NAME_crashed, NAME_iae_m_s and other metrics.
     failures:   of laws of one's own, when and why they failed, by the number of the flight.
     duration_s: of each flight.
     """
@@ -64,11 +66,19 @@ class CampaignFlights:
     def __repr__(self) -> str:
         """Return the table that `print` shows."""
         shown = self._shown()
-        return "\n".join(in_lines(shown.heads, shown.rows, shown.text_columns))
+        return "\n".join([*in_lines(shown.heads, shown.rows, shown.text_columns), *self._reasons()])
 
     def _repr_markdown_(self) -> str:
         """Return the same for a notebook."""
-        return self._shown().markdown()
+        return "\n\n".join([self._shown().markdown(), *self._reasons()])
+
+    def _reasons(self) -> list[str]:
+        """Return a sentence for each law that failed: how often, and why at first."""
+        return [
+            f"{name} failed in {len(reasons)} of {len(self.table['seed'])}, as in flight {min(reasons)}, "
+            f"{reasons[min(reasons)]}"
+            for name, reasons in self.failures.items()
+        ]
 
     def _shown(self) -> ResultTable:
         rows = []
@@ -102,10 +112,12 @@ def campaign(
     draws:      values and distributions of section [draws] of campaign.toml; the others have its defaults.
 
     Flight number k has the draws that flight k of the command has with that seed. Raises ArgumentError for a
-    wrong argument, InvalidSettingsError for wrong draws, BuildError if there is no compiler.
+    wrong argument, InvalidSettingsError for wrong draws or names, FlightError for an update period that is no
+    whole number of the drone's ticks, BuildError if there is no compiler.
     """
     require_kind("laws", laws, Mapping, "a mapping of names to controllers and laws")
     require(len(laws) > 0, "laws", laws, "have a controller or a law")
+    demand_own_names([str(name) for name in laws], "laws")
     for name, law in laws.items():
         good = isinstance(name, str) and NAME.fullmatch(name) is not None
         require(good, "laws", name, "have names of at most 40 letters, digits, - and _")
@@ -120,11 +132,12 @@ def campaign(
         part = drawn[first : first + MOST_TOGETHER]
         flown = _fly(laws, [scenario(flight, one) for one in part])
         rows += [one | row for one, row in zip(part, flown, strict=True)]
-    columns = [name for name in rows[0] if not name.endswith(f"_{FAILURE}")]
+    spatial = any(one["trajectory"] in IN_SPACE for one in drawn)
+    titles = "seed", *PARAMETERS, *columns(tuple(laws), sensed=flight["sensors"] != "true", spatial=spatial)
     failed = {name: _failures(rows, name) for name in laws}
     return CampaignFlights(
         names=tuple(laws),
-        table={name: [row[name] for row in rows] for name in columns},
+        table={name: [row[name] for row in rows] for name in titles},
         failures={name: reasons for name, reasons in failed.items() if reasons},
         duration_s=duration_s,
     )
@@ -141,14 +154,25 @@ def draw_vehicles(
     file = _file(vehicle, {"duration_s": 1.0}, draws)
     flight = file.flight.model_dump() | {"vehicle": vehicle.drone.model_dump()}
     scenarios = [scenario(flight, one) for one in _draws(file, flights, seed)]
-    return flight_of(scenarios, _PERIOD_S).vehicle
+    return flight_of(scenarios, vehicle.drone.step_s).vehicle
 
 
 def _file(vehicle: Vehicle, flight: Mapping[str, Any], draws: Mapping[str, Any] | None) -> CampaignFile:
     """Return what a campaign.toml with these sections says; raises ArgumentError and InvalidSettingsError."""
     require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
-    document = {"flight": dict(flight), "draws": dict(draws or {})}
+    require(draws is None or isinstance(draws, Mapping), "draws", draws, "be a mapping of names to draws")
+    document = {"flight": _listed(flight), "draws": _listed(draws or {})}
     return completed(as_sections(CampaignFile, document, _SOURCE), vehicle.drone, _SOURCE, replaced=False)
+
+
+def _listed(section: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section whose distributions may have tuples in place of lists."""
+    return {
+        name: {way: list(one) if isinstance(one, tuple) else one for way, one in value.items()}
+        if isinstance(value, Mapping)
+        else value
+        for name, value in section.items()
+    }
 
 
 def _draws(file: CampaignFile, flights: int, seed: int) -> list[Draw]:
@@ -164,10 +188,13 @@ def _fly(laws: Mapping[str, Controller | Law], scenarios: Sequence[Scenario]) ->
     entrants = [
         Entrant(name, "nmpc", law.settings) for name, law in laws.items() if isinstance(law, Controller)
     ]
-    rows: list[dict[str, Any]] = list(fly_scenarios(entrants, scenarios, _silent))
+    rows: list[dict[str, Any]] = list(fly_scenarios(entrants, scenarios))
     for name, law in laws.items():
         if not isinstance(law, Controller):
-            found = fly_law(name, law, scenarios, _silent)
+            try:
+                found = fly_law(name, law, scenarios)
+            except ArgumentError as error:
+                raise ArgumentError(f"laws[{name!r}]: {error}") from error
             rows = [row | of_law for row, of_law in zip(rows, found, strict=True)]
     return rows
 
@@ -176,7 +203,3 @@ def _failures(rows: Sequence[Mapping[str, Any]], name: str) -> dict[int, str]:
     """Return when and why a law failed, by the number of the flight."""
     key = f"{name}_{FAILURE}"
     return {number: row[key] for number, row in enumerate(rows) if key in row}
-
-
-def _silent(share: float) -> None:
-    """Tell nobody."""

@@ -50,7 +50,7 @@ class Flown:
     """n simulated flights.
 
     trace:   k samples of n flights, with units in the names of its arrays.
-    metrics: of the true positions, each (n,).
+    metrics: of the true positions, each (n,), from `measured_from_s` on.
     crashed: which flights (n,) were lost, tilted too far or touched the ground.
     failures: of a law of one's own, when and why it was lost, by the number of the flight.
     """
@@ -62,10 +62,12 @@ class Flown:
 
     def __repr__(self) -> str:
         """Return how many flights there are, how close they are, and how many crashed."""
-        rms_m = [distance(value) for value in np.quantile(self.metrics.rms_error_m, (0.5, 1.0)).tolist()]
-        shown = " to ".join(dict.fromkeys(rms_m))
-        flights = f"{len(self.crashed)} flight{'' if len(self.crashed) == 1 else 's'}"
-        return f"Flown({flights}: rms error {shown}, {int(self.crashed.sum())} crashed)"
+        rms_m = np.where(self.crashed, np.inf, self.metrics.rms_error_m)
+        median_m, most_m = np.quantile(rms_m, (0.5, 1.0), method="inverted_cdf").tolist()
+        if len(rms_m) == 1:
+            return f"Flown({'crashed' if self.crashed[0] else f'rms error {distance(most_m)}'})"
+        shown = f"rms error {distance(median_m)} in the median, {distance(most_m)} at most"
+        return f"Flown({len(rms_m)} flights: {shown}, {int(self.crashed.sum())} crashed)"
 
 
 def fly(
@@ -83,6 +85,7 @@ def fly(
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0),
     wind_speed_m_s: PerFlight = 0.0,
     wind_direction_rad: PerFlight = 0.0,
+    measured_from_s: float = 0.0,
 ) -> Flown:
     """Fly the settings of a controller, or a law of your own, on a vehicle, once for each seed.
 
@@ -94,11 +97,12 @@ def fly(
                 if it has a height, which the altitude loop of the vehicle then follows.
     yaw_rad:    constant heading, one for all flights or an array (n,).
     sensors:    what controller and inner loops see: the truth ("true"), or the vehicle's sensors by name.
-    seeds:      of sensor noise, one for each of n flights.
+    seeds:      of sensor noise and gusts, one for each of n flights.
     start:      hovering at the first point, or on the ground 5 s earlier ("take-off").
     push_m_s2:  steady acceleration along x and y of the world, each one number or an array (n,).
     wind_speed_m_s, wind_direction_rad: mean wind 6 m above the ground, of which 0.65 is left at 1.1 m, with
                 its gusts, and the heading towards which it blows; each one number or an array (n,).
+    measured_from_s: time from which on `metrics` count: a start from rest is most of their error.
 
     Raises ArgumentError for a wrong argument, FlightError if they do not fit together.
     """
@@ -108,6 +112,7 @@ def fly(
     require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
     require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
     require_number("duration_s", duration_s, 0.0, LONGEST_S)
+    require_number("measured_from_s", measured_from_s, 0.0, max(0.0, duration_s - period_of(controller)))
     require_choice("sensors", sensors, SENSORS_NAMES)
     require_choice("start", start, STARTS)
     given = _as_seeds(seeds)
@@ -130,12 +135,13 @@ def fly(
     )
     if isinstance(controller, Controller):
         trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
-        return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
+        return Flown(trace, measure(trace, measured_from_s), detect_crashes(trace, vehicle.drone))
     laws = OwnLaws(controller, flight)
     trace = simulate.fly(flight, laws)
     for number, failure in laws.failures.items():
         warnings.warn(f"flight {number}, {failure}", stacklevel=2)
-    return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone), laws.failures)
+    crashed = detect_crashes(trace, vehicle.drone)
+    return Flown(trace, measure(trace, measured_from_s), crashed, laws.failures)
 
 
 def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:

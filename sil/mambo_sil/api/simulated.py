@@ -65,7 +65,6 @@ class SimulatedDrones:
             np.where(put, fresh.rotor_speed_rad_s, self._state.rotor_speed_rad_s),
             np.where(put, fresh.memory, self._state.memory),
         )
-        self._altitude.integral_n = np.where(put, 0.0, self._altitude.integral_n)
         self._delivery.forget(put)
         self._thrust_n = np.where(put, self.drone.hover_demand_n, self._thrust_n)
         true = truth(self._state)

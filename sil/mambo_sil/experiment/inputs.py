@@ -151,7 +151,8 @@ def load_any_entrant(named: str, folder: Path, place: str) -> Entrant:
         raise InvalidSettingsError((f"{place}: {error}",)) from None
     name = named.rpartition(":")[2]
     if not NAME.fullmatch(name):
-        raise InvalidSettingsError((f"{place}: {echo(named)}: its class must have at most 40 letters",))
+        rule = "must have a class of at most 40 letters, digits and _: results are named after it"
+        raise InvalidSettingsError((f"{place}: {echo(named)} {rule}",))
     return Entrant(name, "law", Settings(), law)
 
 

@@ -37,9 +37,9 @@ from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.names import (
+    CONTROLLER_NAMES,
     SENSORS_OF,
     AltitudeName,
-    ControllerName,
     CurveName,
     SensorsName,
     Start,
@@ -57,8 +57,9 @@ LONGEST_S: Final = 3600.0
 LARGEST_YAW_RAD: Final = 1000.0
 LARGEST_WIND_M_S: Final = 50.0
 
-OwnLawName = Annotated[str, Field(pattern=r"^.*\.py:[A-Za-z_]\w*$")]
-"""A law of the user's own, FILE.py:CLASS."""
+_NAMES: Final = "|".join(CONTROLLER_NAMES)
+RecordedController = Annotated[str, Field(pattern=rf"^(?:{_NAMES}|.*\.py:\w+)$")]
+"""A controller by name, or a law of the user's own, FILE.py:CLASS."""
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 
@@ -243,7 +244,7 @@ class Record(_Record):
 
     format: Literal[2] = FORMAT
     scenario: Scenario
-    controller: ControllerName | OwnLawName = "nmpc"
+    controller: RecordedController = "nmpc"
     settings: Settings
     """Settings of the NMPC; a PD uses their update period only, a law of the user's own nothing."""
     trace_sha256: str | None = None

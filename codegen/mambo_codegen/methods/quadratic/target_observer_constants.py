@@ -138,6 +138,21 @@ class TargetObserverConstants:
     climb: MotionLimits | None
 
     @property
+    def last_row(self) -> int:
+        """The last row of `gains`."""
+        return len(self.gains) - 1
+
+    @property
+    def known_last_row(self) -> int:
+        """The last row of `known_gains`."""
+        return len(self.known_gains) - 1
+
+    @property
+    def least_drawn(self) -> int:
+        """The smallest memory that the self-test writes: it grows by 1 before it is used."""
+        return self.least - 1
+
+    @property
     def limits(self) -> list[MotionLimits]:
         """The limits of each kind of axis."""
         return [self.level, *([self.climb] if self.climb else [])]

@@ -110,7 +110,7 @@ def _fly_campaign(
 ) -> "CampaignSummary":
     """Fly the missing flights and write the results; if interrupted print how many are finished.
 
-    Says of each law of the user's own in how many of these flights it failed, and why in one of them.
+    Print in how many of these flights a law of the user's own failed, and why in one of them.
     """
     from mambo_sil.experiment.campaign import campaign_file
     from mambo_sil.experiment.campaign.campaign_report import finish
@@ -134,14 +134,15 @@ def _fly_campaign(
                 with pool as open_pool:
                     bar.stage("flying")
                     fly_missing(chosen, store, flights, open_pool, bar, running=bar.running, failed=failed)
-            summary = finish(chosen, store, bar.stage)
+            return finish(chosen, store, bar.stage)
         except KeyboardInterrupt:
             with contextlib.suppress(UnwritableError):
                 store.export()
             raise
-    for name, reasons in failures.items():
-        typer.echo(sentence(f"{name} failed in {len(reasons)} flights, as in {min(reasons)}"), err=True)
-    return summary
+        finally:
+            for name, reasons in failures.items():
+                flown = "1 flight" if len(reasons) == 1 else f"{len(reasons)} flights"
+                typer.echo(sentence(f"{name} failed in {flown}, as in {min(reasons)}"), err=True)
 
 
 FAULTS_FILES = ("faults.csv", "faults.png", "faults.svg")

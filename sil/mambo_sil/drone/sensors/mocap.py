@@ -69,7 +69,7 @@ class MocapSuite:
         self._tick = 0
 
     def place(self, start: Seen, put: NDArray[np.bool_]) -> None:
-        """Begin anew with those drones that are `put` (n,) elsewhere, at their true state."""
+        """Start again with the drones that are `put` (n,) elsewhere, at their true state."""
         self._late_m = [np.where(put, start.position_m, late_m) for late_m in self._late_m]
         self._position_m = np.where(put, start.position_m, self._position_m)
         self._velocity_m_s = np.where(put, start.velocity_m_s, self._velocity_m_s)

@@ -4,6 +4,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -32,7 +33,7 @@ from mambo_sil.experiment.campaign.parameters import (
     scenario_values,
 )
 from mambo_sil.experiment.inputs import Entrant, File, FileSection, load_any_entrant, load_drone, read_as
-from mambo_sil.flight.controllers.own_law import LawFile, columns_of_law, load_law
+from mambo_sil.flight.controllers.own_law import LawFile, OwnLaws
 from mambo_sil.flight.names import IN_SPACE, SENSORS_OF, AltitudeName, SensorsName, Start
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
@@ -130,7 +131,14 @@ class Campaign:
         """Return everything that determines the result, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
         controllers = [entrant.document() for entrant in self.entrants]
+        for one in controllers:
+            one.get("law", {}).pop("named", None)  # the same wherever its file is
         return document | {"controllers": controllers, "vehicle": self.drone.model_dump()}
+
+    def places(self) -> dict[str, Any]:
+        """Return where the files of laws are, by the names of the controllers."""
+        laws = {one.name: one.law.named for one in self.entrants if one.law is not None}
+        return {"laws": laws} if laws else {}
 
 
 def scenario(flight: dict[str, Any], drawn: Draw) -> Scenario:
@@ -165,19 +173,7 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
     """Load drone and controllers and check that each can be simulated."""
     file, drone = load_its_drone(file, folder, source, vehicle)
     entrants = tuple(load_any_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
-    names = [entrant.name for entrant in entrants]
-    for name, other in itertools.combinations(names, 2):
-        if name == other:
-            raise InvalidSettingsError(
-                (f"{source}: controllers: two are called {name}; give their files different names",)
-            )
-        if _stem(name) == _stem(other):
-            raise InvalidSettingsError(
-                (
-                    f"{source}: controllers: results of {name} and {other} would have the same names; "
-                    "give one file a name that differs in more than case and _seen",
-                )
-            )
+    demand_own_names([entrant.name for entrant in entrants], f"{source}: controllers")
     campaign = Campaign(file, entrants, drone)
     for entrant, named in zip(entrants, file.controllers, strict=True):
         place, drawn = f"{source}: controllers: {echo(named)}", campaign.draw(0)
@@ -186,6 +182,20 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
         else:
             _demand_command(entrant.law, campaign.flight, drawn, place)
     return campaign
+
+
+def demand_own_names(names: Sequence[str], place: str) -> None:
+    """Raise InvalidSettingsError, which begins with `place`, for two controllers with the same columns."""
+    for name, other in itertools.combinations(names, 2):
+        if name == other:
+            raise InvalidSettingsError((f"{place}: two are called {name}; give them different names",))
+        if _stem(name) == _stem(other):
+            raise InvalidSettingsError(
+                (
+                    f"{place}: results of {name} and {other} would have the same names; "
+                    "give one a name that differs in more than case and _seen",
+                )
+            )
 
 
 def _stem(name: str) -> str:
@@ -205,9 +215,9 @@ def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, plac
 
 
 def _demand_command(law: LawFile, flight: dict[str, Any], drawn: Draw, place: str) -> None:
-    """Raise InvalidSettingsError unless a law returns a command at the start of a random flight."""
+    """Raise InvalidSettingsError unless a law can be copied, and commands at the start of a flight."""
     try:
-        columns_of_law(load_law(law.named), flight_of([scenario(flight, drawn)], law.update_period_s))
+        OwnLaws(law.load(), flight_of([scenario(flight, drawn)], law.update_period_s))
     except (ArgumentError, FlightError) as error:
         raise InvalidSettingsError((f"{place}: {error}",)) from None
 

@@ -19,7 +19,7 @@ from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.own_law import Law, LawFile, OwnLaws, load_law, period_of
+from mambo_sil.flight.controllers.own_law import Law, LawFile, OwnLaws, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly, fly_groups, part_of
@@ -147,7 +147,8 @@ def fly_law(name: str, law: Law, scenarios: Sequence[Scenario], report: Report =
 @cache
 def _load(law: LawFile) -> Law:
     """Return a law; a worker reads its file once."""
-    return load_law(law.named)
+    with _BUILDING:
+        return law.load()
 
 
 def _controller(entrant: Entrant, scenarios: Sequence[Scenario], flight: Flight) -> PositionController:

@@ -63,7 +63,7 @@ def campaign_record(path: Path) -> Record | None:
     except (OSError, ValueError, TypeError, KeyError, sqlite3.Error):
         return None
     settings = Settings.model_validate_json(json.dumps(document["settings"]))
-    law = LawFile(**document["law"]) if "law" in document else None
+    law = LawFile(held["laws"][matched[2]], **document["law"]) if "law" in document else None
     vehicle = VehicleFile.model_validate_json(json.dumps(held["vehicle"])).model_dump()
     entrant = Entrant(document["name"], document["kind"], settings, law)
     return _record(held["flight"] | {"vehicle": vehicle}, entrant, row)

@@ -32,7 +32,7 @@ def table_columns(campaign: Campaign) -> tuple[str, ...]:
 
 def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
     """Open and lock the folder of a campaign; raises what `open_store` raises."""
-    return open_store(folder, campaign.document(), table_columns(campaign))
+    return open_store(folder, campaign.document(), table_columns(campaign), campaign.places())
 
 
 def missing_flights(store: FlightStore, flights: int) -> list[int]:

@@ -131,8 +131,12 @@ def _refuse_special_file(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[FlightStore]:
+def open_store(
+    folder: Path, campaign: Mapping[str, Any], columns: Sequence[str], beside: Mapping[str, Any]
+) -> Iterator[FlightStore]:
     """Open and lock `folder` for a run of `campaign`.
+
+    beside: what campaign.json has, too, and what no result depends on.
 
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
     locked it, UnwritableError if the file system refuses an access. A folder that is new, in which no flight
@@ -144,7 +148,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
             stack.enter_context(create_folder(folder))
         stack.enter_context(lock(folder))
         new = not any(folder.iterdir())
-        claim(folder, "campaign", {"command": "campaign", **campaign})
+        claim(folder, "campaign", {"command": "campaign", **campaign}, beside)
         store = stack.enter_context(contextlib.closing(FlightStore(folder, columns, key)))
         try:
             yield store
@@ -167,9 +171,12 @@ def convert_os_errors(place: Path, advice: str = "") -> Iterator[None]:
         raise UnwritableError(f"{echo(str(place))}: cannot be written: {error}{advice}") from error
 
 
-def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
+def claim(
+    folder: Path, kind: str, identity: Mapping[str, Any], beside: Mapping[str, Any] | None = None
+) -> None:
     """Write `identity` to `<kind>.json` in an empty folder, or compare it with the one that is there.
 
+    `beside` is written, too, and not compared.
     Raises ForeignFilesError for a folder with other files or another identity.
     """
     name, path = echo(str(folder)), folder / f"{kind}.json"
@@ -183,8 +190,7 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
             raise ForeignFilesError(
                 f"{name}: holds files that are not from a mambo-nmpc {kind}; name another folder with -o", ()
             )
-        with convert_os_errors(folder):
-            put(path, (json.dumps(identity, indent=2) + "\n").encode())
+        _write(path, identity | dict(beside or {}))
         return
     if held["generator"] != identity["generator"]:
         raise ForeignFilesError(
@@ -192,11 +198,19 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
             "go on with that version, or name another folder with -o",
             (),
         )
-    difference = _difference("", held, json.loads(json.dumps(identity)))
+    compared = {key: value for key, value in held.items() if key not in (beside or {})}
+    difference = _difference("", compared, json.loads(json.dumps(identity)))
     if difference:
         raise ForeignFilesError(
             f"{name}: holds another {kind}, {difference}; name another folder with -o", ()
         )
+    if compared | dict(beside or {}) != held:
+        _write(path, identity | dict(beside or {}))
+
+
+def _write(path: Path, document: Mapping[str, Any]) -> None:
+    with convert_os_errors(path.parent):
+        put(path, (json.dumps(document, indent=2) + "\n").encode())
 
 
 def _difference(where: str, held: Any, asked: Any) -> str | None:

@@ -30,7 +30,8 @@ UPDATE_PERIOD_S: Final = 0.01
 class Law(Protocol):
     """A position controller of a program's own.
 
-    It may have `update_period_s`, the time from one call to the next; without it is called every 10 ms.
+    It may have `update_period_s`, the time from one call to the next; without it is called every 10 ms. It
+    may have `reset(seed)`, which is called before a flight, with the seed of its noise.
     """
 
     def step(self, state: DroneState, target: TargetState) -> ArrayLike:
@@ -47,7 +48,7 @@ class LawFile:
     """A law in a file.
 
     named:           FILE.py:CLASS, with the whole path of the file.
-    sha256:          of the file.
+    sha256:          of the file, and of the modules beside it that it imports.
     update_period_s: time from one call of the law to the next.
     """
 
@@ -63,38 +64,64 @@ class LawFile:
         """
         file, _, name = named.rpartition(":")
         whole = f"{(folder / file).resolve()}:{name}"
-        law = load_law(whole)
+        law, sha256 = _loaded(whole)
         try:
             period_s = period_of(law)
         except ArgumentError as error:
             raise FlightError(f"{echo(named)}: {error}") from error
-        return cls(whole, hashlib.sha256((folder / file).read_bytes()).hexdigest(), period_s)
+        return cls(whole, sha256, period_s)
+
+    def load(self) -> Law:
+        """Return a new law; raises FlightError as `load_law`, and if the file is no longer what it was."""
+        law, sha256 = _loaded(self.named)
+        if sha256 != self.sha256:
+            raise FlightError(f"{echo(self.named)}: the file, or one that it imports, is not what it was")
+        return law
 
 
 def load_law(named: str) -> Law:
-    """Return a new law of the class that FILE.py:CLASS names; the file may import what lies beside it.
+    """Return a new law of the class that FILE.py:CLASS names; the file may import modules beside it.
 
     Raises FlightError, in one sentence, for whatever is wrong with the file or the class.
     """
+    return _loaded(named)[0]
+
+
+def _loaded(named: str) -> tuple[Law, str]:
+    """Return a new law, and the SHA-256 of its file and of the modules beside it that it imports.
+
+    These are not kept: another law may have others of the same names.
+    """
     file, _, name = named.rpartition(":")
-    path = Path(file)
+    path, before = Path(file), set(sys.modules)
     module_name = f"law_{path.stem}"  # a file numpy.py takes nobody's place
     spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None or not path.is_file():
         raise FlightError(f"{echo(named)}: there is no file {echo(file)}")
     module = importlib.util.module_from_spec(spec)
+    folder = path.resolve().parent
     sys.modules[module_name] = module
-    sys.path.insert(0, str(path.resolve().parent))
+    sys.path.insert(0, str(folder))
     try:
         spec.loader.exec_module(module)
         law = getattr(module, name)()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise FlightError(f"{echo(named)}: {type(error).__name__}: {echo(str(error))}") from error
     finally:
-        sys.path.pop(0)
+        sys.path.remove(str(folder))
+        beside = {
+            one: Path(source)
+            for one in set(sys.modules) - before
+            if (source := getattr(sys.modules[one], "__file__", None)) and folder in Path(source).parents
+        }
+        for one in beside:
+            del sys.modules[one]
     if not callable(getattr(law, "step", None)):
         raise FlightError(f"{echo(named)}: {echo(name)} has no method step(state, target)")
-    return cast("Law", law)
+    digest = hashlib.sha256(path.read_bytes())
+    for one in sorted(beside.keys() - {module_name}):
+        digest.update(beside[one].read_bytes())
+    return cast("Law", law), digest.hexdigest()
 
 
 def period_of(law: object) -> float:
@@ -127,7 +154,7 @@ class OwnLaw:
         if self.failure is None and np.isfinite(state).all():
             try:
                 numbers[0] = command_of(self._law.step(*_seen(state[0], target[0])), self.columns)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 said = str(error) if isinstance(error, ArgumentError) else f"{type(error).__name__}: {error}"
                 self.failure = f"{self._calls * self._period_s:g} s: law.step: {said}"
         self._calls += 1
@@ -139,8 +166,8 @@ class OwnLaws:
 
     def __init__(self, law: Law, flight: Flight) -> None:
         self.columns = columns_of_law(_copy(law), flight)
-        period_s = flight.update_period_s
-        self.laws = [OwnLaw(_copy(law), self.columns, period_s) for _ in range(flight.flights)]
+        seeds = flight.seeds or (0,) * flight.flights
+        self.laws = [OwnLaw(_ready(law, seed), self.columns, flight.update_period_s) for seed in seeds]
 
     def of_flight(self, flight: int) -> OwnLaw:
         """Return the law of a flight."""
@@ -175,7 +202,7 @@ def columns_of_law(law: Law, flight: Flight) -> Columns:
     state[STATE["yaw_rad"]] = np.broadcast_to(flight.yaw_rad, flight.flights)[0]
     try:
         found = law.step(*_seen(state, target))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ArgumentError(f"law.step: {type(error).__name__}: {error}") from error
     count = np.size(found)
     columns = Columns(SPACE.state, SPACE.target, SPACE.command if count == SPACE.command else LEVEL.command)
@@ -205,6 +232,17 @@ def _copy(law: Law) -> Law:
     except Exception as error:
         said = f"{type(error).__name__}: {error}"
         raise ArgumentError(f"law: {said}; it is copied for each flight: give it __deepcopy__") from error
+
+
+def _ready(law: Law, seed: int) -> Law:
+    """Return a copy of a law for a flight; raises ArgumentError if its `reset` raises."""
+    found = _copy(law)
+    if callable(reset := getattr(found, "reset", None)):
+        try:
+            reset(seed)
+        except (Exception, SystemExit) as error:
+            raise ArgumentError(f"law.reset: {type(error).__name__}: {error}") from error
+    return found
 
 
 def _places(columns: dict[str, slice], *members: str) -> list[int]:
