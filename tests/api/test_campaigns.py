@@ -1,5 +1,6 @@
 """Campaigns from Python: the flights of the command, laws beside controllers, and a table of them."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +141,12 @@ def test_drawn_vehicles_are_those_of_a_campaign(both: CampaignFlights) -> None:
     found = fly(Controller.from_preset("crazyflie"), drones, "circle", duration_s=4.0, seeds=range(3))
     assert len(set(found.metrics.rms_error_m.tolist())) == 3
     assert repr(found).startswith("Flown(3 flights: rms error ")
+    assert re.fullmatch(r"Vehicle\(crazyflie: 0\.03\d* to 0\.03\d* kg, attitude cascade, .*\)", repr(drones))
+    assert repr(CRAZYFLIE) == "Vehicle(crazyflie: 0.03 kg, attitude cascade, sensors mocap)"
+    controller = Controller.from_vehicle("crazyflie", n=2)
+    settings = controller.settings.short_digest
+    words = "quadratic cost: roll, pitch and thrust of 2 drones every 0.01 s"
+    assert repr(controller) == f"Controller(settings {settings}, {words})"
     with pytest.raises(ArgumentError, match=r"has shape \(3,\); it must be \(1,\)"):
         fly(Controller.from_preset("crazyflie"), drones, "circle", duration_s=4.0)
 

@@ -206,6 +206,7 @@ def test_laws_in_two_folders_have_helpers_of_their_own(tmp_path: Path) -> None:
         ("laws.py:Idle", "Idle has no method step(state, target)"),
         ("laws.py:Odd", "update_period_s = 0.0071 must be a whole multiple"),
         ("laws.py:Own", "two are called Own"),
+        ("laws.py", "laws.py must be laws.py:CLASS, a law of your own"),
     ],
 )
 def test_a_campaign_names_a_bad_one(named: str, sentence: str) -> None:

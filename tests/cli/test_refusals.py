@@ -125,7 +125,7 @@ def test_an_empty_program_is_no_controller_of_a_campaign(tmp_path: Path) -> None
     (tmp_path / "mypid.py").touch()
     (tmp_path / "campaign.toml").write_text('controllers = ["mambo", "mypid.py"]\n')
     talk = run("campaign", "campaign.toml", code=2)[1]
-    assert talk.startswith("campaign.toml: controllers: mypid.py: is a Python program; name a preset")
+    assert talk.startswith("campaign.toml: controllers: mypid.py must be mypid.py:CLASS, a law of your own")
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,16 @@ class Controller:
         self._height = height
         self._heading = Heading(self._compiled)
 
+    def __repr__(self) -> str:
+        """Return the settings id, how many drones there are, and what is commanded."""
+        settings, drones = self.settings, "1 drone" if self.n == 1 else f"{self.n} drones"
+        has_thrust = settings.height is not None or self._height is not None
+        commands = "roll, pitch and thrust" if has_thrust else "roll and pitch"
+        return (
+            f"Controller(settings {settings.short_digest}, {settings.cost.norm} cost: {commands} of {drones} "
+            f"every {settings.horizon.update_period_s:g} s)"
+        )
+
     @classmethod
     def from_vehicle(
         cls,

@@ -155,6 +155,7 @@ def load(source: str, scalar: str | None) -> "Settings":
 def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
     """Load the drone of --vehicle, else that which the settings of `sources` are for, else the Mambo.
 
+    Say so if a preset has the name of another drone.
     Raises InvalidSettingsError for settings of several drones, and what `vehicle_toml` raises.
     """
     from mambo_sil.drone.vehicles import vehicle_toml
@@ -165,6 +166,13 @@ def load_drone(vehicle: str | None, *sources: str) -> "VehicleFile":
     if len(named) > 1:
         several = " and ".join(map(echo, named))
         raise InvalidSettingsError((f"the settings are for {several}; choose one with --vehicle",))
+    if not named:
+        for source in sorted({*sources} & {*vehicle_toml.names()} - {vehicle_toml.DEFAULT}):
+            typer.echo(
+                f"the drone is vehicle {vehicle_toml.DEFAULT}, the default; for that of the preset add "
+                f"--vehicle {source}",
+                err=True,
+            )
     return vehicle_toml.load(named[0] if named else vehicle_toml.DEFAULT)
 
 

@@ -143,6 +143,10 @@ def load_any_entrant(named: str, folder: Path, place: str) -> Entrant:
 
     Raises InvalidSettingsError, whose lines begin with `place`.
     """
+    if named.endswith(".py"):
+        raise InvalidSettingsError(
+            (f"{place}: {echo(named)} must be {echo(named)}:CLASS, a law of your own",)
+        )
     if ".py:" not in named:
         return load_entrant(named, folder, place)
     try:

@@ -90,7 +90,7 @@ class Moment:
     """Acceleration upwards."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Vehicle:
     """The simulated drone: what differs between flights, and the drone whose inner loops and mixer it has."""
 
@@ -98,6 +98,13 @@ class Vehicle:
     motor_lag_s: PerFlight = NOMINAL.motor_lag_s
     drag_1_s: PerFlight = NOMINAL.body.drag_1_s
     drone: VehicleFile = NOMINAL
+
+    def __repr__(self) -> str:
+        """Return the drone's name, mass, loop and sensors."""
+        low_kg, high_kg = float(np.min(self.airframe.mass_kg)), float(np.max(self.airframe.mass_kg))
+        mass = f"{low_kg:.3g} kg" if low_kg == high_kg else f"{low_kg:.3g} to {high_kg:.3g} kg"
+        drone = self.drone
+        return f"Vehicle({drone.name}: {mass}, attitude {drone.attitude.kind}, sensors {drone.sensors.kind})"
 
     def __post_init__(self) -> None:
         """Raise ArgumentError for values outside the ranges of a vehicle.toml, and for other types."""
