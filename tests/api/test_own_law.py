@@ -173,7 +173,7 @@ def test_a_bad_answer_loses_its_flight_alone(
     ("law", "words"),
     [
         (object(), "must be a Controller or an object with the method step"),
-        (Pd, "missing 1 required positional argument"),
+        (Pd, r"law: Pd is a class; give an object, Pd\(\)"),
         (Four(), r"law\.step: returned \[.*, 0.0, 0.0\]; it must return roll and pitch"),
         (Alone(), "there is one of it; it is copied for each flight: give it __deepcopy__"),
     ],

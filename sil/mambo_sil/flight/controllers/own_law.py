@@ -195,6 +195,8 @@ def columns_of_law(law: Law, flight: Flight) -> Columns:
 
     Raises ArgumentError if it raises, or returns what is no command.
     """
+    if isinstance(law, type):
+        raise ArgumentError(f"law: {law.__name__} is a class; give an object, {law.__name__}()")
     target = flight.targets_in_space[0, 0]
     state = np.zeros(SPACE.state)
     for member in ("position_m", "height_m"):
