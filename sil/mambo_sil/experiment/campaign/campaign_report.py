@@ -1,6 +1,6 @@
 """Results of a campaign: summary and result."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -25,7 +25,16 @@ from mambo_sil.experiment.campaign.statistics import (
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, FlightStore, convert_os_errors
 from mambo_sil.flight.names import PD_TITLES
-from mambo_sil.results.blocks import Block, CommandResult, Commands, Facts, Picture, ResultTable, Sentence
+from mambo_sil.results.blocks import (
+    Block,
+    CommandResult,
+    Commands,
+    Details,
+    Facts,
+    Picture,
+    ResultTable,
+    Sentence,
+)
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.metric_names import AS_ESTIMATED, SEEN, named, titled
 from mambo_sil.results.number_format import digits, distance
@@ -36,6 +45,8 @@ CAPTION: Final = (
     "Cumulative distributions over the flights: a curve further left is better. The value of a crashed "
     "flight is infinite, so the curve of a controller that crashes ends below 100 %."
 )
+MAIN_INDICES: Final = ("iae_m_s", "max_error_m", "command_variation_rad")
+"""What the console shows of each controller."""
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
@@ -107,13 +118,26 @@ class CampaignSummary(ReportedSummary):
     worst: dict[str, list[WorstFlight]]
 
     def result(self, folder: Path, /) -> CommandResult:
-        """Return the result: statistics, improvements, and commands to repeat the worst flights."""
+        """Return the result: how close each controller flies, the rest folded."""
         found = self.controllers
         crashed = any(one.crashed.count for name, one in found.items() if name not in PD_TITLES)
-        blocks = [block for name, one in found.items() for block in _statistics(name, one)]
+        blocks = [_compared(found), *_failed(found)]
+        blocks.append(self._improvement(["iae_m_s"]))
+        first = {name: flights[:1] for name, flights in self.worst.items()}
+        blocks.append(_repeated("worst flight by IAE of each; this command repeats it", folder, first))
+        everything = [_statistics(name, one) for name, one in found.items()]
         if any(key.startswith(SEEN) for one in found.values() for key in one.quantiles):
-            blocks.append(Sentence(AS_ESTIMATED))
-        improvement = ResultTable(
+            everything.append(Sentence(AS_ESTIMATED))
+        indices = list(dict.fromkeys(one.index for one in self.improvements))
+        everything += [self._improvement(indices), _repeated("worst flights by IAE", folder, self.worst)]
+        answer = [_answer(self, name) for name in reversed(found)]
+        shown = [*blocks, Details("All indices, and the worst flights of each controller", everything)]
+        return self.campaign.shown(folder, False if crashed else None, answer, shown)
+
+    def _improvement(self, indices: Sequence[str]) -> Block:
+        """Return how much better each controller is than the first one, by some indices."""
+        first = next(iter(self.controllers))
+        return ResultTable(
             ("the other", "index", "median", "95 % interval", "better in", "95 % interval"),
             [
                 (
@@ -125,19 +149,11 @@ class CampaignSummary(ReportedSummary):
                     _interval(one.better),
                 )
                 for one in self.improvements
+                if one.index in indices
             ],
             (0, 1),
-            title=f"improvement on {next(iter(found))}: its index divided by the other's, flight by flight",
+            title=f"improvement on {first}: its index divided by the other's, flight by flight",
         )
-        worst = [
-            (f"{name}, {_end(flight)}", f"mambo-nmpc fly --repeat {echo(str(folder))}/{flight.record}")
-            for name, flights in self.worst.items()
-            for flight in flights
-        ]
-        commands = Commands("worst flights by IAE; these commands repeat them", worst)
-        answer = [_answer(self, name) for name in reversed(found)]
-        good = False if crashed else None
-        return self.campaign.shown(folder, good, answer, [*blocks, improvement, commands])
 
 
 class UnfinishedCampaign(Drawn, ReportedSummary):
@@ -198,17 +214,48 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
     return summary
 
 
-def _statistics(name: str, found: Distributions) -> list[Block]:
-    """Return the quantiles of a controller's metrics, and how many of its flights failed."""
+def _compared(found: Mapping[str, Distributions]) -> Block:
+    """Return the quantiles of the main metrics, of one controller below the other."""
+    rows = [
+        (titled(index), name, *(digits(one.quantiles[index][share]) for share in _SHOWN))
+        for index in MAIN_INDICES
+        for name, one in found.items()
+        if index in one.quantiles
+    ]
+    return ResultTable(("index", "controller", *_SHOWN.values()), rows, (0, 1))
+
+
+def _failed(found: Mapping[str, Distributions]) -> list[Block]:
+    """Return how many flights crashed, and in how many an input was rejected, if any."""
+    rows = [
+        (name, word, f"{one.count} of {one.flights}", _interval(one))
+        for name, each in found.items()
+        for word, one in (("crashed", each.crashed), ("rejected an input", each.refused_an_input))
+        if one.count
+    ]
+    if rows:
+        return [ResultTable(("controller", "", "flights", "95 % interval"), rows, (0, 1))]
+    one = next(iter(found.values())).crashed
+    return [Sentence(f"crashed: none of {one.flights} (95 % interval of each {_interval(one)})")]
+
+
+def _repeated(title: str, folder: Path, worst: Mapping[str, Sequence[WorstFlight]]) -> Block:
+    """Return the commands that repeat flights."""
+    rows = [
+        (f"{name}, {_end(flight)}", f"mambo-nmpc fly --repeat {echo(str(folder))}/{flight.record}")
+        for name, flights in worst.items()
+        for flight in flights
+    ]
+    return Commands(title, rows)
+
+
+def _statistics(name: str, found: Distributions) -> Block:
+    """Return the quantiles of all metrics of a controller."""
     rows = [
         (titled(index), *(digits(quantiles[share]) for share in _SHOWN))
         for index, quantiles in found.quantiles.items()
     ]
-    blocks: list[Block] = [ResultTable((name, *_SHOWN.values()), rows)]
-    blocks.append(Sentence(f"crashed: {_spelled(found.crashed)}"))
-    if found.refused_an_input.count:
-        blocks.append(Sentence(f"rejected an input: {_spelled(found.refused_an_input)}"))
-    return blocks
+    return ResultTable((name, *_SHOWN.values()), rows)
 
 
 def _answer(summary: CampaignSummary, name: str) -> str:
@@ -224,7 +271,3 @@ def _end(flight: WorstFlight) -> str:
 
 def _interval(one: Proportion) -> str:
     return f"{100 * one.low:.3g} .. {100 * one.high:.3g} %"
-
-
-def _spelled(one: Proportion) -> str:
-    return f"{one.count} of {one.flights} flights, {100 * one.share:.3g} % (95 % interval {_interval(one)})"
