@@ -398,7 +398,8 @@ static void draw_command(unsigned long *stream, nmpc_command_t *command)
 
 static void draw_memory(unsigned long *stream, nmpc_motion_t *motion)
 {
-    const int counted = 17 + (int)(next_number(stream) % NMPC_SELF_TEST_MEMORIES);
+    const unsigned long drawn = next_number(stream) % NMPC_SELF_TEST_MEMORIES;
+    const int counted = 17 + (int)drawn;
 
     motion->memory = (nmpc_real_t)counted;
     motion->noise = draw_share(stream, ((counted % 2) == 0) ? NMPC_SELF_TEST_NOISE_M_S : NMPC_SELF_TEST_MOST_NOISE_M_S);

@@ -7,6 +7,7 @@
 #include "nmpc.h"
 
 #ifdef NMPC_HAS_WHOLES
+#define WHOLE_TYPE nmpc_real_t
 #define ONE(member, column, quantity) +1
 #define STATE_NUMBERS (0 STATE_REALS(ONE) STATE_WHOLES(ONE))
 #define TARGET_NUMBERS (0 TARGET_REALS(ONE) TARGET_WHOLES(ONE))

@@ -164,6 +164,7 @@ static nmpc_real_t number_of(double value, int bits)
 #define IN_SI(number, quantity) ((double)(number))
 #endif
 
+#define WHOLE_TYPE double
 #define MEASURE(member, column, quantity) measured.member = NUMBER(state[column], quantity);
 #define MEASURE_WHOLE(member, column, quantity) measured.member = WHOLE_OF(state[column]);
 #define WANT(member, column, quantity) wanted.member = NUMBER(target[column], quantity);

@@ -12,9 +12,13 @@ _PLACES: Final = {"state": STATE, "target": TARGET, "command": COMMAND}
 
 _WHOLE_OF: Final = (
     "#define WHOLE_OF(number) "
-    "(((number) >= 0) && ((number) < 100) && !((double)(number) > (int)(number)) ? (int)(number) : 100)"
+    "(((number) >= 0) && ((number) < 100) && !((number) > (WHOLE_TYPE)(int)(number)) ? "
+    "(int)(number) : 100)"
 )
-"""An integer. A fraction, NaN, and what is less than 0 or large become 100, which no `known` is."""
+"""An integer of a number of the type WHOLE_TYPE, which each file defines.
+
+A fraction, NaN, and what is less than 0 or large become 100, which no `known` is.
+"""
 
 
 def port_lists() -> str:
