@@ -158,7 +158,7 @@ FIGURES = [
     Figure(BOARDS, r"ARM926, and fixed point (\d+)", lambda: instructions("mambo", FIXED)),
     Figure(BOARDS, r"takes \*\*(\S+) KB of flash", lambda: f"{board('crazyflie')['flash_bytes'] / 1000:.1f}"),
     Figure(BOARDS, r"KB of flash, (\d+) B of RAM", lambda: str(board("crazyflie")["ram_bytes"])),
-    Figure(BOARDS, r"RAM and (\d+) instructions a step", lambda: instructions("crazyflie")),
+    Figure(BOARDS, r"RAM and (\d+) instructions per step", lambda: instructions("crazyflie")),
     Figure(BOARDS, r"Cortex-M4F\*\*, (\d+ to \d+) us", lambda: step_us("crazyflie")),
     Figure(BOARDS, r"most of the Mega's (\d+) B", lambda: str(board("mega")["ram_bytes"])),
     Figure(BOARDS, r"in software: (\d+) times the instructions", times_in_float64),
@@ -179,7 +179,7 @@ FIGURES = [
     ),
     Figure(BOARDS, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
     Figure(BOARDS, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
-    Figure("docs/evidence/benchmarks.md", r"(\d+) a step for `mambo`", lambda: instructions("crazyflie")),
+    Figure("docs/evidence/benchmarks.md", r"a step takes (\d+) for `mambo`", lambda: instructions("crazyflie")),
     Figure(
         "docs/evidence/benchmarks.md",
         r"for `mambo`, (\d+) for `mambo-1norm`",
