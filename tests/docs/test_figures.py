@@ -179,7 +179,9 @@ FIGURES = [
     ),
     Figure(BOARDS, r"\*\*(\d+) instructions at least", lambda: instructions("crazyflie", kind="least")),
     Figure(BOARDS, r"instructions at least, (\d+) in the mean", lambda: instructions("crazyflie")),
-    Figure("docs/evidence/benchmarks.md", r"a step takes (\d+) for `mambo`", lambda: instructions("crazyflie")),
+    Figure(
+        "docs/evidence/benchmarks.md", r"a step takes (\d+) for `mambo`", lambda: instructions("crazyflie")
+    ),
     Figure(
         "docs/evidence/benchmarks.md",
         r"for `mambo`, (\d+) for `mambo-1norm`",
