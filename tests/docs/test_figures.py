@@ -247,6 +247,7 @@ FIGURES = [
         r"quadratic, (\d+ to \d+) instructions",
         lambda: f"{instructions('crazyflie', kind='least')} to {instructions('crazyflie', kind='most_met')}",
     ),
+    Figure("docs/reference/c-api.md", r"Cortex-M4F, (\d+) in the mean", lambda: instructions("crazyflie")),
 ]
 
 
