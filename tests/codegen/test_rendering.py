@@ -31,7 +31,7 @@ def test_calls_of_products_are_written_with_operators(kernel: str, expected: str
 
 def test_what_is_no_product_stays() -> None:
     """Names that only contain one, declarations, comments, and lines that are long for other reasons."""
-    text = f"my_gain_product(a, b); /* gain_product */\n/* {'x' * 150} */\n"
+    text = f"my_gain_products(a, b); /* gain_product */\n/* {'x' * 150} */\n"
     assert infix(text) == text
 
 

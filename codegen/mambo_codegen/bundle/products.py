@@ -9,22 +9,16 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-_NAMES: Final = (
-    *("aged_position", "aged_velocity", "angle_square", "angle_to_yaw", "approach_product"),
-    *("approach_ratio", "attitude_sum", "braking_product", "change_product", "command_product"),
-    *("count_product", "distance_gradient"),
-    *("disturbance_correction", "drag_product", "effort_cost", "effort_gradient", "error_change"),
-    *("factor_product", "factor_to_sine", "feedback_product", "gain_correction", "gain_product"),
-    *("gravity_product", "half_change", "halved", "initial_error", "knee_product", "learning_product"),
-    *("move_acceleration", "noise_product", "per_step2_product", "per_step_product", "position_change"),
-    *("position_correction", "ratio_product", "reach_product", "row_sum"),
-    *("scaled_velocity", "share_product", "sine_difference", "sine_product", "sine_sum", "sine_to_angle"),
-    *("slope_acceleration", "speed_product", "speed_ratio", "squared", "step2_product", "step_product"),
-    *("target_product", "thrust_product", "tilt_product", "to_factor", "to_move", "tracker_product"),
-    *("tracking_cost", "tracking_gradient", "velocity_change", "velocity_correction", "velocity_product"),
-    "wide_product",
+_OTHER_NAMES: Final = (
+    *("aged_position", "aged_velocity", "angle_square", "angle_to_yaw", "approach_ratio"),
+    *("attitude_sum", "distance_gradient", "disturbance_correction", "effort_cost", "effort_gradient"),
+    *("error_change", "factor_to_sine", "gain_correction", "half_change", "halved"),
+    *("initial_error", "move_acceleration", "position_change", "position_correction", "row_sum"),
+    *("scaled_velocity", "sine_difference", "sine_sum", "sine_to_angle", "slope_acceleration"),
+    *("speed_ratio", "squared", "to_factor", "to_move", "tracking_cost"),
+    *("tracking_gradient", "velocity_change", "velocity_correction"),
 )
-"""The functions of fixed point."""
+"""The functions of fixed point beside those whose name ends in `_product`."""
 
 _FORMS: Final = {1: "{}", 2: "{} * {}", 4: "({} * {}) + ({} * {})"}
 """What they are in floating point, by the number of their arguments."""
@@ -42,7 +36,7 @@ _OTHER_FORMS: Final = {
 COLUMNS: Final = 120
 """Of a line of C."""
 
-CALL: Final = re.compile(rf"\b({'|'.join(_NAMES)})\(")
+CALL: Final = re.compile(rf"\b(\w+_product|{'|'.join(_OTHER_NAMES)})\(")
 """A call of a product, up to its first argument."""
 
 _OPERATOR: Final = re.compile(r" (?:[-+*/]|&&|\|\||[<>=!]=|[<>]) ")

@@ -27,11 +27,11 @@ class OneNormArithmetic(Arithmetic):
 
     def thrust_product(self, thrust_m_s2: Real) -> Real:
         """Return thrust acceleration * tau^2, m/step^2."""
-        return self._nearest(thrust_m_s2 * self._step_squared_s2, "thrust_product")
+        return self.nearest(thrust_m_s2 * self._step_squared_s2, "thrust_product")
 
     def velocity_product(self, velocity_m_s: Real) -> Real:
         """Return tau * velocity, m/step; in fixed point half an error more, so that `error_change` rounds."""
-        product = self._nearest(self._step_s * velocity_m_s, "velocity_product")
+        product = self.nearest(self._step_s * velocity_m_s, "velocity_product")
         return product if self._half_error is None else product + self._half_error
 
     def gain_product(self, gain_m_step2_rad: Real, tilt_rad: Real) -> Real:
@@ -64,7 +64,7 @@ class OneNormArithmetic(Arithmetic):
 
     def effort_cost(self, weight: Real, variation_rad: Real) -> Real:
         """Return lambda_2 * variation."""
-        return self._nearest(weight * variation_rad, "effort_cost")
+        return self.nearest(weight * variation_rad, "effort_cost")
 
     def tracking_gradient(self, weight: Real, distance_gradient_m_rad: Real) -> Real:
         """Return lambda_1 * gradient of the distance."""

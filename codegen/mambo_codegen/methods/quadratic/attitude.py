@@ -82,26 +82,24 @@ class AttitudeModel:
         before_rad: Real,
         after_rad: Real,
         weight: Real | None = None,
-        gain: Real | None = None,
+        meant: Callable[[Real], Real] | None = None,
     ) -> AttitudeState:
         """Change the last commands from `before_rad` to `after_rad` (n, 2), roll and pitch.
 
-        They stand for `gain` (n, 2) times as much, if there is one.
+        `meant` turns commands that are sent into those of the model, if they differ.
         """
         if self.vector is not None:
-            before, after = (
-                self._commanded(self.vector, self._meant(rad, gain), weight)
-                for rad in (before_rad, after_rad)
-            )
+            sides_rad = [before_rad, after_rad]
+            if meant is not None:
+                sides_rad = [meant(side) for side in sides_rad]
+            before, after = (self._commanded(self.vector, side, weight) for side in sides_rad)
             return replace(attitude, command=clamp(attitude.command + (after - before), self._limit))
-        change_rad = self._meant(after_rad - before_rad, gain)
+        change_rad = after_rad - before_rad
+        if meant is not None:
+            change_rad = meant(change_rad)
         product = self.weighed(self._products.tilt_product(self._command_gain, change_rad), weight)
         change = np.stack([product[:, 0], -product[:, 1]], axis=1)
         return replace(attitude, command=clamp(attitude.command + change, self._limit))
-
-    def _meant(self, command_rad: Real, gain: Real | None) -> Real:
-        """Return commands (n, 2) of the model that stand for those that were sent."""
-        return command_rad if gain is None else self._products.angle_product(gain, command_rad)
 
     def _commanded(self, vector: ThrustVector, command_rad: Real, weight: Real | None) -> Real:
         """Return the accelerations (n, 2) of the attitude that commands (n, 2) lead to."""

@@ -201,16 +201,7 @@ class QuadraticController:
     @property
     def last_estimate(self) -> Real:
         """All numbers of nmpc_estimate_t (n, k), in their order and in the numbers of the C."""
-        memory, products = self.memory, self.parts.products
-        estimate = memory.estimate
-        columns = [
-            estimate.position_m,
-            products.per_step_product(estimate.velocity_m_step),
-            products.per_step2_product(estimate.disturbance_m_step2),
-            *self._height.estimate(memory.height),
-            *self.parts.learnt(memory),
-        ]
-        return np.concatenate(columns, axis=1)
+        return np.concatenate(self.parts.estimate(self.memory), axis=1)
 
     @property
     def deciding(self) -> NDArray[np.bool_]:

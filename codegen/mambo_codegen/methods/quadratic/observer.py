@@ -48,6 +48,15 @@ class KalmanObserver:
         drag = self._products.drag_product(self._drag, estimate.velocity_m_step)
         return np.asarray(estimate.disturbance_m_step2 - drag)
 
+    def estimate(self, estimate: Estimate) -> list[Real]:
+        """Return the columns (n, 2) of nmpc_estimate_t: position, velocity and disturbance."""
+        products = self._products
+        return [
+            estimate.position_m,
+            products.per_step_product(estimate.velocity_m_step),
+            products.per_step2_product(estimate.disturbance_m_step2),
+        ]
+
     def is_free(self, estimate: Estimate) -> Rows:
         """Return whether a disturbance along x or y is within its limit (n,)."""
         free: Rows = np.any(np.abs(estimate.disturbance_m_step2) < self._disturbance_limit, axis=1)

@@ -190,9 +190,10 @@ class ControlStep:
         attitude = self._told(memory, memory.attitude, memory.command_rad, command[:, 0:2], weight)
         return replace(memory, command_rad=command[:, 0:2], attitude=attitude, height=height)
 
-    def learnt(self, memory: QuadraticMemory) -> list[Real]:
-        """Return what the estimate tells of the drone (n, k) beside its motion and its lift."""
-        return [memory.tilt_gain.gain] if self.tilt_gain else []
+    def estimate(self, memory: QuadraticMemory) -> list[Real]:
+        """Return the numbers (n, k) of nmpc_estimate_t, in SI units."""
+        columns = [*self.observer.estimate(memory.estimate), *self.height.estimate(memory.height)]
+        return [*columns, memory.tilt_gain.gain] if self.tilt_gain else columns
 
     def saturated(self, memory: QuadraticMemory) -> Rows:
         """Return whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
@@ -433,8 +434,8 @@ class ControlStep:
         weight: Real | None,
     ) -> AttitudeState:
         """Return models that know what was sent (n, 2) in place of what they asked for (n, 2)."""
-        gain = memory.tilt_gain.gain if self.tilt_gain else None
-        return self.model.change_command(model, asked_rad, sent_rad, weight, gain)
+        meant = partial(self.tilt_gain.meant, memory.tilt_gain) if self.tilt_gain else None
+        return self.model.change_command(model, asked_rad, sent_rad, weight, meant)
 
     def _limit_angles(self, memory: QuadraticMemory, angles_rad: Real, seen: _Observed) -> Real:
         """Return angles (n, 2) with rate feedback, within the tilt limit."""

@@ -85,7 +85,7 @@ class TiltGain:
         seen_slow = self._mean(self._slow, state.seen_slow_m_step2, seen)
         moved = quick - slow
         error = clamp((seen_quick - seen_slow) - moved, self._most_m_step2)
-        change = products.learning_product(self._rate, np.where(moved < 0, -error, error))
+        change = products.nearest(self._rate * np.where(moved < 0, -error, error), "learning_product")
         learnt = confine(state.gain + products.factor_product(state.gain, change), *self._range)
         free = products.angle_product(self.share(state) - self._free, tilt_limit_rad)
         is_free = np.abs(self.meant(state, command_rad)) <= free

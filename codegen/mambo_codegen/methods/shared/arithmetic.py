@@ -25,7 +25,7 @@ class Products:
         self._half: Any = self.numbers.scalar(0.5) if shifts is None else 1
         """A half; 1 in fixed point, where the shift halves too."""
 
-    def _nearest(self, product: Real, name: str) -> Real:
+    def nearest(self, product: Real, name: str) -> Real:
         """Return a product in the format of its result, rounded to nearest, ties up."""
         return product if self._shifts is None else rounded(product, self._shifts[name])
 
@@ -66,7 +66,7 @@ class Arithmetic(Products):
 
     def sine_product(self, value: Real, sine: Real) -> Real:
         """Return value * sine, in the format of the value."""
-        return self._nearest(value * sine, "sine")
+        return self.nearest(value * sine, "sine")
 
     def turn(self, vector: Real, sine: Real, cosine: Real) -> Real:
         """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
@@ -77,20 +77,20 @@ class Arithmetic(Products):
 
     def target_product(self, factor: Any, value: Real) -> Real:
         """Return factor * change of a velocity, m/s, or a derivative of it in steps; in m/step^2."""
-        return self._nearest(factor * value, "target_product")
+        return self.nearest(factor * value, "target_product")
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         """Return gain * acceleration, m/step^2."""
-        return self._nearest(gain * acceleration_m_step2, "sine")
+        return self.nearest(gain * acceleration_m_step2, "sine")
 
     def factor_product(self, value: Real, factor: Real) -> Real:
         """Return value * factor, in the format of the value."""
-        return self._nearest(value * factor, "factor_product")
+        return self.nearest(value * factor, "factor_product")
 
     def noise_product(self, steps2_per_m: Any, acceleration_m_step2: Real) -> Real:
         """Return steps2_per_m * acceleration, a factor."""
-        return self._nearest(steps2_per_m * acceleration_m_step2, "noise_product")
+        return self.nearest(steps2_per_m * acceleration_m_step2, "noise_product")
 
     def feedback_product(self, steps: Any, change_rad: Real) -> Real:
         """Return steps * change of an angle, rad."""
-        return self._nearest(steps * change_rad, "feedback_product")
+        return self.nearest(steps * change_rad, "feedback_product")

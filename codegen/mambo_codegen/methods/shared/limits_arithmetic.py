@@ -128,7 +128,7 @@ class LimitsArithmetic(Products):
 
     def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
         """Return ratio * distance, m/s, with a ratio in 1/s."""
-        return self._within(self._nearest(ratio * distance_m, "approach"), self._fastest)
+        return self._within(self.nearest(ratio * distance_m, "approach"), self._fastest)
 
     def braking_square(self, braking: Real, distance_m: Real) -> Real:
         """Return twice the braking times a distance, the square of a speed."""
@@ -154,7 +154,7 @@ class LimitsArithmetic(Products):
 
     def share_product(self, velocity_m_s: Real, share: Real) -> Real:
         """Return velocity * share."""
-        return self._nearest(velocity_m_s * share, "share")
+        return self.nearest(velocity_m_s * share, "share")
 
     def least_braking(self, braking: Real, speed_m_s: Real) -> Real:
         """Return twice the braking, at most what the approach rate asks for at a speed."""
@@ -169,13 +169,13 @@ class LimitsArithmetic(Products):
 
     def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
         """Return slope * tilt, the acceleration of a tilt, m/s^2."""
-        return self._nearest(slope * tilt_rad, "tilt")
+        return self.nearest(slope * tilt_rad, "tilt")
 
     def mean_turn(self, turn_m2_s2: Real, before_m_s: Real, velocity_m_s: Real) -> Real:
         """Return a mean (n,) with the vector product of two velocities (n, 2) taken in."""
         cross = (before_m_s[:, 0] * velocity_m_s[:, 1]) - (before_m_s[:, 1] * velocity_m_s[:, 0])
-        mean = (self._turn_rest * turn_m2_s2) + (self._turn_gain * self._nearest(cross, "velocity"))
-        return self._nearest(mean, "mean_turn")
+        mean = (self._turn_rest * turn_m2_s2) + (self._turn_gain * self.nearest(cross, "velocity"))
+        return self.nearest(mean, "mean_turn")
 
     def speed(self, square: Real) -> Real:
         """Return the root of a positive sum of squares of speeds, m/s."""
@@ -183,7 +183,7 @@ class LimitsArithmetic(Products):
 
     def turn_product(self, turn: Any, tilt_rad: Real) -> Real:
         """Return turn * tilt, the change of velocity that a tilt gives in an update period, m/s."""
-        return self._at_most(self._nearest(turn * tilt_rad, "turn"), 2 * self._fastest)
+        return self._at_most(self.nearest(turn * tilt_rad, "turn"), 2 * self._fastest)
 
     def turn_most(self, change_m_s: Real, speed_m_s: Real) -> Real:
         """Return change * speed, m^2/s^2."""
