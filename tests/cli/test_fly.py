@@ -36,7 +36,7 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert len(rows) == len(trace.time_s) == 201
     assert (out / "flight.png").read_bytes().startswith(b"\x89PNG")
     drawn = (out / "flight.svg").read_text()
-    assert "bernoulli, 2 m, 0.5 rad/s, 2 s, no wind" in drawn
+    assert "bernoulli, 2 m, 0.5 rad/s, 2 s, state true, no wind" in drawn
     assert "in the first 10 s" not in drawn
 
 
@@ -47,7 +47,7 @@ def test_the_axis_of_the_error_is_for_what_follows_the_start(
     monkeypatch.chdir(tmp_path)
     run("fly", "--duration-s", "12", "--wind", "gusts", "-o", "out")
     drawn = Path("out/flight.svg").read_text("utf-8")
-    assert "NMPC, mambo on mambo<" in drawn
+    assert "NMPC, mambo on mambo, one flight: " in drawn
     assert "s, wind 7.72 m/s<" in drawn
     (found,) = re.findall(r"up to (\S+) m in the first 10 s", drawn)
     assert float(found) == pytest.approx(

@@ -45,6 +45,24 @@ def test_a_bar_counts_what_is_finished_and_moves_with_what_runs() -> None:
     assert seen(bar) == ("computing statistics, 1000 of 1000 flights", None)
 
 
+def test_things_that_are_not_alike_have_no_remaining_time() -> None:
+    """Of the checks of `verify` one takes as long as all others."""
+    bar = Bar("verifying", 22, "checks", alike=False)
+    bar(0)
+    bar(2)
+    assert seen(bar) == ("verifying, 2 of 22 checks", None)
+
+
+def test_a_command_without_a_bar_says_that_it_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After `FIRST_LINE_S`; a bar says it otherwise."""
+    stream = Stream()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "FIRST_LINE_S", 0.0)
+    with progress.announced("margins"):
+        assert stream.written.wait(60.0)
+    assert stream.getvalue().startswith("margins, 0 s so far")
+
+
 def test_a_bar_of_shares_shows_percent() -> None:
     """Nothing is known before the first share."""
     bar = Bar("flying", 1.0)
@@ -82,7 +100,7 @@ def test_lines_are_printed_where_stderr_is_no_terminal(monkeypatch: pytest.Monke
     with progress_bar("brief work") as bar:
         bar(0.5)
     assert stream.getvalue() == ""
-    monkeypatch.setattr(progress, "LINE_PERIOD_S", 0.0)
+    monkeypatch.setattr(progress, "FIRST_LINE_S", 0.0)
     with counting_bar("flying", "flights", 8) as bar:
         bar(3)
         assert stream.written.wait(60.0)

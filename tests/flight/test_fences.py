@@ -1,5 +1,6 @@
 """Fences set in flight, metrics of limits against slow loops over drawn flights, and how both are shown."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,8 @@ from mambo_sil.flight.fences import (
     walls_m,
     with_limits,
 )
-from mambo_sil.flight.flight_plots import draw_flights, flight_columns
+from mambo_sil.flight.flight_marks import FlightMarks
+from mambo_sil.flight.flight_plots import draw_flight, flight_columns
 from mambo_sil.flight.flight_report import RepeatSummary, judge
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
@@ -283,7 +285,7 @@ FLOWN = trace_of([0.0, 2.5, 3.5, 3.0], [0.0, 5.5, -6.0, 0.0], [0.0, 3.0, 3.0, 3.
 
 @pytest.mark.long
 def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
-    """One line for each wall, and none without a fence; floor and ceiling in both pictures of the height."""
+    """One line for each wall, and none without a fence; floor and ceiling in the picture of the height."""
     trace = trace_of([0.0, 1.0], [0.0, 0.0], [0.0, 1.0])
     heights = np.zeros((2, 1, 2))
     spatial = replace(trace, target=np.concatenate([trace.target, heights], axis=-1))
@@ -291,9 +293,9 @@ def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
     dashes = []
     for name, walls in fences.items():
         for flown in (trace, spatial):
-            draw_flights({name: flown}, tmp_path / name, walls)
+            draw_flight(flown, "", "", tmp_path / name, FlightMarks(walls))
             dashes.append((tmp_path / f"{name}.svg").read_text("utf-8").count("stroke-dasharray"))
-    assert dashes == [0, 4, 0, 0, 4, 4]
+    assert dashes == [0, 2, 0, 0, 4, 4]
 
 
 @pytest.mark.long
@@ -302,7 +304,7 @@ def test_the_picture_of_a_fast_flight_has_its_speed_limit(tmp_path: Path) -> Non
     fast = trace_of([0.0, 4.0], [0.0, 4.0], [0.0, 8.0])
     shown = {}
     for limit_m_s in (0.0, 5.0, 9.0):
-        draw_flights({"fast": fast}, tmp_path / "fast", None, limit_m_s)
+        draw_flight(fast, "", "", tmp_path / "fast", FlightMarks(speed_limit_m_s=limit_m_s))
         drawn = (tmp_path / "fast.svg").read_text("utf-8")
         shown[limit_m_s] = drawn.count("stroke-dasharray"), drawn.count("speed, m/s")
     assert shown == {0.0: (0, 0), 5.0: (1, 1), 9.0: (0, 0)}
@@ -312,7 +314,8 @@ def test_the_picture_of_a_fast_flight_has_its_speed_limit(tmp_path: Path) -> Non
 def test_the_picture_on_a_page_has_fence_and_speed_too() -> None:
     """The speed over time, and a line for each wall and the limit."""
     fast = trace_of([0.0, 4.0], [0.0, 4.0], [0.0, 8.0])
-    plain, near = (flight_columns({"fast": fast}, *given)[0] for given in ((), (walls_m(MAMBO, 2.0), 5.0)))
+    marks = FlightMarks(), FlightMarks(walls_m(MAMBO, 2.0), 5.0)
+    plain, near = (flight_columns({"fast": fast}, given)[0] for given in marks)
     assert ["speed, m/s" in one for one in (plain, near)] == [False, True]
     assert [one.count("stroke-dasharray") for one in (plain, near)] == [0, 5]
     assert ["from above, speed, distance" in one for one in (plain, near)] == [False, True]
@@ -389,3 +392,15 @@ def test_a_fence_wants_limits() -> None:
     """Settings without limits have no nmpc_set_limits."""
     with pytest.raises(FlightError, match="no limits"):
         with_limits(presets.preset("table1"), **square_fence(1.0))
+
+
+@pytest.mark.long
+def test_the_picture_of_a_crash_has_a_cross_and_says_so(tmp_path: Path) -> None:
+    """In the path, with a name in the legend, and a line over time; above it the message and the flight."""
+    drawn = {}
+    for crash_s in (math.nan, 5.0):
+        _, svg = draw_flight(FLOWN, "CRASHED", "mambo", tmp_path / "flight", FlightMarks(crash_s=crash_s))
+        drawn[crash_s] = svg.read_text("utf-8")
+    assert [">crash<" in one for one in drawn.values()] == [False, True]
+    assert [one.count("#d55e00") > 3 for one in drawn.values()] == [False, True]
+    assert all(">CRASHED<" in one and ">mambo<" in one for one in drawn.values())

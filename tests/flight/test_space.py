@@ -12,7 +12,7 @@ from mambo_sil.flight.columns import LEVEL, TARGET
 from mambo_sil.flight.controllers.pd import PdController, pd_controller
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.flight_plots import draw_flights, flight_columns
+from mambo_sil.flight.flight_plots import draw_flight, flight_columns
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
@@ -132,7 +132,7 @@ def test_pictures_of_a_course_with_a_height_show_it(tmp_path: Path) -> None:
     trace = flown("helix", 0.5, 1.0)
     level = fly(Flight(Circle(1.0, 1.0), duration_s=1.0), PdController())
     for name, one, panels in (("space", trace, 6), ("level", level, 4)):
-        draw_flights({name: one}, tmp_path / name)
+        draw_flight(one, "", "", tmp_path / name)
         picture = (tmp_path / f"{name}.svg").read_text("utf-8")
         assert picture.count('<g id="axes_') == panels
         assert ("path seen from above, height, distance" in flight_columns({name: one})[0]) == (panels == 6)

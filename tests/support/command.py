@@ -1,5 +1,6 @@
 """The whole command, run as a person would type it."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +20,12 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
     """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
     result = CliRunner().invoke(app(), arguments)
     assert result.exit_code == code, (result.output, result.exception)
-    return result.stdout, result.stderr
+    return result.stdout, without_progress(result.stderr)
+
+
+def without_progress(text: str) -> str:
+    """Return printed text without the lines on the progress of a command that takes longer than 2 s."""
+    return re.sub(r"^.*, \d+ (?:s|min) so far\n", "", text, flags=re.MULTILINE)
 
 
 def unwrapped(text: str) -> str:
@@ -42,6 +48,8 @@ def command(
     `script` is the Python that runs it; Ctrl-C stops it.
     """
     line = [sys.executable, "-c", HEARS_CTRL_C + script, *map(str, arguments)]
-    return subprocess.run(
+    done = subprocess.run(
         line, cwd=folder, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
     )
+    done.stderr = without_progress(done.stderr)
+    return done

@@ -7,6 +7,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.support.command import without_progress
+
 NOT_RUN = "Not run by the tests: "
 """What the title of a block begins with whose commands need what a test has not."""
 
@@ -95,7 +97,7 @@ def faults(page: Page, folder: Path, *binaries: Path) -> list[str]:
     assert len(printed) == 2 * len(commands), done.stdout
     found = []
     for index, command in enumerate(commands):
-        output, code = printed[2 * index].rstrip("\n"), printed[2 * index + 1]
+        output, code = without_progress(printed[2 * index] + "\n").rstrip("\n"), printed[2 * index + 1]
         shown = index + 1 < len(commands) and commands[index + 1].text == "echo $?"
         if code != "0" and not shown:
             found.append(f"line {command.line}: {command.text}: exit code {code}\n{output}")

@@ -1,7 +1,10 @@
 """The command line `mambo-nmpc` with all its commands."""
 
 import inspect
+import logging
 import os
+import sys
+import warnings
 from collections.abc import Callable
 from typing import Final
 
@@ -133,6 +136,9 @@ def app() -> typer.Typer:
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; what libraries warn programmers of is not for its users."""
     os.environ["MPLBACKEND"] = "agg"  # plots go to files; matplotlib fails on a backend it does not know
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
     app()()

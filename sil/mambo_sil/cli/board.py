@@ -150,7 +150,6 @@ def sweep(
         from mambo_sil.board.footprint.footprint_plots import draw_sweep
 
         write_points(points, folder / "sweep.csv")
-        draw_sweep(points, axes, budget, chosen.title, folder / "sweep")
         best = closest_fit(points)
         summary = SweepSummary(
             source=source,
@@ -163,6 +162,7 @@ def sweep(
             closest_fit=best,
             reference=reference,
         )
+        draw_sweep(points, axes, budget, summary.headline, folder / "sweep")
         summary.write(folder)
     if fit and best is not None and not as_json:
         summary = summary.model_copy(update={"points": [best]})

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import traceback
-from typing import Annotated, Any, Never
+from typing import Annotated, Any, Final, Never
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -24,6 +24,7 @@ from mambo_codegen.errors import (
     Terminated,
     echo,
 )
+from mambo_sil.cli.progress import announced
 
 EXIT_CODES = (
     "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
@@ -31,8 +32,24 @@ EXIT_CODES = (
 )
 
 
+_TYPES: Final = {"int": "N", "float": "X", "Path": "PATH", "str": "TEXT"}
+"""How the help spells the value of an option, by its type in Python."""
+
+
+def _named(parameters: list[Any]) -> list[Any]:
+    """Return parameters whose options say in plain words what they take; a flag takes nothing."""
+    for one in parameters:
+        if one.param_type_name == "option" and one.metavar is None:
+            one.metavar = "" if one.is_flag else _TYPES.get(one.bare_type())
+    return parameters
+
+
 class RootGroup(TyperGroup):
     """The root command: an error becomes a message and an exit code, without a traceback."""
+
+    def get_params(self, ctx: typer.Context) -> list[Any]:  # type: ignore[override] # typer hides the base of Context
+        """Return the options."""
+        return _named(super().get_params(ctx))
 
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Run a command line, help and version included, and flush stdout."""
@@ -68,6 +85,10 @@ class RootGroup(TyperGroup):
 class Command(TyperCommand):
     """A command, which refuses the empty value of a script's unset variable and an option given twice."""
 
+    def get_params(self, ctx: typer.Context) -> list[Any]:  # type: ignore[override] # as above
+        """Return the options and arguments."""
+        return _named(super().get_params(ctx))
+
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # as above
         """Parse a command line.
 
@@ -83,6 +104,11 @@ class Command(TyperCommand):
             if parameters.count(parameter) > 1 and not named.multiple:
                 raise typer.BadParameter("is there more than once; give it once", ctx, named)
         return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # as above
+        """Run the command, and say after a while that it works."""
+        with announced(str(ctx.info_name)):
+            return super().invoke(ctx)
 
 
 def _terminate(*_: object) -> Never:

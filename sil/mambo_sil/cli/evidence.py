@@ -64,7 +64,7 @@ def verify(
     check_tmpdir()
     with (
         new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE)) as place,
-        counting_bar("generating the C", "checks", len(chosen)) as bar,
+        counting_bar("generating the C", "checks", len(chosen), alike=False) as bar,
     ):
         folder = place.resolve()
         bundle.write(render(settings), folder / CONTROLLER)

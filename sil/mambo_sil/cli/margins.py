@@ -57,6 +57,9 @@ def margins(
             metavar="",
         ),
     ] = False,
+    all_figures: Annotated[
+        bool, typer.Option("--all", help="Print every figure, not the margins only.", metavar="")
+    ] = False,
     drones: Annotated[int, typer.Option(help="Number of drones with --campaign.", min=1, max=100_000)] = 100,
     output: OptionalResults = None,
     as_json: AsJson = False,
@@ -82,7 +85,8 @@ def margins(
         summary = _measure_drawn(subject, campaign, drawing, drones, output)
     drawn = (*PICTURES, RESPONSES) if summary.axes else ()
     written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
-    show_result(summary, output, written, as_json=as_json)
+    shown = summary.model_copy(update={"all_figures": all_figures})
+    show_result(shown, output, written, as_json=as_json)
     if not summary.stable:
         raise typer.Exit(1)
 

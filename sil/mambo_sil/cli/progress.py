@@ -1,4 +1,4 @@
-"""Progress of long work on stderr: a moving bar on a terminal, otherwise a line every 30 s.
+"""Progress of long work on stderr: a moving bar on a terminal, otherwise a line after 2 s, then every 30 s.
 
 Work that takes less prints no line.
 """
@@ -10,18 +10,22 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Final
 
+FIRST_LINE_S: Final = 2.0
+"""Time after which a command says what it does."""
 LINE_PERIOD_S: Final = 30.0
 """Time from one line to the next where stderr is no terminal."""
+_SHOWS: Final = threading.Event()
+"""Whether a bar has been shown."""
 
 
 class Bar:
     """What is shown of some work: its stage, and how much of `total` is finished, in `things` or in percent.
 
-    `show` is called after every change.
+    `show` is called after every change. Of things that are not alike the remaining time is not known.
     """
 
-    def __init__(self, stage: str, total: float, things: str = "") -> None:
-        self._stage, self._total, self._things = stage, total, things
+    def __init__(self, stage: str, total: float, things: str = "", *, alike: bool = True) -> None:
+        self._stage, self._total, self._things, self._alike = stage, total, things, alike
         self._begun_s = time.monotonic()
         self._first = self._finished = self._running = 0.0
         self._told = not things
@@ -47,7 +51,7 @@ class Bar:
     @property
     def share(self) -> float | None:
         """The finished share, or None before the first progress and after the last, when it tells nothing."""
-        done = self._finished + self._running
+        done = self._finished + self._running if self._alike else 0.0
         return done / self._total if self._first < done < self._total else None
 
     def text(self) -> str:
@@ -82,14 +86,33 @@ def progress_bar(stage: str) -> AbstractContextManager[Bar]:
     return _shown(Bar(stage, 1.0))
 
 
-def counting_bar(stage: str, things: str, total: int) -> AbstractContextManager[Bar]:
+def counting_bar(stage: str, things: str, total: int, *, alike: bool = True) -> AbstractContextManager[Bar]:
     """Show a bar for work that begins with `stage`; its amounts are numbers of `things` out of `total`."""
-    return _shown(Bar(stage, total, things))
+    return _shown(Bar(stage, total, things, alike=alike))
+
+
+@contextmanager
+def announced(name: str) -> Iterator[None]:
+    """Say that the command `name` works if it has shown no bar for `FIRST_LINE_S`."""
+    _SHOWS.clear()
+    begun = Bar(name, 1.0)
+
+    def announce() -> None:
+        if not _SHOWS.wait(FIRST_LINE_S):
+            with suppress(OSError, ValueError):
+                print(begun.line(), file=sys.stderr, flush=True)
+
+    threading.Thread(target=announce, daemon=True).start()
+    try:
+        yield
+    finally:
+        _SHOWS.set()
 
 
 @contextmanager
 def _shown(bar: Bar) -> Iterator[Bar]:
     """Show `bar` while the block runs."""
+    _SHOWS.set()
     with _moving(bar) if sys.stderr.isatty() else _printed(bar):
         yield bar
 
@@ -116,11 +139,16 @@ def _moving(bar: Bar) -> Iterator[None]:
 
 @contextmanager
 def _printed(bar: Bar) -> Iterator[None]:
-    """Print a line on `bar` every `LINE_PERIOD_S`, from another thread: the work may block this one."""
+    """Print a line on `bar` after `FIRST_LINE_S`, then every `LINE_PERIOD_S`.
+
+    From another thread: the work may block this one.
+    """
     over = threading.Event()
 
     def print_lines() -> None:
-        while not over.wait(LINE_PERIOD_S):
+        wait_s = FIRST_LINE_S
+        while not over.wait(wait_s):
+            wait_s = LINE_PERIOD_S
             with suppress(OSError, ValueError):  # whoever read stderr has closed it
                 print(bar.line(), file=sys.stderr, flush=True)
 

@@ -1,10 +1,10 @@
-"""Pictures of flights as in the paper's Fig. 3: path, error, commands; as files and for a page.
+"""Pictures of flights: path, error, commands; as files and for a page.
 
-Where a course has a height, the path is shown from the side, too, and the height over time.
+Where a course has a height, the height is shown over time, too; where it climbs, the path also from the side.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,91 +12,117 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec
 
 from mambo_sil.flight.fences import Walls, nears_limit
+from mambo_sil.flight.flight_marks import NO_MARKS, FlightMarks
 from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, horizontal_speed_m_s
 from mambo_sil.flight.traces import Trace
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.pictures import inline, save
-from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, INK, QUIET, TARGET, THIN, style
+from mambo_sil.results.style import (
+    BROAD,
+    COLUMN_INCHES,
+    COMMAND,
+    DOT,
+    FLOWN,
+    INK,
+    PAGE_INCHES,
+    QUIET,
+    TARGET,
+    THIN,
+    VERMILION,
+    add_headline,
+    style,
+)
 
-_LEVEL: Final = {"y (east), m": 1.9, "error, m": 1.0, "roll, rad": 1.0, "pitch, rad": 1.0}
-_SPATIAL: Final = {
-    "y (east), m": 1.9,
-    "height from the east, m": 1.3,
-    "height, m": 1.0,
-    "horizontal error, m": 1.0,
-    "roll, rad": 1.0,
-    "pitch, rad": 1.0,
-}
-"""Labels of the axes of a column, and their heights relative to each other."""
+_PATH, _SIDE = "y (east), m", "height, m (side view)"
+_HEIGHT, _SPEED, _ERROR = "height, m", "speed, m/s", "error, m"
+_ANGLES: Final = ("roll, rad", "pitch, rad")
+_TALL: Final = {_PATH: 1.9, _SIDE: 1.3}
+"""Heights of panels, of which others have 1."""
 _BOUND: Final[Mapping[str, Any]] = {"color": INK, "linestyle": "--", "linewidth": THIN}
 """How limits look."""
-_SPEED: Final = "speed, m/s"
-_ABOVE_ERROR: Final = -4
-"""Row of the speed: above error, roll and pitch."""
+
+Panels = Mapping[str, Axes]
+"""Axes by the labels of their ordinates."""
 
 
-def draw_flights(
-    flights: Mapping[str, Trace], stem: Path, walls: Walls | None = None, speed_limit_m_s: float = 0.0
+def draw_flight(
+    trace: Trace, message: str, about: str, stem: Path, marks: FlightMarks = NO_MARKS
 ) -> tuple[Path, Path]:
-    """Draw the first flight of each trace as one column with the same scales in all columns, and the fence.
+    """Draw the first flight of a trace, its path beside what varies over time; write stem.png and stem.svg.
 
-    The speed and its limit (0: none) are shown where a flight comes near it. Writes stem.png and stem.svg.
+    Above it stands the message of the picture, and what is known about the flight.
     """
     with style():
-        labels = _labels(flights, speed_limit_m_s)
-        figure = Figure(
-            figsize=(COLUMN_INCHES * len(flights), 1.47 * sum(labels.values())), layout="constrained"
-        )
-        ratios = tuple(labels.values())
-        rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
-        for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            _draw_column(column, trace, title, walls, speed_limit_m_s if _SPEED in labels else 0.0)
-        _share_scales(rows[0])
-        rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
-        _label_column(rows[:, 0], labels)
+        labels = _labels([trace], marks)
+        seen = [label for label in labels if label in _TALL]
+        over_time = [label for label in labels if label not in _TALL]
+        figure = Figure(figsize=(PAGE_INCHES, 0.8 + 1.05 * len(over_time)), layout="constrained")
+        add_headline(figure, message, about)
+        halves = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.2))
+        heights = [_TALL[label] for label in seen]
+        places = halves[0].subgridspec(len(seen), 1, height_ratios=heights)
+        panels = _add_panels(figure, places, seen)
+        panels |= _add_panels(figure, halves[1].subgridspec(len(over_time), 1), over_time)
+        for label in over_time[:-1]:
+            panels[label].sharex(panels[over_time[-1]])
+            panels[label].tick_params(labelbottom=False)
+        _draw(panels, trace, marks)
+        panels[_PATH].invert_yaxis()  # seen from above, with north to the right
         return save(figure, stem)
 
 
-def _labels(flights: Mapping[str, Trace], speed_limit_m_s: float) -> dict[str, float]:
-    """Return the labels of the axes of a column, and their relative heights."""
-    labels = _SPATIAL if any(trace.spatial for trace in flights.values()) else _LEVEL
-    placed = list(labels.items())
-    if any(nears_limit(trace, speed_limit_m_s) for trace in flights.values()):
-        placed.insert(_ABOVE_ERROR + 1, (_SPEED, 1.0))
-    return dict(placed)
+def _add_panels(
+    figure: Figure, places: GridSpec | GridSpecFromSubplotSpec, labels: Iterable[str]
+) -> dict[str, Axes]:
+    panels = {label: figure.add_subplot(places[row]) for row, label in enumerate(labels)}
+    for label, axes in panels.items():
+        axes.set_ylabel(label)
+    return panels
 
 
-def _draw_column(
-    column: NDArray[Any], trace: Trace, title: str, walls: Walls | None, speed_limit_m_s: float
-) -> None:
-    """Draw the first flight of a trace in axes (4,): path, error, roll, pitch; or (6,), with the height.
+def _labels(flights: Iterable[Trace], marks: FlightMarks) -> list[str]:
+    """Return the panels of a flight, in their order, which several pictures share."""
+    flights = list(flights)
+    wanted = {
+        _PATH: True,
+        _SIDE: any(np.ptp(trace.target_height_m[:, 0]) > 0.0 for trace in flights),
+        _ERROR: True,
+        _HEIGHT: any(trace.spatial for trace in flights),
+        _SPEED: any(nears_limit(trace, marks.speed_limit_m_s) for trace in flights),
+        **dict.fromkeys(_ANGLES, True),
+    }
+    return [label for label, is_wanted in wanted.items() if is_wanted]
 
-    With a speed limit the speed is above the error. Target and commands are broad lines below the flown ones,
-    so that both stay visible.
+
+def _draw(panels: Panels, trace: Trace, marks: FlightMarks) -> None:
+    """Draw the first flight of a trace.
+
+    Target and commands are broad lines below the flown ones, so that both stay visible.
     """
-    if speed_limit_m_s:
-        _draw_speed(column[_ABOVE_ERROR], trace, speed_limit_m_s)
-        column = np.delete(column, _ABOVE_ERROR)
-    path, *heights, error, roll, pitch = column
-    angles = roll, pitch
+    path = panels[_PATH]
     path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=BROAD, label="target")
     path.plot(*trace.position_m[:, 0, :2].T, color=FLOWN, label="flown")
-    path.set_title(title, loc="left", pad=20, parse_math=False)  # above the legend
-    path.set(xlabel="x (north), m", aspect="equal")
-    if heights:
-        _draw_heights(heights, trace, walls)
-    _draw_error(error, trace)
-    for axis, axes in enumerate(angles):
-        axes.plot(
-            trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=BROAD, label="command"
-        )
-        axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=THIN, label="flown")
-    angles[-1].set_xlabel("time, s")
-    if walls is not None:
-        _draw_walls(path, walls)
+    path.set(xlabel="x (north), m", aspect="equal", anchor="N")
+    _draw_heights(panels, trace, marks.walls)
+    _draw_error(panels[_ERROR], trace)
+    if _SPEED in panels:
+        panels[_SPEED].plot(trace.time_s, horizontal_speed_m_s(trace)[:, 0], color=FLOWN)
+        panels[_SPEED].axhline(marks.speed_limit_m_s, **_BOUND)
+        panels[_SPEED].set_ylim(0, None)
+    for axis, label in enumerate(_ANGLES):
+        command_rad, angle_rad = trace.command_rad[:, 0, axis], trace.euler_rad[:, 0, axis]
+        panels[label].plot(trace.time_s, command_rad, color=COMMAND, linewidth=BROAD, label="command")
+        panels[label].plot(trace.time_s, angle_rad, color=FLOWN, linewidth=THIN, label="flown")
+    panels[_ANGLES[-1]].set_xlabel("time, s")
+    for axes in (path, panels[_ANGLES[0]]):
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, borderaxespad=0.1)
+    if marks.walls is not None:
+        _draw_walls(path, marks.walls)
+    if math.isfinite(marks.crash_s):
+        _mark_crash(panels, trace, marks.crash_s)
 
 
 def _draw_error(axes: Axes, trace: Trace) -> None:
@@ -111,13 +137,6 @@ def _draw_error(axes: Axes, trace: Trace) -> None:
         axes.text(0.99, 0.97, words, transform=axes.transAxes, ha="right", va="top", color=QUIET)
 
 
-def _draw_speed(axes: Axes, trace: Trace, limit_m_s: float) -> None:
-    """Draw the horizontal speed of the first flight and its limit over time."""
-    axes.plot(trace.time_s, horizontal_speed_m_s(trace)[:, 0], color=FLOWN)
-    axes.axhline(limit_m_s, **_BOUND)
-    axes.set_ylim(0, None)
-
-
 def _draw_walls(path: Axes, walls: Walls) -> None:
     """Draw the walls of a fence in a path seen from above."""
     for x_m, y_m, _ in (walls[:3], walls[3:]):
@@ -127,62 +146,60 @@ def _draw_walls(path: Axes, walls: Walls) -> None:
             path.axhline(y_m, **_BOUND)
 
 
-def _draw_heights(axes: Sequence[Axes], trace: Trace, walls: Walls | None) -> None:
+def _draw_heights(panels: Panels, trace: Trace, walls: Walls | None) -> None:
     """Draw the height of the first flight along x and over time, with floor and ceiling of a fence."""
     target_m, flown_m = trace.target_height_m[:, 0], -trace.position_m[:, 0, 2]
-    abscissae = (trace.target[:, 0, 0], trace.position_m[:, 0, 0]), (trace.time_s, trace.time_s)
-    for place, (targets, flown) in zip(axes, abscissae, strict=True):
-        place.plot(targets, target_m, color=TARGET, linewidth=BROAD)
-        place.plot(flown, flown_m, color=FLOWN)
+    along = {_SIDE: (trace.target[:, 0, 0], trace.position_m[:, 0, 0]), _HEIGHT: (trace.time_s, trace.time_s)}
+    for label in along.keys() & panels.keys():
+        targets, flown = along[label]
+        panels[label].plot(targets, target_m, color=TARGET, linewidth=BROAD)
+        panels[label].plot(flown, flown_m, color=FLOWN)
         for height_m in (walls[2], walls[5]) if walls else ():
             if math.isfinite(height_m):
-                place.axhline(height_m, **_BOUND)
-    axes[0].set(xlabel="x (north), m")
-    axes[0].set_aspect("equal", adjustable="datalim")
+                panels[label].axhline(height_m, **_BOUND)
+    if _SIDE in panels:
+        panels[_SIDE].set(xlabel="x (north), m", aspect="equal", anchor="N")
 
 
-def _label_column(column: NDArray[Any], labels: Mapping[str, float]) -> None:
-    for axes, label in zip(column, labels, strict=True):
-        axes.set_ylabel(label)
-    for axes in (column[0], column[-2]):
-        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
+def _mark_crash(panels: Panels, trace: Trace, crash_s: float) -> None:
+    """Put a cross where the drone crashed, and a line at that time."""
+    place_m = trace.position_m[np.searchsorted(trace.time_s, crash_s), 0, :2]
+    look: dict[str, Any] = {"color": VERMILION, "zorder": 5}
+    panels[_PATH].plot(*place_m, "X", markersize=2.0 * DOT, label="crash", **look)
+    panels[_PATH].legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, borderaxespad=0.1)
+    for label, axes in panels.items():
+        if label not in _TALL:
+            axes.axvline(crash_s, **look)
 
 
-def flight_columns(
-    flights: Mapping[str, Trace], walls: Walls | None = None, speed_limit_m_s: float = 0.0
-) -> list[Markup]:
-    """Return one picture per flight: path, height, error, roll and pitch, with the same scales in all.
-
-    Fence and speed are shown as in `draw_flights`.
-    """
+def flight_columns(flights: Mapping[str, Trace], marks: FlightMarks = NO_MARKS) -> list[Markup]:
+    """Return one picture per flight: path, height, error, roll and pitch, with the same scales in all."""
     with style():
-        labels = _labels(flights, speed_limit_m_s)
-        height = "height, " if "height, m" in labels else ""
-        speed = "speed, " if _SPEED in labels else ""
-        limit_m_s = speed_limit_m_s if speed else 0.0
-        figures = [_column(title, trace, labels, walls, limit_m_s) for title, trace in flights.items()]
+        labels = _labels(flights.values(), marks)
+        figures = [_column(title, trace, labels, marks) for title, trace in flights.items()]
         for row in zip(*(figure.axes for figure in figures), strict=True):
             _share_scales(row)
         for figure in figures:
             figure.axes[0].invert_yaxis()  # seen from above, with north to the right
+        others = "".join(word for label, word in _WORDS.items() if label in labels)
         return [
             inline(
                 figure,
-                f"{title}: path seen from above, {height}{speed}distance to the target, "
-                "roll and pitch over time",
+                f"{title}: path seen from above, {others}distance to the target, roll and pitch over time",
             )
             for title, figure in zip(flights, figures, strict=True)
         ]
 
 
-def _column(
-    title: str, trace: Trace, labels: Mapping[str, float], walls: Walls | None, speed_limit_m_s: float
-) -> Figure:
-    figure = Figure(figsize=(COLUMN_INCHES, 1.347 * sum(labels.values())), layout="constrained")
-    column = figure.subplots(len(labels), 1, height_ratios=tuple(labels.values()))
-    _draw_column(column, trace, "", walls, speed_limit_m_s)
+_WORDS: Final = {_HEIGHT: "height, ", _SPEED: "speed, "}
+
+
+def _column(title: str, trace: Trace, labels: Sequence[str], marks: FlightMarks) -> Figure:
+    heights = [_TALL.get(label, 1.0) for label in labels]
+    figure = Figure(figsize=(COLUMN_INCHES, 1.347 * sum(heights)), layout="constrained")
+    panels = _add_panels(figure, figure.add_gridspec(len(labels), 1, height_ratios=heights), labels)
     figure.suptitle(title, parse_math=False)  # above the legend, whatever the path's shape
-    _label_column(column, labels)
+    _draw(panels, trace, marks)
     return figure
 
 

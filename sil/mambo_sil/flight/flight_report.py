@@ -20,7 +20,8 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.animation import animate
 from mambo_sil.flight.crashes import Crash, first_crash
-from mambo_sil.flight.fences import Walls, measure_limits, nears_limit, walls_m
+from mambo_sil.flight.fences import measure_limits, nears_limit, walls_m
+from mambo_sil.flight.flight_marks import NO_MARKS, FlightMarks
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES, flies_settings
 from mambo_sil.flight.scenario import Scenario
@@ -90,8 +91,7 @@ class FlightSummary(ReportedSummary):
                 folder,
                 {name: "trace.npz"},
                 "Path, horizontal error, commanded and actual angles.",
-                self.walls_m,
-                self.speed_limit_m_s or 0.0,
+                self.marks,
             ),
             ResultTable(("", *self.columns, ""), rows, (0, -1)),
         ]
@@ -101,11 +101,21 @@ class FlightSummary(ReportedSummary):
         refused = [f"{count} {name}" for name, count in self.statuses.items() if name not in quiet]
         if refused:
             blocks += map(Sentence, (f"refused inputs: {', '.join(refused)}", *self.refusals))
-        mean_m = self.metrics.get("iae_m_s", math.nan) / flown.duration_s
-        most_m = self.metrics.get("max_error_m", math.nan)
-        answer = [f"{distance(mean_m)} in the mean, {distance(most_m)} at most", *self._remarks()]
         subject = f"{self._source} on {echo(flown.vehicle.name)}"
+        answer = self.answer(flown.duration_s)
         return CommandResult(title, None if self.good else False, answer, blocks, subject)
+
+    def answer(self, duration_s: float) -> list[str]:
+        """Return how close the drone stayed to its target, and what went wrong."""
+        mean_m = self.metrics.get("iae_m_s", math.nan) / duration_s
+        most_m = self.metrics.get("max_error_m", math.nan)
+        return [f"{distance(mean_m)} in the mean, {distance(most_m)} at most", *self._remarks()]
+
+    @property
+    def marks(self) -> FlightMarks:
+        """What a picture shows besides the flight."""
+        crash_s = math.nan if self.crash is None else self.crash.time_s
+        return FlightMarks(self.walls_m, self.speed_limit_m_s or 0.0, crash_s)
 
     @property
     def _source(self) -> str:
@@ -152,9 +162,9 @@ class FlySummary(FlightSummary):
     duration_s: float
 
     @property
-    def title(self) -> str:
-        """Say in two lines what flies, and where."""
-        return flight_title(self._flier, self)
+    def about(self) -> str:
+        """Say what flies, and where."""
+        return about_flight(self._flier, self)
 
     @property
     def _flier(self) -> str:
@@ -226,10 +236,12 @@ def _controller(summary: FlightSummary, source: str = "") -> str:
     )
 
 
-def flight_title(name: str, flown: FlySummary | Scenario) -> str:
-    """Return the title of a picture, in two lines: what flies on which drone; curve and wind."""
+def about_flight(name: str, flown: FlySummary | Scenario) -> str:
+    """Return what flies on which drone, curve, state and wind, for a picture."""
     wind = f"wind {flown.wind_speed_m_s:.3g} m/s" if flown.wind_speed_m_s else "no wind"
-    return f"{name} on {echo(flown.vehicle.name)}\n{echo(_course(flown)['trajectory'])}, {wind}"
+    course = _course(flown)
+    where = f"{echo(course['trajectory'])}, state {course['state']}, {wind}"
+    return f"{name} on {echo(flown.vehicle.name)}, one flight: {where}"
 
 
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:
@@ -321,8 +333,7 @@ def flight_pictures(
     folder: Path,
     files: Mapping[str, str],
     caption: str,
-    walls: Walls | None = None,
-    speed_limit_m_s: float = 0.0,
+    marks: FlightMarks = NO_MARKS,
 ) -> list[Picture]:
     """Return the animation and the pictures of the traces `files`, names in `folder` by title."""
 
@@ -338,7 +349,7 @@ def flight_pictures(
     def columns() -> list[Markup]:
         from mambo_sil.flight.flight_plots import flight_columns  # noqa: PLC0415 - loaded when drawing
 
-        return flight_columns(flights(), walls, speed_limit_m_s)
+        return flight_columns(flights(), marks)
 
     paths = [folder / name for name in files.values()]
     return [MovingPicture(animation, "", paths), Picture(columns, caption, paths)]

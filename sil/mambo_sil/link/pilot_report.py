@@ -7,6 +7,8 @@ from typing import Final, Self
 
 import numpy as np
 
+from mambo_sil.flight.flight_report import flight_pictures
+from mambo_sil.flight.traces import Trace
 from mambo_sil.link.life_cycle import LifeCycle
 from mambo_sil.link.steady_frame import FrameJump
 from mambo_sil.link.steering import Update
@@ -20,10 +22,13 @@ from mambo_sil.model.identify.signals import (
     THRUST_COMMAND,
     UPDATE,
 )
-from mambo_sil.results.blocks import CommandResult, ResultTable
+from mambo_sil.results.blocks import Block, CommandResult, ResultTable
+from mambo_sil.results.number_format import distance
 from mambo_sil.results.summary import Number, ReportedSummary
 
 LOG: Final = "flight.csv"
+TRACE: Final = "trace.npz"
+PICTURES: Final = ("flight.png", "flight.svg")
 COLUMNS: Final = (
     *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),
     *("target_x_m", "target_y_m", "target_height_m", "target_vx_m_s", "target_vy_m_s", "target_climb_m_s"),
@@ -75,14 +80,30 @@ class PilotSummary(ReportedSummary):
     pauses: int
     refused: int
 
-    def result(self, _folder: Path, /) -> CommandResult:
-        """Return the result of this flight."""
+    @property
+    def about(self) -> str:
+        """Say what flew over which link."""
         drone = "a simulated" if self.simulated else "an"
         heard = self.autopilot or "that was never heard"
-        title = f"{self.source} over {self.link}, {drone} autopilot {heard}"
-        return CommandResult(
-            title, self.good, [self.end], [ResultTable((), _rows(self) if self.set_points else [])]
-        )
+        return f"{self.source} over {self.link}, {drone} autopilot {heard}"
+
+    def result(self, folder: Path, /) -> CommandResult:
+        """Return the result of this flight; drawing raises TraceError."""
+        caption = "Path, horizontal error as estimated, height, commanded and actual angles."
+        blocks: list[Block] = [
+            *flight_pictures(folder, {self.source: TRACE}, caption),
+            ResultTable((), _rows(self) if self.set_points else []),
+        ]
+        return CommandResult(self.about, self.good, [self.end], blocks)
+
+    def draw(self, trace: Trace, folder: Path) -> None:
+        """Write `PICTURES`."""
+        from mambo_sil.flight.flight_plots import draw_flight  # noqa: PLC0415 - loaded when drawing
+
+        rms = " and ".join(f"{distance(one)}" for one in (self.horizontal_rms_m, self.vertical_rms_m))
+        message = f"{self.end}; {rms} (rms, in the plane and in height, as estimated) off the target"
+        about = f"{self.about}; one flight: {self.trajectory}, {self.flown_s:.0f} s"
+        draw_flight(trace, message, about, folder / "flight")
 
     @classmethod
     def of(cls, life: LifeCycle, updates: Sequence[Update], **named: object) -> Self:
@@ -151,6 +172,24 @@ def _rows(summary: PilotSummary) -> list[tuple[str, str]]:
         ("link", f"{1e3 * summary.link_delay_s:.0f} ms each way, before the flight"),
         ("jumps, pauses", f"{summary.jumps} of the estimator, {summary.pauses} of the link"),
     ]
+
+
+def trace_of(updates: Sequence[Update]) -> Trace:
+    """Return the steps of a flight as the trace of one flight: of the estimate, on the course's clock."""
+    rows = np.array([_logged(update)[: COLUMNS.index("target_ax_m_s2")] for update in updates])[:, np.newaxis]
+    time_s, position_m, velocity_m_s, euler_rad, x_y_m, height_m, v_m_s, climb_m_s = np.split(
+        rows, np.cumsum((1, 3, 3, 3, 2, 1, 2)), axis=-1
+    )
+    return Trace(
+        time_s=time_s[:, 0, 0] - time_s[0, 0, 0],
+        position_m=position_m,
+        velocity_m_s=velocity_m_s,
+        euler_rad=euler_rad,
+        target=np.concatenate([x_y_m, v_m_s, height_m, climb_m_s], axis=-1),
+        command_rad=np.array([one.command_rad for one in updates])[:, np.newaxis],
+        thrust_acceleration_m_s2=np.array([[one.thrust_m_s2] for one in updates]),
+        status=np.array([[one.status] for one in updates]),
+    )
 
 
 def write_log(updates: Sequence[Update], path: Path) -> None:

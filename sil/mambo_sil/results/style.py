@@ -5,12 +5,15 @@ grey some are alike: so lines that are to be told apart differ in dashes or widt
 """
 
 import contextlib
+import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.rcsetup import cycler
 
 BLUE: Final = "#0072B2"
@@ -42,6 +45,7 @@ PAGE_INCHES: Final = 7.16
 """Width of a page of a journal, two columns."""
 SMALL: Final = 7.0
 """Size of the font beside ticks and in crowded legends."""
+_HEADLINE: Final = 8.5
 
 Dashes = str | tuple[float, tuple[float, ...]]
 
@@ -124,3 +128,22 @@ def style() -> Iterator[None]:
         mpl.rcParams.update(_STYLE)
         warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
         yield
+
+
+_LETTERS_AN_INCH: Final = 13.5
+"""Letters of the headline that fit into an inch, those of a bold line included."""
+_LINE_INCHES: Final = 0.15
+
+
+def add_headline(figure: Figure, message: str, about: str) -> None:
+    """Put what a picture says above it, and in grey below that what was flown, how often and where."""
+    letters = int(_LETTERS_AN_INCH * figure.get_figwidth())
+    bold, quiet = textwrap.wrap(message, letters), textwrap.wrap(about, int(1.15 * letters))
+    height = figure.get_figheight()
+    look: dict[str, Any] = {"ha": "left", "va": "top", "parse_math": False, "fontsize": _HEADLINE}
+    below = 1.0 - (0.06 + _LINE_INCHES * len(bold)) / height
+    figure.text(0.01, 1.0 - 0.05 / height, "\n".join(bold), fontweight="bold", **look)
+    figure.text(0.01, below, "\n".join(quiet), color=QUIET, **look)
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(rect=(0.0, 0.0, 1.0, below - (0.05 + _LINE_INCHES * len(quiet)) / height))

@@ -158,7 +158,7 @@ def test_any_points_can_be_drawn(points: list[Point], axes: tuple[Axis, ...], tm
     limits = budgets(boards.load("crazyflie"), ONE_NORM, axes)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        draw_sweep(points, axes, limits, "Crazyflie", tmp_path / "sweep")
+        draw_sweep(points, axes, limits, ("fits", "Crazyflie"), tmp_path / "sweep")
     assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "sweep.svg").read_text("utf-8")
 
@@ -173,7 +173,7 @@ def test_the_budget_of_time_is_left_out_where_it_varies() -> None:
 @pytest.mark.long
 def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
     """Dollar signs in a board's title are drawn literally."""
-    draw_sweep([POINT], AXES, {}, r"$\frac{$ <b>", tmp_path / "sweep")
+    draw_sweep([POINT], AXES, {}, ("fits", r"$\frac{$ <b>"), tmp_path / "sweep")
     assert r"$\frac{$ &lt;b&gt;" in (tmp_path / "sweep.svg").read_text("utf-8")
 
 

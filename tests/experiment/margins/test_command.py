@@ -40,9 +40,13 @@ def test_the_default_has_the_margins_of_the_manual() -> None:
 
 
 def test_it_says_in_words_how_far_the_edge_is() -> None:
-    """The last lines are the verdicts; the table names both places."""
-    said, _ = run("margins", "crazyflie", "--vehicle", "crazyflie")
+    """A sentence for each axis; with --all every figure, of both places."""
+    flown = ("margins", "crazyflie", "--vehicle", "crazyflie")
+    said, _ = run(*flown)
     assert "roll: tolerates 2.5 times the gain or 164 ms more delay; at the motors' torque\n" in said
+    assert "gain margin up" not in said
+    assert len(said.splitlines()) < 8
+    said, _ = run(*flown, "--all")
     assert "command: gain margin up" in said
     assert "motors: delay margin" in said
 

@@ -15,12 +15,22 @@ from matplotlib.ticker import MaxNLocator
 from mambo_sil.board.footprint.measure import Footprint
 from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
-from mambo_sil.results.style import COLUMN_INCHES, COMMAND, FLOWN, PAGE_INCHES, QUIET, SMALL, THIN, style
+from mambo_sil.results.style import (
+    COLUMN_INCHES,
+    COMMAND,
+    FLOWN,
+    PAGE_INCHES,
+    QUIET,
+    SMALL,
+    THIN,
+    add_headline,
+    style,
+)
 
 _SWEPT: Final = {
     "flash_bytes": "flash, B",
     "ram_bytes": "RAM, B",
-    "time_ms": "time of a step, ms (upper estimate)",
+    "time_ms": "most time of a step, ms",
     "iae_m_s": "IAE, m s",
 }
 """Quantities of a `Point` that are plotted, and their axis labels."""
@@ -54,19 +64,25 @@ def _format(value: float) -> str:
 
 
 def draw_sweep(
-    points: Sequence[Point], axes: Sequence[Axis], budget: Mapping[str, float], title: str, stem: Path
+    points: Sequence[Point],
+    axes: Sequence[Axis],
+    budget: Mapping[str, float],
+    headline: tuple[str, str],
+    stem: Path,
 ) -> tuple[Path, Path]:
     """Draw flash, RAM, time and IAE against the first key; write stem.png and stem.svg.
 
     A line for each value of the second key. Dots: within budget. Dashed grey line: the budget. Crosses at the
-    bottom: refused settings.
+    bottom: refused settings. All but a wide range of time or IAE begin at 0.
+
+    `headline`: what the sweep found, and what was flown.
     """
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 5.6), layout="constrained")
+        add_headline(figure, *headline)
         for panel, quantity in zip(figure.subplots(2, 2).flat, _SWEPT, strict=True):
             _draw_swept(panel, points, axes, quantity, budget.get(quantity))
         _add_legend(figure, panel, 3)
-        figure.suptitle(title, parse_math=False)
         return save(figure, stem)
 
 
@@ -87,14 +103,17 @@ def _draw_swept(
     refused = sorted({point.values[first.key] for point in points if point.refusal is not None})
     panel.plot(refused, [0.03] * len(refused), "x", color=QUIET, transform=panel.get_xaxis_transform())
     measured = [value for value in (getattr(point, quantity) for point in points) if math.isfinite(value)]
-    if limit is not None and measured and limit < 3 * max(measured):
+    near = limit is not None and bool(measured) and limit < 3 * max(measured)
+    if limit is not None and near:
         panel.axhline(limit, color=QUIET, linestyle=(0, (6, 3)), linewidth=THIN)
-    panel.set(xlabel=first.key, ylabel=_SWEPT[quantity])
+    panel.set(xlabel=first.key, ylabel=f"{_SWEPT[quantity]} (less is better)")
     panel.xaxis.set_major_locator(MaxNLocator(7, integer=all(isinstance(one, int) for one in first.values)))
     if measured and max(measured) > 2.0 * min(measured) and quantity in ("iae_m_s", "time_ms"):
         panel.set_yscale("log")
         panel.yaxis.set_major_formatter(PlainLogFormatter())
         panel.yaxis.set_minor_formatter(PlainLogFormatter())
+    else:
+        panel.set_ylim(0.0, 1.1 * max([*measured, *([limit] if near else [])], default=1.0))
 
 
 def _add_legend(figure: Figure, panel: Axes, columns: int) -> None:

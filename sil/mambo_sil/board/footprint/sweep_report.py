@@ -53,14 +53,10 @@ class SweepSummary(ReportedSummary):
             return sweep_panels(self.points, self.axes, self.budget)
 
         flown = [point for point in self.points if point.refusal is None]
-        best, fitting = self.closest_fit, sum(point.fits for point in flown)
-        answer = [f"nothing fits {self.board}"]
-        if best is not None or fitting:
-            answer = [f"{fitting} of {len(self.points)} controllers fit", *self._closest()]
         return CommandResult(
             f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}",
-            best is not None,
-            answer,
+            self.closest_fit is not None,
+            self._answer(),
             [
                 *([Picture(panels, CAPTION)] if self.points else []),
                 ResultTable(_HEADS, list(map(_row, flown)), (0, -1), _WIDE),
@@ -71,6 +67,22 @@ class SweepSummary(ReportedSummary):
                 ),
             ],
         )
+
+    @property
+    def headline(self) -> tuple[str, str]:
+        """What the sweep found, and what was flown, for a picture."""
+        about = (
+            f"{self.source} on board {self.board}, drone {self.vehicle.name}, {len(self.points)} controllers "
+            "with one flight of Table II's figure of eight without wind each"
+        )
+        return "; ".join(self._answer()[:2]), about
+
+    def _answer(self) -> list[str]:
+        """Return how many controllers fit, and which is the closest."""
+        fitting = sum(point.fits for point in self.points)
+        if self.closest_fit is None and not fitting:
+            return [f"nothing fits {self.board}"]
+        return [f"{fitting} of {len(self.points)} controllers fit", *self._closest()]
 
     def _closest(self) -> list[str]:
         """Return in words which point is closest, and which would be without regard to margins."""

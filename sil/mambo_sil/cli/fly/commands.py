@@ -171,14 +171,14 @@ def faults(
                 verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar, drone=drone)
             except FlightError as error:
                 raise FlightError(f"{echo(source)}: {error}") from error
+            summary = FaultsSummary(
+                source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
+            )
             bar.stage("drawing pictures")
             from mambo_sil.experiment.faults.faults_plots import draw_faults
 
-            draw_faults(verdicts, folder / "faults")
+            draw_faults(verdicts, summary.result(folder).finding, summary.subject, folder / "faults")
         write_csv(verdicts, folder / "faults.csv")
-        summary = FaultsSummary(
-            source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
-        )
         summary.write(folder)
     show_result(summary, output, as_json=as_json)
     if summary.crashed:

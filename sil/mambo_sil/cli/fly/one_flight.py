@@ -31,7 +31,6 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.own_law import Law, OwnLaws, load_law, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
-from mambo_sil.flight.fences import Walls, walls_m
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import CONTROLLER_NAMES, SIZED, TIMED, PdName, flies_settings
@@ -201,8 +200,7 @@ def write_flight(
     others = target_columns(flight, settings) if flies_settings(summary.controller) else {}
     write_trace(trace, folder, others)
     if not output.no_pictures:
-        limit_m_s = settings.limits.speed_m_s if flies_settings(summary.controller) else 0.0
-        draw_flight(trace, summary.title, folder, walls_m(settings), limit_m_s)
+        draw(trace, summary, summary.about, summary.duration_s, folder)
 
 
 def write_trace(trace: Trace, folder: Path, others: Mapping[str, FloatArray]) -> None:
@@ -211,11 +209,12 @@ def write_trace(trace: Trace, folder: Path, others: Mapping[str, FloatArray]) ->
     write_npz(trace, folder / "trace.npz")
 
 
-def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None, speed_limit_m_s: float) -> None:
-    """Write the pictures of `FLIGHT_FILES`, with the fence and the speed limit (0: none), if any."""
-    from mambo_sil.flight.flight_plots import draw_flights  # matplotlib is slow to import
+def draw(trace: Trace, summary: FlightSummary, about: str, duration_s: float, folder: Path) -> None:
+    """Write the pictures of `FLIGHT_FILES`."""
+    from mambo_sil.flight.flight_plots import draw_flight  # matplotlib is slow to import
 
-    draw_flights({title: trace}, folder / "flight", walls, speed_limit_m_s)
+    message = f"Distance to the target: {'; '.join(summary.answer(duration_s))}"
+    draw_flight(trace, message, about, folder / "flight", summary.marks)
 
 
 def finish(summary: FlightSummary, output: Output, files: tuple[str, ...]) -> None:

@@ -60,14 +60,16 @@ def pilot(
     """
     from mambo_sil.api.api_controller import Controller
     from mambo_sil.cli.fly.one_flight import curve_of
+    from mambo_sil.flight.traces import write_npz
     from mambo_sil.link.pilot import Pilot
-    from mambo_sil.link.pilot_report import LOG, PilotSummary, write_log
+    from mambo_sil.link.pilot_report import LOG, PICTURES, TRACE, PilotSummary, trace_of, write_log
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
     open_link = _opener(source, link, simulate, vehicle, key)
     updates: list[Update] = []
-    with new_results(output, PilotSummary.command, (LOG,)) as folder, progress_bar("connecting") as bar:
+    files = (LOG, TRACE, *PICTURES)
+    with new_results(output, PilotSummary.command, files) as folder, progress_bar("connecting") as bar:
         flown = Pilot(Controller(settings), open_link, updates.append, _watch(bar), farthest_m=farthest_m)
         interrupted: KeyboardInterrupt | None = None
         try:
@@ -88,8 +90,13 @@ def pilot(
             simulated=simulate is not None,
             trajectory=trajectory,
         )
+        if len(updates) > 1:
+            bar.stage("drawing pictures")
+            trace = trace_of(updates)
+            write_npz(trace, folder / TRACE)
+            summary.draw(trace, folder)
         summary.write(folder)
-    show_result(summary, output, (LOG,), as_json=as_json)
+    show_result(summary, output, files if len(updates) > 1 else (LOG,), as_json=as_json)
     if interrupted is not None:
         raise interrupted
     if not summary.good:

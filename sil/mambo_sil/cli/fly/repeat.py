@@ -8,7 +8,7 @@ from mambo_sil.cli.fly.fly_options import OtherFlight, Output
 from mambo_sil.cli.fly.one_flight import (
     FLIGHT_FILES,
     TRACE_FILES,
-    draw_flight,
+    draw,
     finish,
     tell_failures,
     write_trace,
@@ -20,8 +20,8 @@ from mambo_sil.flight.controllers.inner_steps import WatchedController, write_in
 from mambo_sil.flight.controllers.own_law import OwnLaws, load_law, period_of
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
-from mambo_sil.flight.fences import fenced, walls_m
-from mambo_sil.flight.flight_report import RepeatSummary, flight_title, judge
+from mambo_sil.flight.fences import fenced
+from mambo_sil.flight.flight_report import RepeatSummary, about_flight, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import flies_settings
 from mambo_sil.flight.scenario import Record, flight_of, read_record
@@ -53,11 +53,6 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
             trace = simulate(flight, controller, progress)
         has_settings = flies_settings(record.controller)
         write_trace(trace, folder, target_columns(flight, record.settings) if has_settings else {})
-        if not output.no_pictures:
-            limit_m_s = record.settings.limits.speed_m_s if has_settings else 0.0
-            walls = walls_m(record.settings, record.scenario.fence_m)
-            title = flight_title(file.name, record.scenario)
-            draw_flight(trace, title, folder, walls, limit_m_s)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
@@ -71,6 +66,9 @@ def fly_again(file: Path, output: Output, other: OtherFlight) -> None:
             settings=record.settings.digest if has_settings else None,
             **judge(trace, record.settings, record.scenario.vehicle, limited),
         )
+        if not output.no_pictures:
+            about = about_flight(file.name, record.scenario)
+            draw(trace, summary, about, record.scenario.duration_s, folder)
         summary.write(folder)
     tell_failures(laws)
     written = TRACE_FILES if output.no_pictures else FLIGHT_FILES

@@ -13,11 +13,10 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED
-from mambo_sil.experiment.campaign.statistics import COMPARED, Table, index_values
+from mambo_sil.experiment.campaign.statistics import Table, index_values
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
-from mambo_sil.results.style import COLUMN_INCHES, PAGE_INCHES, QUIET, THIN, Look, looks, style
+from mambo_sil.results.style import COLUMN_INCHES, PAGE_INCHES, QUIET, THIN, Look, add_headline, looks, style
 
-_LABELS: Final = ("IAE, m s", "ISE, m² s", "ITSE, m² s²", "ITAE, m s²")
 _SHOWN: Final = {
     "iae_m_s": "IAE, m s",
     "max_error_m": "largest error, m",
@@ -30,35 +29,51 @@ _MOST_POINTS: Final = 20_000
 """Flights that a curve shows, more than an axis has points; of a million it shows every fiftieth."""
 
 
-def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path, Path]:
-    """Draw cumulative distributions of each index and of its ratio to the first controller's.
+def draw_campaign(
+    table: Table, names: Sequence[str], message: str, about: str, stem: Path
+) -> tuple[Path, Path]:
+    """Draw cumulative distributions of the main indices, and of the first controller's IAE by another's.
 
-    Writes stem.png and stem.svg. Because of crashed flights a curve ends below 1; with few but very
-    large values it leaves the panel.
+    Writes stem.png and stem.svg. Because of crashed flights a curve ends below 100 %; with few but very large
+    values it leaves the panel.
     """
-    rows = 1 if len(names) == 1 else 2
-    with style():
-        figure = Figure(figsize=(PAGE_INCHES, 0.4 + 1.9 * rows), layout="constrained")
-        panels = figure.subplots(rows, len(COMPARED), squeeze=False, sharey=True)
-        for axes, index, label in zip(panels[0], COMPARED, _LABELS, strict=True):
-            for name, look in looks(names).items():
-                _draw_shares(axes, index_values(table, name, index), look, name)
-            axes.set(xscale="log", xlabel=label, ylim=(0.0, 1.0))
+    shown = (*_DRAWN, None) if len(names) > 1 else _DRAWN
+    with style(), mpl.rc_context({"text.parse_math": False}):  # a controller's name is no formula
+        figure = Figure(figsize=(PAGE_INCHES, 1.0 + 2.0 * -(-len(shown) // 2)), layout="constrained")
+        add_headline(figure, message, about)
+        grid = figure.subplots(-(-len(shown) // 2), 2, squeeze=False, sharey=True)
+        panels = grid.flat
+        for axes, index in zip(panels, shown, strict=False):
+            for name, look in list(looks(names).items())[0 if index else 1 :]:
+                values = index_values(table, name, index or "iae_m_s")
+                if index is None:
+                    with np.errstate(invalid="ignore", divide="ignore"):
+                        values = index_values(table, names[0], "iae_m_s") / values
+                _draw_shares(axes, values, look, _counted(name, table), whole=100.0)
+            axes.set(xscale="log", ylim=(0.0, 102.0), xlabel=_MORE.format(names[0]))
+            if index is not None:
+                axes.set_xlabel(_LESS.format(_SHOWN[index]))
+            else:
+                axes.axvline(1.0, color=QUIET, linewidth=THIN)
             _show_most(axes)
             _label_plainly(axes)
-        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(names))
-        for axes, index, label in zip(panels[-1] if rows > 1 else (), COMPARED, _LABELS, strict=False):
-            for name in names[1:]:
-                theirs, ours = index_values(table, names[0], index), index_values(table, name, index)
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    _draw_shares(axes, theirs / ours, looks(names)[name], name)
-            axes.axvline(1.0, color=QUIET, linewidth=THIN)
-            axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: improvement on {names[0]}")
-            _show_most(axes)
-            _label_plainly(axes)
-        for axes in panels[:, 0]:
-            axes.set_ylabel("share of flights")
+        for axes in panels:  # that has nothing to show
+            axes.remove()
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(names))
+        for axes in grid[:, 0]:
+            axes.set_ylabel("flights below, %")
         return save(figure, stem)
+
+
+_DRAWN: Final = ("iae_m_s", "max_error_m", "command_variation_rad")
+_LESS: Final = "\N{LEFTWARDS ARROW} better: {}"
+_MORE: Final = "times closer than {} (by IAE): better \N{RIGHTWARDS ARROW}"
+
+
+def _counted(name: str, table: Table) -> str:
+    """Return a controller with how many of its flights crashed."""
+    crashed = int((table[f"{name}_{CRASHED}"] > 0.0).sum())
+    return f"{name}: {crashed} crashed" if crashed else name
 
 
 def _show_most(axes: Axes) -> None:

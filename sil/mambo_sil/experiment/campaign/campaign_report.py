@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import echo
 from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection
+from mambo_sil.experiment.campaign.campaign_file import distributions as distributions_of
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED
 from mambo_sil.experiment.campaign.campaign_records import record_name, write_records
 from mambo_sil.experiment.campaign.statistics import (
@@ -209,9 +210,22 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
     from mambo_sil.experiment.campaign.campaign_plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
 
     with convert_os_errors(store.folder):
-        draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)
+        names = [entrant.name for entrant in campaign.entrants]
+        message = "; ".join(_answer(summary, name) for name in reversed(names))
+        draw_campaign(table, names, message, _about(campaign, summary.flights), store.folder / PICTURE)
         put(store.folder / SUMMARY, summary.text().encode())
     return summary
+
+
+def _about(campaign: Campaign, flights: int) -> str:
+    """Return what was flown, how often and where, for a picture."""
+    flight = campaign.file.flight
+    wind = distributions_of(flight, campaign.file.draws)["wind_speed_m_s"]
+    return (
+        f"{flights} random flights on drone {campaign.drone.name}, sensors {flight.sensors}: "
+        f"{flight.trajectory.text()}, {flight.size_m.text()} m, {flight.rate_rad_s.text()} rad/s, "
+        f"{flight.duration_s:g} s, wind {wind.text()} m/s"
+    )
 
 
 def _compared(found: Mapping[str, Distributions]) -> Block:

@@ -44,8 +44,13 @@ class FaultsSummary(ReportedSummary):
             False if self.crashed else recovered or None,
             [_counts(self.flights)],
             [Note(_ABOUT), _table(self.flights), Sentence(_bands(self.flights))],
-            f"{echo(self.source)} on {echo(self.vehicle.name)}",
+            self.subject,
         )
+
+    @property
+    def subject(self) -> str:
+        """What flew on which drone."""
+        return f"{echo(self.source)} on {echo(self.vehicle.name)}"
 
 
 def _counts(verdicts: Sequence[Verdict]) -> str:
@@ -90,7 +95,7 @@ def _worst_end(pair: Sequence[Verdict]) -> End:
 
 def _bands(verdicts: Sequence[Verdict]) -> str:
     bands = ", ".join(
-        f"{course} {next(v.band_m for v in verdicts if v.course == course and not v.turning):.3f} m"
+        f"{course} {1e3 * next(v.band_m for v in verdicts if v.course == course and not v.turning):.2g} mm"
         for course in COURSES
     )
     return f"Recovered means an error within: {bands}."

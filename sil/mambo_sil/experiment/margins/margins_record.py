@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Final
 
 from markupsafe import Markup
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from mambo_codegen.errors import echo
 from mambo_sil.experiment.margins.axis_margins import PLACES, AxisName, Margins, PlaceName
 from mambo_sil.experiment.margins.margin_figures import figure_table, number, verdict
 from mambo_sil.flight.names import SensorsName
-from mambo_sil.results.blocks import Block, CommandResult, Picture, ResultTable, Sentence
+from mambo_sil.results.blocks import Block, CommandResult, Details, Picture, ResultTable, Sentence
 from mambo_sil.results.summary import Number, ReportedSummary
 
 PICTURES: Final = tuple(
@@ -89,6 +89,8 @@ class MarginsSummary(ReportedSummary):
     reason: str | None = None
     axes: list[Margins] | None = None
     many: ManyDrones | None = None
+    all_figures: bool = Field(default=False, exclude=True)
+    """Whether the result shows every figure unfolded."""
 
     @property
     def stable(self) -> bool:
@@ -102,8 +104,21 @@ class MarginsSummary(ReportedSummary):
             return [self.reason or ""]
         return [verdict(axis) for axis in self.axes]
 
+    @property
+    def about(self) -> str:
+        """Say whose margins these are."""
+        state = "the true state" if self.sensors == "true" else f"sensors {self.sensors}"
+        period = f"{1e3 * self.update_period_s:g} ms an update"
+        return f"{echo(self.source)} on {echo(self.vehicle)}, {state}, {period}"
+
+    @property
+    def headline(self) -> tuple[str, str]:
+        """The margins of the loop broken at the command, and whose they are, for a picture."""
+        verdicts = "; ".join(line.partition("; at the motors")[0] for line in self.verdicts)
+        return verdicts, f"{self.about}, at hover, without wind; bold bars: margins"
+
     def result(self, folder: Path, /) -> CommandResult:
-        """Return the result: a verdict for each axis, every figure, and those of many drones."""
+        """Return the result: a verdict for each axis, every figure folded, and those of many drones."""
 
         def panels() -> list[Markup]:
             from mambo_sil.experiment.margins.margins_plots import margin_panels  # noqa: PLC0415 - slow to load
@@ -111,18 +126,18 @@ class MarginsSummary(ReportedSummary):
 
             return [Markup("\n").join(margin_panels(read_responses(folder / RESPONSES)))]
 
-        state = "the true state" if self.sensors == "true" else f"sensors {self.sensors}"
-        period = f"{1e3 * self.update_period_s:g} ms an update"
         blocks: list[Block] = []
         if self.axes is not None:
             heads = ("broken at", *(axis.axis for axis in self.axes), "")
             rows = [(name, *values, unit) for name, values, unit in figure_table(self.axes)]
-            blocks = [Picture(panels, CAPTION, [folder / RESPONSES]), ResultTable(heads, rows, (0, -1))]
+            figures = ResultTable(heads, rows, (0, -1))
+            shown = figures if self.all_figures else Details("All figures", [figures])
+            blocks = [Picture(panels, CAPTION, [folder / RESPONSES]), shown]
         if self.many is not None:
             blocks += self.many.blocks
         return CommandResult(
-            f"Margins of {self.source} on {self.vehicle}, {state}",
+            f"Margins of {self.source} on {self.vehicle}",
             None if self.axes is None else self.stable,
-            [f"{echo(self.source)} on {echo(self.vehicle)}, {state}, {period}", *self.verdicts],
+            [self.about, *self.verdicts],
             blocks,
         )

@@ -97,7 +97,7 @@ def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> M
                 motors = not isinstance(flight.vehicle.loop, FirstOrderDrone)
                 curves = responses(loops, period_s, motors=motors)
                 write_responses(curves, place / RESPONSES)
-                draw_margins(curves, place)
+                draw_margins(curves, summary.headline, place)
                 if found:
                     write_drones(found, place / DRONES)
         if place is not None:
