@@ -145,7 +145,7 @@ def faults(controller: str) -> Callable[[Figures], str]:
                 row[f"{course}: recovered after, s"] = "-" if back is None else f"{back:.1f}"
             rows.append(row | {"end": max((flight["end"] for flight in flights), key=_ENDS.index)})
         bands = {one["course"]: one["band_m"] for one in figures[controller] if not one["turning"]}
-        within = ", ".join(f"{course} {band:.3f} m" for course, band in bands.items())
+        within = ", ".join(f"{course} {1e3 * band:.2g} mm" for course, band in bands.items())
         return f"{table(rows)}\n\nBack means within: {within}."
 
     return make

@@ -146,9 +146,9 @@ class Board(BaseModel):
     fpu: Fact[Literal["none", "single", "double"]] = Field(
         description="the widest floating-point format that the core computes itself"
     )
-    emulated_core: Fact[Literal["arm926", "cortex-m0", "cortex-m4", "cortex-m7", "rv32", "avr"]] = Field(
-        description="the emulated core that runs the same instructions"
-    )
+    emulated_core: Fact[
+        Literal["arm926", "cortex-m0", "cortex-m3", "cortex-m4", "cortex-m7", "cortex-m33", "rv32", "avr"]
+    ] = Field(description="the emulated core that runs the same instructions")
     clock_hz: Fact[Annotated[int, Field(ge=1, le=10**11)]] = Field(description="clock of the core, in hertz")
     flash_bytes: Fact[Bytes] = Field(description="memory for code and constants, in bytes")
     ram_bytes: Fact[Bytes] = Field(description="memory for data and stack, in bytes")

@@ -13,15 +13,17 @@ from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, Unre
 from tests.support.tools import require
 
 FOLDER = Path(boards.__file__).parent / "data" / "boards"
-NAMES = ("crazyflie", "mambo", "mega", "rp2040", "rv32", "stm32h743", "teensy41")
+NAMES = ("crazyflie", "mambo", "mega", "nano33ble", "rp2040", "rv32", "stm32f103", "stm32h743", "teensy41")
 SECTIONS = sorted(Board.model_fields.keys() - {"name", "title"})
 OPTIONAL = {"cycles", "flash_wait"}
 MACROS: dict[str, dict[str, str | None]] = {
     "crazyflie": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
     "mambo": {"__ARM_ARCH_5TEJ__": "1", "__SOFTFP__": "1", "__pic__": "2", "__pie__": None},
     "mega": {"__AVR_ATmega2560__": "1", "__SIZEOF_INT__": "2", "__SIZEOF_DOUBLE__": "4"},
+    "nano33ble": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS": "1"},
     "rp2040": {"__ARM_ARCH_6M__": "1", "__SOFTFP__": "1"},
     "rv32": {"__riscv_xlen": "32", "__riscv_mul": "1", "__riscv_compressed": "1", "__riscv_atomic": "1"},
+    "stm32f103": {"__ARM_ARCH_7M__": "1", "__SOFTFP__": "1"},
     "stm32h743": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
     "teensy41": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
 }

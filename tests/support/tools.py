@@ -19,6 +19,8 @@ CORES = {
     "mambo": "arm926",
     "rp2040": "cortex-m0",
     "crazyflie": "cortex-m4",
+    "nano33ble": "cortex-m4",
+    "stm32f103": "cortex-m3",
     "stm32h743": "cortex-m7",
     "teensy41": "cortex-m7",
     "rv32": "rv32",

@@ -64,8 +64,10 @@ def _arm(model: int, *, thumb: bool) -> CoreModel:
 MODELS: Final = {
     "arm926": _arm(arm_const.UC_CPU_ARM_926, thumb=False),
     "cortex-m0": _arm(arm_const.UC_CPU_ARM_CORTEX_M0, thumb=True),
+    "cortex-m3": _arm(arm_const.UC_CPU_ARM_CORTEX_M3, thumb=True),
     "cortex-m4": _arm(arm_const.UC_CPU_ARM_CORTEX_M4, thumb=True),
     "cortex-m7": _arm(arm_const.UC_CPU_ARM_CORTEX_M7, thumb=True),
+    "cortex-m33": _arm(arm_const.UC_CPU_ARM_CORTEX_M33, thumb=True),
     "rv32": CoreModel(
         architecture=unicorn.UC_ARCH_RISCV,
         mode=unicorn.UC_MODE_RISCV32,

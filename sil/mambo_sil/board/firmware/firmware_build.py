@@ -33,8 +33,10 @@ _CLANG: Final = "clang"
 _CLANG_TARGETS: Final = {
     "arm926": "arm-none-eabi",
     "cortex-m0": "arm-none-eabi",
+    "cortex-m3": "arm-none-eabi",
     "cortex-m4": "arm-none-eabi",
     "cortex-m7": "arm-none-eabi",
+    "cortex-m33": "arm-none-eabi",
     "rv32": "riscv32-unknown-elf",
 }
 """Clang's target of each emulated core; the board's flags choose core and FPU."""
