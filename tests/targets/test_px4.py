@@ -77,6 +77,19 @@ def test_a_mode_that_cannot_fly_is_refused_and_offered_again(
     assert desk.select(MPC)["mode"] == MPC
 
 
+def test_a_refusal_that_comes_and_goes_is_said_once(module: Path) -> None:
+    """As at a take-off, where the estimate is valid, not, and valid again; ten seconds later it is news."""
+    desk = Px4Desk(module)
+    for invalid in (1.0, 0.0, 1.0, 0.0):
+        desk.set("px4.invalid", invalid)
+        desk.run(300)
+    assert desk.console == "GCS: MPC not available: estimate not valid\n"
+    desk.run(10000)
+    desk.set("px4.invalid", 1.0)
+    desk.run(300)
+    assert desk.console.count("GCS: MPC not available: estimate not valid\n") == 2
+
+
 def test_a_build_with_other_bits_is_refused() -> None:
     """The self-test sees a product that a compiler rounds otherwise."""
     desk = Px4Desk(build_px4(px4_settings(), ("#define NMPC_HALF 0.5f", "#define NMPC_HALF 0.50001f")))
