@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.link.checks import Preflight, stack_of
 from mambo_sil.link.courses import Place, TargetCourse
 from mambo_sil.link.estimates import Estimates
@@ -362,10 +363,13 @@ class LifeCycle:
 
     def _hover_above(self) -> list[Order]:
         """Return the set-point above the place of take-off, of an autopilot that climbs by set-points."""
+        return self._hover_at(self._place_m - np.array([0.0, 0.0, self.height_m]))
+
+    def _hover_at(self, position_m: FloatArray) -> list[Order]:
+        """Return the set-point of a place (3,), of an autopilot that climbs by set-points."""
         estimate = self.estimates.take()
         if self.stack is None or estimate is None or not self.stack.climbs_by_set_points:
             return []
-        position_m = self._place_m - np.array([0.0, 0.0, self.height_m])
         return [SetPosition(estimate.time_s, position_m, float(estimate.attitude_rad[2]))]
 
     def _climb(self, now_s: float) -> list[Order]:
@@ -421,7 +425,10 @@ class LifeCycle:
         return [] if set_point is None else [set_point]
 
     def _land(self, now_s: float) -> list[Order]:
-        """Let the autopilot land, and disarm on the ground; fly on until it has changed its mode."""
+        """Let the autopilot land, and disarm on the ground; fly on, or stay, until it has changed its mode.
+
+        Without set-points PX4 would leave its guided mode, as at a switch of the human pilot.
+        """
         stack = self.stack
         if stack is None:
             return []
@@ -430,6 +437,8 @@ class LifeCycle:
             orders += [SetMode(stack.land)] if self._changes_mode.is_due(now_s) else []
             if self.steering.take_overs and not self._lands:
                 orders += self._steer(now_s)
+            elif not self.steering.take_overs:
+                orders += self._hover_at(self.course.target(0.0).position_m)
         if self._landed and self._arm.is_due(now_s):
             orders.append(Arm(arm=False))
         return orders
