@@ -158,6 +158,27 @@ def test_settings_derived_with_the_delay_of_the_link_fly_closer_over_it() -> Non
     assert rms_m(known) < 0.1 * rms_m(settings_for(drone()))
 
 
+@pytest.mark.long
+def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
+    """20 to 80 ms and a fifth lost, in place of 50: each state is carried to one age.
+
+    With states of the age at which they come the circle is half as far off again.
+    """
+    slow = DRONE.replace("dead_time_s = 0.04", "dead_time_s = 0.09").replace("time_s = 0.01", "time_s = 0.06")
+    settings = settings_for(vehicle_toml.parse(slow, "drone", "drone.toml").with_sensors("autopilot"))
+
+    def rms_m(faults: Faults) -> float:
+        link, updates = WiredLink("ardupilot", drone(), seed=1), list[Update]()
+        link.wire.to_pilot = link.wire.to_autopilot = faults
+        with Pilot(Controller(settings), lambda: link, updates.append) as pilot:
+            pilot.take_off(1.0)
+            pilot.fly(Circle(1.0, 1.5), 9.0)
+            pilot.land()
+        return horizontal_rms_m(updates, settled_s=4.0)
+
+    assert rms_m(Faults(lost=0.2, delay_s=0.02, jitter_s=0.06)) < 1.1 * rms_m(Faults(delay_s=0.05))
+
+
 class Hovering:
     """A pilot that hovers at 1 m behind a wire, in a flight in which something happens."""
 

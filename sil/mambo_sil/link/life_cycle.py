@@ -391,12 +391,11 @@ class LifeCycle:
         return orders
 
     def _steer(self, now_s: float) -> list[Order]:
-        """Return the controller's set-point for a fresh estimate, or a level one where none comes."""
-        estimate, fresh_s = self.estimates.take(), self.estimates.fresh_s
-        if estimate is not None and self._believes:
-            return self._step(estimate, now_s)
-        is_silent = not self._believes or now_s - fresh_s > PAUSE_S
-        if self.estimate is None or not is_silent or not self._level.is_due(now_s):
+        """Return the controller's set-point, once a period, or a level one where no fresh estimate comes."""
+        fresh_s, estimate = self.estimates.fresh_s, self.estimates.carried(now_s)
+        if estimate is not None and self._believes and now_s - fresh_s <= PAUSE_S:
+            return self._step(estimate, now_s) if self.steering.is_due(estimate) else []
+        if self.estimate is None or not self._level.is_due(now_s):
             return []
         return [self.steering.level(self.estimate.time_s + now_s - fresh_s)]
 
@@ -412,7 +411,7 @@ class LifeCycle:
         if not self.steering.is_accepted:
             if self.phase is Phase.FLYING and now_s - self._accepted_s > REFUSED_S:
                 self.land("the controller refuses the state, which is out of its [ranges]", good=False)
-            return [] if set_point is None else [set_point]
+            return [set_point]
         self._accepted_s = now_s
         if self.phase is Phase.FLYING and self.steering.pushed_s > PUSHED_S:
             most_m_s2 = self.steering.most_disturbance_m_s2
@@ -422,7 +421,7 @@ class LifeCycle:
         elif self.phase is Phase.FLYING and away_m > self.farthest_m:
             self.hold()
             self.land(f"the target is {away_m:.0f} m away; farthest_m = {self.farthest_m:g}", good=False)
-        return [] if set_point is None else [set_point]
+        return [set_point]
 
     def _land(self, now_s: float) -> list[Order]:
         """Let the autopilot land, and disarm on the ground; fly on, or stay, until it has changed its mode.

@@ -82,7 +82,7 @@ class Steering:
         self._jump: FrameJump | None = None
         """That of the estimator since the last step."""
         self._sent_rad, self._sent_m_s2, self._yaw_rad = np.zeros(2), self.hover_m_s2, 0.0
-        self._last_s = self._clock_s = -math.inf
+        self._clock_s = -math.inf
 
     def begin(self, estimate: EstimatedState) -> None:
         """Begin anew at an estimate, with the thrust of hover."""
@@ -98,20 +98,22 @@ class Steering:
         self._yaw_rad = yaw_rad - self.frame.heading_change_rad
         self.take_overs += 1
 
-    def steer(self, estimate: EstimatedState, targets: Targets) -> SetAttitude | None:
-        """Return the set-point for an estimate; None if it comes within the period of the last one.
+    def is_due(self, estimate: EstimatedState) -> bool:
+        """Return whether the period of the last set-point is over at an estimate."""
+        return estimate.time_s - self._clock_s > 0.5 * self.controller.update_period_s
 
-        The controller steps once for each of its periods that has passed: where estimates are lost, with
+    def steer(self, estimate: EstimatedState, targets: Targets) -> SetAttitude:
+        """Return the set-point for an estimate that is due.
+
+        The controller steps once for each of its periods that has passed: where the pilot was late, with
         states between the last one and this, and with the command that was sent last.
         """
-        if estimate.time_s - self._last_s > PAUSE_S:
+        period_s = self.controller.update_period_s
+        if estimate.time_s - self._clock_s > PAUSE_S:
             self.begin(estimate)
-        self._last_s, period_s = estimate.time_s, self.controller.update_period_s
-        steps = round((estimate.time_s - self._clock_s) / period_s)
+        steps = max(round((estimate.time_s - self._clock_s) / period_s), 1)
         self._clock_s += steps * period_s
         self._follow_frame(estimate)
-        if steps < 1:
-            return None
         self._steps += steps
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
@@ -185,7 +187,11 @@ class Steering:
         return SetAttitude(estimate.time_s, attitude_rad, thrust)
 
     def level(self, time_s: float) -> SetAttitude:
-        """Return a level set-point with the thrust of hover, for a drone whose state is not known."""
+        """Return a level set-point with the thrust of hover, for a drone whose state is not known.
+
+        The controller, which knows nothing of it, begins anew after it.
+        """
+        self._clock_s = -math.inf
         return SetAttitude(time_s, np.array([0.0, 0.0, self._heading_rad]), self.mean_thrust)
 
     @property
