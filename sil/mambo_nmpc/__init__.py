@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from mambo_sil.flight.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
     from mambo_sil.link.pilot import Pilot
+    from mambo_sil.plan.plans import Plan, plan
+    from mambo_sil.plan.points import PlanPoint
 
 __all__ = [
     "ArgumentError",
@@ -31,6 +33,8 @@ __all__ = [
     "Flown",
     "MamboNmpcError",
     "Pilot",
+    "Plan",
+    "PlanPoint",
     "StepOutcome",
     "TargetState",
     "Vehicle",
@@ -39,6 +43,7 @@ __all__ = [
     "command_in_frame",
     "draw_vehicles",
     "fly",
+    "plan",
 ]
 
 _HOMES: Final = {
@@ -50,6 +55,8 @@ _HOMES: Final = {
     "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
     "Pilot": "mambo_sil.link.pilot",
+    "Plan": "mambo_sil.plan.plans",
+    "PlanPoint": "mambo_sil.plan.points",
     "StepOutcome": "mambo_sil.flight.states",
     "TargetState": "mambo_sil.flight.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
@@ -58,6 +65,7 @@ _HOMES: Final = {
     "command_in_frame": "mambo_sil.flight.frames",
     "draw_vehicles": "mambo_sil.api.campaigns",
     "fly": "mambo_sil.api.flights",
+    "plan": "mambo_sil.plan.plans",
 }
 """The module of each name: imported at its first use, so that the command line starts at once."""
 

@@ -80,3 +80,9 @@ class LogError(MamboNmpcError):
 
     def __str__(self) -> str:
         return "\n".join(self.faults)
+
+
+class PlanError(MamboNmpcError):
+    """No plan is possible; the message says at which point, by which limit, by how much, what would do."""
+
+    exit_code: ClassVar[int] = 1

@@ -15,6 +15,7 @@ from mambo_sil.cli.command import Command, examples, root
 from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
 from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
 from mambo_sil.cli.fly.pilot import pilot
+from mambo_sil.cli.fly.plan import plan
 from mambo_sil.cli.generate import generate, identify_binary
 from mambo_sil.cli.margins import margins
 from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
@@ -33,7 +34,14 @@ PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
         "margins": margins,
     },
     "Generate": {"generate": generate, "identify-binary": identify_binary},
-    "Fly": {"fly": fly, "pilot": pilot, "campaign": campaign, "faults": faults, "replay": replay},
+    "Fly": {
+        "fly": fly,
+        "plan": plan,
+        "pilot": pilot,
+        "campaign": campaign,
+        "faults": faults,
+        "replay": replay,
+    },
     "Board": {"footprint": footprint, "sweep": sweep, "same-bits": same_bits},
     "Evidence": {"verify": verify, "regress": regress, "table2": table2, "report": report},
 }
@@ -59,6 +67,9 @@ mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
 mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
+mambo-nmpc plan points.csv --vehicle crazyflie -o lap.csv
+mambo-nmpc plan points.csv --vehicle crazyflie --closed --rate 0.9 -o slower.csv
+mambo-nmpc plan mission.plan --vehicle my-drone.toml -o mission.csv
 mambo-nmpc pilot controller.toml --link udp:127.0.0.1:14540 --trajectory circle --size-m 1
 mambo-nmpc pilot controller.toml --simulate px4 -o piloted
 mambo-nmpc table2 -o table2

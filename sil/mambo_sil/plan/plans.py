@@ -1,0 +1,106 @@
+"""Plans for programs: from points to a course that a drone flies."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mambo_sil.api.api_controller import Controller
+from mambo_sil.arguments import is_whole, require, require_kind, require_number
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.polynomials import PiecesInSpace
+from mambo_sil.plan.hermite import pieces_of
+from mambo_sil.plan.plan_plots import draw_plan
+from mambo_sil.plan.plan_report import PlanSummary, csv_text, summary_of
+from mambo_sil.plan.planning import Planned, Progress, make_plan
+from mambo_sil.plan.points import PlanPoint, check_points, read_points
+from mambo_sil.plan.solver import silent
+from mambo_sil.results.terminal import result_text
+
+LEAST_RATE, MOST_DRONES = 0.05, 1000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan:
+    """A course through points, and how drones have flown it; `print` shows that.
+
+    curve:   polynomial pieces; `fly` and adapters fly them.
+    summary: time, distances, limits and flights.
+    """
+
+    curve: PiecesInSpace
+    summary: PlanSummary
+    _planned: Planned
+
+    def __repr__(self) -> str:
+        """Return what the command prints."""
+        return result_text(self.summary.result())
+
+    @property
+    def text(self) -> str:
+        """The CSV file of the pieces."""
+        return csv_text(self._planned)
+
+    def draw(self, stem: Path) -> tuple[Path, Path]:
+        """Draw path, height and shares of the limits; writes stem.png and stem.svg."""
+        return draw_plan(self._planned, stem)
+
+
+def plan(
+    points: str | Path | Sequence[PlanPoint | tuple[float, float, float]],
+    vehicle: Vehicle,
+    controller: Controller | None = None,
+    *,
+    closed: bool = False,
+    rate: float = 1.0,
+    drones: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Plan:
+    """Plan the quickest course through points that a drone and others like it fly, and fly it with them.
+
+    points:     a CSV file or a mission of QGroundControl, or points in m, x ahead, y to the left, z up. If
+                they have times, the course of least snap at these times.
+    controller: its settings fly; None for those that `design` derives.
+    closed:     return to the first point, in a lap that repeats.
+    rate:       speed over that of the quickest plan, at most 1.
+    drones:     how many are drawn as by `draw_vehicles` with `seed`.
+    progress:   called with what is being done, and the share that is done.
+
+    Raises ArgumentError, TrajectoryError for points that cannot be planned, PlanError if no plan keeps the
+    limits or is flown, BuildError, CacheError.
+    """
+    require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
+    require_kind("controller", controller, (Controller, type(None)), "a Controller")
+    require_number("rate", rate, LEAST_RATE, 1.0)
+    require(is_whole(drones, 1, MOST_DRONES), "drones", drones, f"be a whole number in 1..{MOST_DRONES}")
+    planned = make_plan(
+        _points(points),
+        vehicle,
+        None if controller is None else controller.settings,
+        closed=closed,
+        rate=rate,
+        drones=drones,
+        seed=seed,
+        progress=progress,
+    )
+    course = planned.course
+    return Plan(pieces_of(course.knots, course.duration_s), summary_of(planned, vehicle.drone), planned)
+
+
+def _points(points: object) -> tuple[PlanPoint, ...]:
+    if isinstance(points, str | Path):
+        return read_points(Path(points))
+    require(isinstance(points, Sequence), "points", points, "be a file, or a sequence of points")
+    found = []
+    for point in points if isinstance(points, Sequence) else ():
+        if isinstance(point, PlanPoint):
+            found.append(point)
+            continue
+        try:
+            x_m, y_m, z_m = (float(one) for one in point)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"points: {point!r} must be a PlanPoint, or x, y and z in m") from None
+        found.append(PlanPoint(x_m, y_m, z_m))
+    check_points(found)
+    return tuple(found)

@@ -1,0 +1,124 @@
+"""Whole plans: flown by the drones that judge them, written as pieces, refused in words."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
+from mambo_sil.errors import ArgumentError, PlanError, TrajectoryError
+from mambo_sil.flight.polynomials import read_course
+from mambo_sil.plan.plan_flight import _crossed_m, _nearest_m
+from mambo_sil.plan.plans import Plan
+from tests.support.command import run
+
+POINTS = [(0.0, 0.0, 1.0), (0.8, 0.4, 1.1), (0.6, -0.6, 1.0)]
+
+
+@pytest.fixture(scope="module")
+def made() -> Plan:
+    """Return a plan of a Crazyflie, judged by three drawn ones."""
+    return plan(POINTS, Vehicle.from_preset("crazyflie"), drones=3)
+
+
+def test_a_plan_is_flown_by_all_its_drones(made: Plan) -> None:
+    """Verdict and figures are those of the flights, and `print` shows them."""
+    summary = made.summary
+    assert (summary.good, summary.flown, summary.passed) == (True, 4, 4)
+    assert summary.largest_miss_m <= 0.1
+    assert summary.time_s == pytest.approx(made.curve.duration_s)
+    assert f"crazyflie: {summary.time_s:.2f} s through 3 points" in repr(made)
+
+
+def test_another_flight_passes_the_points_too(made: Plan) -> None:
+    """`fly` with the same settings and other noise, judged by the trace alone."""
+    controller = Controller.from_vehicle("crazyflie")
+    flown = fly(
+        controller,
+        Vehicle.from_preset("crazyflie"),
+        made.curve,
+        duration_s=made.curve.duration_s + 1.0,
+        sensors="mocap",
+        seeds=(11,),
+    )
+    path_m = flown.trace.position_m[:, 0] * [1.0, -1.0, -1.0]
+    for point in POINTS[1:]:
+        assert np.linalg.norm(path_m - point, axis=1).min() < 0.1
+
+
+def test_the_file_reads_back_to_the_same_course(made: Plan, tmp_path: Path) -> None:
+    """`read_course`, which `fly --trajectory` and `pilot` use, gives the curve of the plan."""
+    path = tmp_path / "lap.csv"
+    path.write_text(made.text, "utf-8")
+    read, times_s = read_course(path), np.linspace(0.0, made.curve.duration_s, 50)
+    np.testing.assert_array_equal(read.target(times_s), made.curve.target(times_s))
+    np.testing.assert_array_equal(read.acceleration(times_s), made.curve.acceleration(times_s))
+
+
+def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
+    """Given times, at a rate: the pieces last as long as the times over the rate; `fly` takes the file."""
+    points, lap = tmp_path / "points.csv", tmp_path / "lap.csv"
+    points.write_text("x,y,z,time\n0,0,1,0\n0.8,0.4,1.1,2\n0.6,-0.6,1,4.5\n", "utf-8")
+    arguments = "plan", str(points), "--vehicle", "crazyflie", "--rate", "0.9", "--drones", "2"
+    printed, said = run(*arguments, "-o", str(lap))
+    assert "crazyflie: 5.00 s through 3 points" in printed
+    assert "lap.png" in said
+    assert (tmp_path / "lap.png").is_file()
+    assert len(lap.read_text("utf-8").splitlines()) == 3
+    _, refused = run(*arguments, "-o", str(lap), code=2)
+    assert "already exists" in refused
+    flown = "fly", "crazyflie", "--vehicle", "crazyflie", "--trajectory", str(lap), "--duration-s", "5"
+    run(*flown, "--no-pictures", "-o", str(tmp_path / "flown"))
+
+
+def test_times_that_are_too_short_name_point_limit_and_rate() -> None:
+    """Where, when, which limit, by how much; the rate that is offered does it."""
+    points = [PlanPoint(*place, time_s=time_s) for place, time_s in zip(POINTS, (0.0, 0.5, 1.0), strict=True)]
+    vehicle = Vehicle.from_preset("crazyflie")
+    with pytest.raises(
+        PlanError, match=r"(at|between) points? \d.* after the start: passes the limit of"
+    ) as raised:
+        plan(points, vehicle, drones=2)
+    offered = re.search(r"--rate (0\.\d+) would do", str(raised.value))
+    assert offered is not None
+    assert plan(points, vehicle, drones=2, rate=float(offered[1])).curve.duration_s > 1.0
+
+
+def test_a_point_behind_a_wall_is_refused() -> None:
+    """The message names the point, the fence, and how far beyond it is."""
+    fenced = Controller.from_preset("mambo", fence_m=(-1.0, 0.5, -2.0, 2.0))
+    with pytest.raises(PlanError, match=r"point 2.*passes the limit of fence by 0\.[23]\d m"):
+        plan(POINTS, Vehicle.from_preset("mambo"), fenced, drones=1)
+
+
+def test_a_tolerance_below_the_noise_is_refused_with_one_that_would_do() -> None:
+    """No plan is so slow that a drone seen with noise passes within a millimetre."""
+    points = [PlanPoint(*place, tolerance_m=0.001) for place in POINTS[:2]]
+    with pytest.raises(PlanError, match=r"point 2: \d of 2 drones pass it.* tolerance = 0\.\d+ would do"):
+        plan(points, Vehicle.from_preset("crazyflie"), drones=1)
+
+
+def test_a_turn_that_is_too_quick_is_refused() -> None:
+    """The heading may turn by 4 rad/s at most."""
+    points = [PlanPoint(0, 0, 1, time_s=0.0, yaw_rad=0.0), PlanPoint(0.3, 0, 1, time_s=1.2, yaw_rad=3.0)]
+    with pytest.raises(TrajectoryError, match=r"points 1 to 2: a turn by 3\.00 rad in 1\.20 s"):
+        plan(points, Vehicle.from_preset("crazyflie"), drones=1)
+
+
+def test_what_is_no_point_is_refused() -> None:
+    """Two numbers are no point, a rate of 2 no rate."""
+    vehicle = Vehicle.from_preset("crazyflie")
+    with pytest.raises(ArgumentError, match="must be a PlanPoint, or x, y and z"):
+        plan([(0.0, 1.0), (1.0, 1.0)], vehicle)  # type: ignore[list-item]
+    with pytest.raises(ArgumentError, match=r"rate = 2\.0 must lie in"):
+        plan(POINTS, vehicle, rate=2.0)
+
+
+def test_distances_of_a_path_by_hand() -> None:
+    """A path past the origin, between its samples; through a plane beside it; and one that turns back."""
+    past = np.array([[-1.0, 0.3, 0.0], [1.0, 0.3, 0.0]])[:, np.newaxis]
+    assert _nearest_m(past) == pytest.approx([0.3])
+    normal = np.array([1.0, 0.0, 0.0])
+    assert _crossed_m(past + np.array([0.5, 0.0, 0.0]), normal) == pytest.approx([0.3])
+    assert _crossed_m(past[::-1], normal) == [np.inf]
