@@ -54,8 +54,9 @@ def test_things_that_are_not_alike_have_no_remaining_time() -> None:
 
 
 def test_a_command_without_a_bar_says_that_it_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After `FIRST_LINE_S`; a bar says it otherwise."""
+    """On a terminal, after `FIRST_LINE_S`; a bar says it otherwise."""
     stream = Stream()
+    monkeypatch.setattr(stream, "isatty", lambda: True)
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "FIRST_LINE_S", 0.0)
     with progress.announced("margins"):

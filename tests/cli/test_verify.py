@@ -1,14 +1,17 @@
 """The command verify, used as a person would: lines, verdict, evidence, and what a missing tool does."""
 
 import json
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.presets import preset
 from mambo_sil.results.terminal import result_text
 from mambo_sil.verify.check import CHECKS, CheckOutcome
+from mambo_sil.verify.sarif import sarif
 from mambo_sil.verify.verify_report import Verified, summarise, verdict
 from tests.support.command import run, unwrapped
 from tests.support.tools import require
@@ -70,11 +73,35 @@ def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
     assert (tmp_path / "verification" / "controller" / "nmpc.c").is_file()
 
 
+def test_sarif_has_a_result_for_each_check_that_did_not_pass() -> None:
+    """Of rules the lines that break them, in addresses that an editor finds; a passed check has none."""
+    passed, failed, incomplete = CheckOutcome.PASSED, CheckOutcome.FAILED, CheckOutcome.INCOMPLETE
+    warnings, rules, proof = ended(passed, failed, incomplete)
+    broken = [{"file": "nmpc.c", "line": 7, "rule": "misra-c2012-10.4", "message": "types"}]
+    found = [warnings, replace(rules, figures={"findings": broken}), replace(proof, evidence="no frama-c")]
+    document = json.loads(sarif(summarise(found, "mambo", preset("mambo")), Path("an evidence/controller")))
+    assert document["version"] == "2.1.0"
+    (run_,) = document["runs"]
+    ids = [rule["id"] for rule in run_["tool"]["driver"]["rules"]]
+    assert ids == [entry.name for entry in CHECKS]
+    results = run_["results"]
+    assert [(one["ruleId"], one["level"]) for one in results] == [("rules", "error"), ("proof", "warning")]
+    assert [ids[one["ruleIndex"]] for one in results] == ["rules", "proof"]
+    assert [one["message"]["text"] for one in results] == ["misra-c2012-10.4: types", "no frama-c"]
+    (place,) = results[0]["locations"]
+    assert place["physicalLocation"] == {
+        "artifactLocation": {"uri": "an%20evidence/controller/nmpc.c"},
+        "region": {"startLine": 7},
+    }
+
+
 @pytest.mark.usefixtures("_no_tool")
 def test_an_earlier_run_is_replaced_and_nothing_else(tmp_path: Path) -> None:
     """What somebody put between the reports is not lost."""
     run("verify", "--only", "rules,proof", code=1)
-    run("verify", "--only", "rules", code=1)
+    _, talk = run("verify", "--only", "rules", "--sarif", code=1)
+    assert "summary.json, verify.sarif, controller/" in talk
+    assert (tmp_path / "verification" / "verify.sarif").is_file()
     assert [path.name for path in (tmp_path / "verification" / "checks").iterdir()] == ["rules"]
     (tmp_path / "verification" / "checks" / "notes.txt").write_text("mine")
     _, talk = run("verify", "--only", "rules", code=2)

@@ -25,6 +25,7 @@ from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix
+from mambo_codegen.bundle.sbom import with_sbom
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -80,7 +81,7 @@ def render(settings: Settings, *, with_digest: bool = True) -> dict[str, str]:
     project = {
         path: templates.get_template(f"project/{name}.j2").render(context) for name, path in PROJECT.items()
     }
-    return _finish(library | project, settings)
+    return with_sbom(_finish(library | project, settings))
 
 
 def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
@@ -113,7 +114,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         for path in templates.list_templates(extensions=["j2"])
         if path.startswith(own)
     }
-    return library | _finish(files, settings)
+    return with_sbom(library | _finish(files, settings))
 
 
 def _pil_payload_bytes(method: Method) -> int:

@@ -48,6 +48,9 @@ def verify(
     ] = None,
     output: Results = Path("verification"),
     scalar: Scalar = None,
+    as_sarif: Annotated[
+        bool, typer.Option("--sarif", help="Write verify.sarif too, for source hosts and editors.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Generate the C of a controller, prove and test it, and keep the evidence.
@@ -57,13 +60,14 @@ def verify(
     from mambo_codegen.bundle import bundle
     from mambo_codegen.bundle.render import render
     from mambo_sil.results.html_page import results_page
+    from mambo_sil.verify.sarif import SARIF, sarif
     from mambo_sil.verify.verify_report import PAGE, VerifySummary, summarise
 
     settings = load(source, scalar)
     chosen = _chosen_checks(only)
     check_tmpdir()
     with (
-        new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE)) as place,
+        new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE, SARIF)) as place,
         counting_bar("generating the C", "checks", len(chosen), alike=False) as bar,
     ):
         folder = place.resolve()
@@ -73,9 +77,12 @@ def verify(
         (folder / PAGE).write_text(
             results_page([(str(output), summary.result(folder))], [summary.generator]), "utf-8"
         )
+        if as_sarif:
+            (folder / SARIF).write_text(sarif(summary, output / CONTROLLER), "utf-8")
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
-    show_result(summary, output, (PAGE, SUMMARY, CONTROLLER, REPORTS), as_json=as_json)
+    written = (PAGE, SUMMARY, *((SARIF,) if as_sarif else ()), CONTROLLER, REPORTS)
+    show_result(summary, output, written, as_json=as_json)
     if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
 

@@ -17,7 +17,7 @@ from mambo_sil.cli.options import (
     sensors_option,
     show_result,
 )
-from mambo_sil.cli.progress import counting_bar
+from mambo_sil.cli.progress import counting_bar, progress_bar
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
 from mambo_sil.results.folders import SUMMARY
@@ -78,7 +78,8 @@ def margins(
     if campaign is None:
         drone = load_drone(vehicle, source)
         subject = MarginSubject(source, settings, drone, sensors or "true")
-        summary = measure(subject, _corners(subject) if uncertainty else None, output)
+        with progress_bar("measuring"):
+            summary = measure(subject, _corners(subject) if uncertainty else None, output)
     else:
         drawing = _campaign(campaign, vehicle, vehicle_toml.of_settings(source), sensors)
         subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "true")

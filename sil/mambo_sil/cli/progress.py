@@ -93,8 +93,10 @@ def counting_bar(stage: str, things: str, total: int, *, alike: bool = True) -> 
 
 @contextmanager
 def announced(name: str) -> Iterator[None]:
-    """Say that the command `name` works if it has shown no bar for `FIRST_LINE_S`."""
+    """Say on a terminal that the command `name` works if it has shown no bar for `FIRST_LINE_S`."""
     _SHOWS.clear()
+    if not sys.stderr.isatty():
+        _SHOWS.set()
     begun = Bar(name, 1.0)
 
     def announce() -> None:

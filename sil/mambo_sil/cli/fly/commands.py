@@ -215,7 +215,8 @@ def replay(
     from mambo_sil.model.replay.replay_report import CURVES, PICTURES, LogReplaySummary, summarise
 
     settings = load(source, scalar)
-    replayed = replay_log(log, parse_columns(columns, SIGNALS), settings)
+    with progress_bar("replaying"):
+        replayed = replay_log(log, parse_columns(columns, SIGNALS), settings)
     summary = summarise(replayed, str(log), source, settings.digest)
     with new_results(output, LogReplaySummary.command, (CURVES, *PICTURES)) as folder:
         write_curves(replayed, folder / CURVES)
