@@ -1,5 +1,6 @@
 """The interface for programs: the C's bits, shapes that are checked, frames that agree with rotations."""
 
+import copy
 import subprocess
 import sys
 import warnings
@@ -311,6 +312,50 @@ def test_a_drone_in_any_frame_gets_the_same_command(frame: FrameName) -> None:
     here = Controller.from_preset("crazyflie").step(ned, goal).command_rad
     there = Controller.from_preset("crazyflie").step(told, aim).command_rad
     np.testing.assert_allclose(there, here, atol=1e-6)
+
+
+QUAD = (Path(__file__).parents[2] / "examples" / "quad.toml").read_text("utf-8")
+LEVER_M = (0.03, -0.02, 0.05)
+
+
+def levered(folder: Path) -> Path:
+    """Write the file of a drone whose state is known beside its centre of mass."""
+    path = folder / "levered.toml"
+    path.write_text(QUAD.rstrip() + f"\nlever_m = {list(LEVER_M)}\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("frame", AXES)
+def test_a_state_beside_the_centre_of_mass_gets_the_command_of_the_centre(
+    frame: FrameName, tmp_path: Path
+) -> None:
+    """Whatever the frame: the place, turned, and its speed about the centre, are taken away."""
+    (tmp_path / "plain.toml").write_text(QUAD, "utf-8")
+    plain, other = (Controller.from_vehicle(path) for path in (tmp_path / "plain.toml", levered(tmp_path)))
+    body = AXES["NED"] if frame == "NED" else AXES["NWU"]
+    rng = np.random.default_rng(4)
+    target = TargetState(np.zeros(3), np.zeros(3), yaw_rad=0.0)
+    for _ in range(5):
+        position, velocity, rates = rng.normal(0.0, 0.3, (3, 3))
+        euler = rng.normal(0.0, 0.4, 3)
+        turned = Rotation.from_euler("xyz", euler)
+        there = position + turned.apply(LEVER_M), velocity + turned.apply(np.cross(rates, LEVER_M))
+        place, speed = (vectors_to_ned(frame, one) for one in there)
+        angles = attitude_to_ned(frame, euler)
+        beside = DroneState.in_frame(frame, place, speed, angles, rates_rad_s=body @ rates)
+        found = other.step(beside, target)
+        expected = plain.step(DroneState(position, velocity, euler), target)
+        np.testing.assert_allclose(found.command_rad, expected.command_rad, rtol=0, atol=1e-6)
+        assert found.thrust_m_s2 == pytest.approx(expected.thrust_m_s2, abs=1e-4)
+
+
+def test_a_state_beside_the_centre_of_mass_wants_rates(tmp_path: Path) -> None:
+    """The message names the key, and what else may be meant; a copy of the controller wants them too."""
+    controller = Controller.from_vehicle(levered(tmp_path))
+    state = DroneState(np.zeros(3), np.zeros(3), np.zeros(3))
+    for one in (controller, copy.deepcopy(controller)):
+        with pytest.raises(ArgumentError, match=r"rates_rad_s is missing; sensors.lever_m = \[0.03, -0.02"):
+            one.step(state, TargetState(np.zeros(3), np.zeros(3)))
 
 
 def test_a_flight_is_that_of_the_command_and_leaves_the_controller_alone() -> None:

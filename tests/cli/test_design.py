@@ -38,7 +38,7 @@ def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
-    wrote, *height, reach, flown, pushed, roll, pitch, least = said.splitlines()
+    wrote, *height, reach, flown, pushed, seen, roll, pitch, least = said.splitlines()
     assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml"
     height_text = unwrapped("\n".join(height))
     assert height_text.startswith(
@@ -47,6 +47,7 @@ def test_it_writes_a_file_that_flies() -> None:
     assert reach == "largest horizontal acceleration: 4.5 m/s^2, by limits.tilt_rad = 0.5"
     assert flown == "flown for 10 s: stays at its target (true state)"
     assert pushed == "bears a steady push of 4 m/s^2 from every side"
+    assert re.fullmatch(r"bears to be seen \d+ cm below and \d+ cm above where sensors\.lever_m says", seen)
     assert re.fullmatch(r"roll: tolerates [\d.]+ times the gain or \d+ ms more delay \(true state\)", roll)
     assert pitch == roll.replace("roll", "pitch")
     assert re.fullmatch(r"least margin: (roll|pitch), .* at the command", least)
@@ -98,7 +99,8 @@ def test_firm_settings_come_with_their_price() -> None:
     """After the push that they bear; the file says what is firm."""
     _, said = run("design", "crazyflie-flown", "--firm")
     assert re.search(
-        r"bears a steady push of 3 m/s\^2 from every side firm: a push of 0\.5 m/s\^2 moves it by \d+ mm, "
+        r"bears a steady push of 3 m/s\^2 from every side bears to be seen .* lever_m says "
+        r"firm: a push of 0\.5 m/s\^2 moves it by \d+ mm, "
         r"with --calm by \d+; its commands change [\d.]+ times as much flown on the desk",
         unwrapped(said),
     )

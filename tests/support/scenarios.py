@@ -125,9 +125,9 @@ LATE: Final = changed(
         "roll_trim_rad": 0.013,
         "pitch_trim_rad": -0.021,
     },
-    sensors={"position_rate_hz": 50, "position_delay_s": 0.006},
+    sensors={"position_rate_hz": 50, "position_delay_s": 0.006, "lever_m": (0.02, -0.03, 0.05)},
 )
-"""Two different angles with trims, whose dead times are no multiples of a tick."""
+"""Two different angles with trims, whose dead times are no multiples of a tick; markers below and beside."""
 LAGGING: Final = changed(LATE, thrust={"gain": 0.9, "lag_s": 0.06, "dead_time_s": 0.0151})
 """The same, with a thrust that lags."""
 
@@ -293,6 +293,7 @@ def drones() -> st.SearchStrategy[VehicleFile]:
             "position_rate_hz": st.sampled_from([20, 50, 100]),
             "position_delay_s": _within(0.0, 0.2),
             "velocity_filter_s": st.one_of(st.just(0.0), _within(0.001, 1.0)),
+            "lever_m": st.one_of(st.just((0.0, 0.0, 0.0)), st.tuples(*[_within(-0.3, 0.3)] * 3)),
         }
     )
     cascades = st.fixed_dictionaries({"rate_hz": tick, "roll": axis, "pitch": axis, "yaw": axis})

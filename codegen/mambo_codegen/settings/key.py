@@ -9,8 +9,8 @@ from typing import Any
 class Key:
     """One setting: its dotted path, its description and its allowed values.
 
-    `kind` is "whole number", "number", "one of" or "text"; `domain` says in words which values are allowed;
-    `rule` follows "must" in a message; `low` and `high` bound a number and are None for text.
+    `kind` is "whole number", "number", "numbers", "one of" or "text"; `domain` says in words which values are
+    allowed; `rule` follows "must" in a message; `low` and `high` bound a number and are None for text.
     """
 
     path: str
@@ -59,6 +59,10 @@ def key_of(path: str, schema: dict[str, Any]) -> Key:
     if "pattern" in schema:
         words = f"lower-case letters, digits and single inner underscores, at most {schema['maxLength']}"
         return Key(path, description, "text", words, f"be {words}, a letter first")
+    if "prefixItems" in schema:
+        low, high = (schema["prefixItems"][0][bound] for bound in ("minimum", "maximum"))
+        domain = f"{len(schema['prefixItems'])} numbers in {low:.10g}..{high:.10g}"
+        return Key(path, description, "numbers", domain, f"be {domain}")
     low, high = schema["minimum"], schema["maximum"]
     kind = "whole number" if schema["type"] == "integer" else "number"
     if "not" in schema:

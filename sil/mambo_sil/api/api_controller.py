@@ -29,6 +29,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import PlacedSensors
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
 from mambo_sil.flight.controllers.controller_library import generator_digest
@@ -41,6 +42,7 @@ from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 LARGEST_N: Final = 1_000_000
+Lever = tuple[float, float, float]
 
 _RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active", "thrust_m_s2")
 """The results of a step in C that a program gets."""
@@ -66,6 +68,7 @@ class Controller:
         self._step = self._compiled.stepper(self._inputs, self._outcome)
         self._height = height
         self._heading = Heading(self._compiled)
+        self._lever_m: Lever | None = None
 
     def __repr__(self) -> str:
         """Return the settings id, how many drones there are, and what is commanded."""
@@ -143,6 +146,8 @@ class Controller:
             rule = "be left out: the settings have [height], so the controller itself commands the thrust"
             require(changed.height is None, "height", name, rule)
         controller = cls(changed, n)
+        if drone is not None and isinstance(drone.sensors, PlacedSensors) and any(drone.sensors.lever_m):
+            controller._lever_m = drone.sensors.lever_m
         if name is not None:
             if drone is None:
                 raise ArgumentError(
@@ -169,6 +174,8 @@ class Controller:
         states or targets without z where the thrust is commanded.
         """
         batch = self._batch(state, target)
+        if self._lever_m is not None:
+            state = state.at_centre(self._lever_m)
         flies_height = self._method.has_height or self._height is not None
         if flies_height:
             left_out, rule = thrust_acceleration_m_s2 is None, "be left out: the step commands it"
@@ -296,6 +303,7 @@ class Controller:
             "settings": self.settings,
             "n": self.n,
             "height": self._height,
+            "lever_m": self._lever_m,
             "yaw_rad": self._heading.yaw_rad,
             "generator": generator_digest(),
             "instances": self._compiled.instances.tobytes(),
@@ -303,6 +311,7 @@ class Controller:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         Controller.__init__(self, state["settings"], state["n"], state["height"])
+        self._lever_m = state["lever_m"]
         instances = self._compiled.instances
         if (state["generator"], len(state["instances"])) != (generator_digest(), instances.nbytes):
             raise ArgumentError("state: was saved by another version, whose C may keep other numbers")

@@ -252,14 +252,23 @@ def _judgement(
     """
     from mambo_sil.api.app_flights import app_flight_of
     from mambo_sil.flight.flown_settings import FlownSettings
-    from mambo_sil.model.derive.derived_flight import firm_words, fly_derived, fly_pushed
+    from mambo_sil.model.derive.derived_flight import (
+        firm_words,
+        fly_beside,
+        fly_derived,
+        fly_pushed,
+    )
     from mambo_sil.model.derive.derived_margins import judge_margins
 
     fly_app = app_flight_of(drone)
     try:
         flown = [fly_derived(settings, drone)]
         bar.stage("flying in wind")
-        flown += [fly_pushed(settings, drone)] if flown[0].good else []
+        if flown[0].good:
+            flown.append(fly_pushed(settings, drone))
+            bar.stage("moving the sensors")
+            beside = fly_beside(settings, drone)
+            flown += [] if beside is None else [beside]
         if calm is not None:
             flown.append(FlownSettings(good=True, words=firm_words(settings, calm, drone)))
         if fly_app is not None:

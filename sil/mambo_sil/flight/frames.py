@@ -60,6 +60,16 @@ def attitude_to_ned(frame: FrameName, attitude_rad: ArrayLike) -> FloatArray:
     return converted
 
 
+def body_to_ned(frame: FrameName, vectors: ArrayLike, name: str = "rates_rad_s") -> FloatArray:
+    """Return vectors (..., 3) along forward, right, down of those along the body of another frame.
+
+    Raises ArgumentError for another frame, and for other shapes; it calls the vectors `name`.
+    """
+    require_choice("frame", frame, FRAMES)
+    array = with_columns(name, vectors, 3)
+    return array if frame == "NED" else np.asarray(array * _SIGNS["NWU"])
+
+
 def yaw_to_ned(frame: FrameName, yaw_rad: ArrayLike) -> FloatArray:
     """Return headings (...) in NED of those in another frame; raises ArgumentError."""
     require_choice("frame", frame, FRAMES)

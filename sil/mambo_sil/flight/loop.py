@@ -270,7 +270,8 @@ def fly(
             with np.errstate(all="ignore"):
                 state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
-                seen = true if suite is None else suite.estimate(true)
+                measured = vehicle.measured(true)
+                seen = measured if suite is None else suite.estimate(measured)
                 stock = not has_thrust and not open_loop
                 thrust_n = altitude.thrust_n(wanted, seen) if stock else take_off_n
             if tick == 0:

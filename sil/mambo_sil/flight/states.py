@@ -1,5 +1,6 @@
 """What n controllers receive, the states of drones and of their targets in NED, and what a step returns."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
@@ -8,10 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_sil.arguments import of_shape, require, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Seen, beside
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.frames import (
     FrameName,
     attitude_to_ned,
+    body_to_ned,
     command_in_frame,
     vectors_to_ned,
     with_columns,
@@ -34,6 +37,9 @@ class DroneState:
     """Roll (right side down), pitch (nose up), yaw (clockwise from above) (..., 3)."""
     grounded: NDArray[np.bool_]
     """Whether the drone touches the floor (...); read with `[height]` in the settings only."""
+    rates_rad_s: FloatArray | None = None
+    """About the axes of the body, forward, right, down (..., 3); read where `sensors.lever_m` of the vehicle
+    is not 0, or None."""
 
     def __init__(
         self,
@@ -41,6 +47,8 @@ class DroneState:
         velocity_m_s: ArrayLike,
         attitude_rad: ArrayLike,
         grounded: ArrayLike = False,
+        *,
+        rates_rad_s: ArrayLike | None = None,
     ) -> None:
         position = _vectors("position_m", position_m)
         batch = position.shape[:-1]
@@ -51,6 +59,8 @@ class DroneState:
         good = contact.dtype == np.bool_ and contact.shape in ((), batch)
         require(good, "grounded", grounded, f"be a truth value, or such of shape {batch}")
         object.__setattr__(self, "grounded", np.broadcast_to(contact, batch))
+        rates = None if rates_rad_s is None else of_shape("rates_rad_s", rates_rad_s, (*batch, 3))
+        object.__setattr__(self, "rates_rad_s", rates)
 
     @classmethod
     def in_frame(
@@ -60,6 +70,8 @@ class DroneState:
         velocity_m_s: ArrayLike,
         attitude_rad: ArrayLike,
         grounded: ArrayLike = False,
+        *,
+        rates_rad_s: ArrayLike | None = None,
     ) -> Self:
         """Return the states of drones in another frame; the arrays have the shapes of a DroneState."""
         return cls(
@@ -67,6 +79,32 @@ class DroneState:
             vectors_to_ned(frame, velocity_m_s, "velocity_m_s"),
             attitude_to_ned(frame, attitude_rad),
             grounded,
+            rates_rad_s=None if rates_rad_s is None else body_to_ned(frame, rates_rad_s),
+        )
+
+    def at_centre(self, lever_m: tuple[float, float, float]) -> Self:
+        """Return the states at the centre of mass of drones that are measured `lever_m` (body) from it.
+
+        Raises ArgumentError without rates.
+        """
+        if self.rates_rad_s is None:
+            raise ArgumentError(
+                f"state: rates_rad_s is missing; sensors.lever_m = {list(lever_m)} of the vehicle wants it; "
+                "leave lever_m out where position and velocity are those of the centre of mass"
+            )
+        axes = self.position_m.shape[-1]
+        columns = [np.zeros((3, math.prod(self.batch))) for _ in range(2)]
+        for column, vectors in zip(columns, (self.position_m, self.velocity_m_s), strict=True):
+            column[:axes] = vectors.reshape(-1, axes).T
+        turned = (vectors.reshape(-1, 3).T for vectors in (self.attitude_rad, self.rates_rad_s))
+        x, y, z = lever_m
+        centre = beside(Seen(*columns, *map(np.ascontiguousarray, turned)), (-x, -y, -z))
+        position_m, velocity_m_s = (
+            np.ascontiguousarray(moved[:axes].T).reshape(self.position_m.shape)
+            for moved in (centre.position_m, centre.velocity_m_s)
+        )
+        return type(self)(
+            position_m, velocity_m_s, self.attitude_rad, self.grounded, rates_rad_s=self.rates_rad_s
         )
 
     def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.autopilot import EstimatorErrors
@@ -55,6 +56,28 @@ def test_a_position_is_late() -> None:
         np.testing.assert_array_equal(
             seen.position_m, truth_at(max(5 * (tick // 5) - 7, 0)).position_m, str(tick)
         )
+
+
+LEVER_M = (0.04, -0.03, 0.05)
+
+
+def test_a_measured_place_beside_the_centre_of_mass_is_moved_back() -> None:
+    """Without a delay to where the centre of mass is, to rounding."""
+    for tick, seen in enumerate(observe(figures(lever_m=LEVER_M), 40)):
+        true = truth_at(5 * (tick // 5))
+        np.testing.assert_allclose(seen.position_m, true.position_m, rtol=0, atol=1e-15)
+
+
+def test_a_late_place_is_moved_back_by_the_attitude_of_now() -> None:
+    """What the drone has turned since, of R of Euler's angles, remains."""
+    for tick, seen in enumerate(observe(figures(lever_m=LEVER_M, position_delay_s=0.01), 40)[5::5]):
+        now, then = truth_at(5 * tick + 5), truth_at(5 * tick)
+        before, after = (
+            Rotation.from_euler("xyz", one.euler_rad[:, 0]).apply(LEVER_M) for one in (then, now)
+        )
+        off_m = (seen.position_m - then.position_m)[:, 0]
+        np.testing.assert_allclose(off_m, before - after, rtol=0, atol=1e-15)
+        assert np.abs(off_m).max() > 1e-4
 
 
 def test_without_a_filter_the_velocity_is_the_difference_quotient() -> None:

@@ -146,6 +146,14 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
         + "[altitude]\np_n_m = 1.0\nd_n_s_m = 1.0\nthrust_max_n = 1.9\n[thrust]\ngain = 0.5\nlag_s = 0.1\n",
         ["altitude.thrust_max_n = 1.9 must be more than 1.962, the weight of body.mass_kg over thrust.gain"],
     ),
+    "a place of two numbers": (
+        FLOWN + '[sensors]\nkind = "true"\nlever_m = [0.0, 0.05]\n',
+        ["sensors.lever_m = a list must be 3 numbers, each in -1..1, in metres"],
+    ),
+    "a place that is too far": (
+        FLOWN + '[sensors]\nkind = "true"\nlever_m = [0, 0, -50]\n',
+        ["sensors.lever_m = a list must be 3 numbers, each in -1..1, in metres"],
+    ),
     "a rate that does not divide": (
         FLOWN + f'[sensors]\nkind = "mocap"\nposition_rate_hz = 60\n{MOCAP}',
         ["sensors.position_rate_hz = 60 must be a divisor of 200 (attitude.rate_hz)"],

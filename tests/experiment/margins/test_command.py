@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,11 @@ import pytest
 
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.presets import preset
-from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.experiment.campaign.campaign_file import default
 from mambo_sil.experiment.margins.many_drones import campaign_drones
 from mambo_sil.experiment.margins.margins_record import PICTURES, RESPONSES
+from mambo_sil.model.derive.derived_flight import chosen_text
 from tests.support.command import run
 from tests.support.height_settings import height_settings
 
@@ -49,6 +51,16 @@ def test_it_says_in_words_how_far_the_edge_is() -> None:
     said, _ = run(*flown, "--all")
     assert "command: gain margin up" in said
     assert "motors: delay margin" in said
+
+
+def test_it_says_what_is_left_where_the_drone_is_seen_elsewhere() -> None:
+    """A slow loop keeps its margins; of a quick one 5 cm take all."""
+    said, _ = run("margins", "mambo")
+    assert re.search(r"\nseen 5 cm below the place told: 1\.\d+ times the gain, 3\d\.\d ms\n", said)
+    assert re.search(r"\nseen 10 cm above the place told: \d\.\d+ times the gain, 3\d\.\d ms\n", said)
+    Path("quick.toml").write_text(chosen_text(vehicle_toml.load("hummingbird"), "quick"), "utf-8")
+    said, _ = run("margins", "quick.toml", "--vehicle", "hummingbird", "--sensors", "mocap")
+    assert "\nseen 5 cm below the place told: roll is UNSTABLE\n" in said
 
 
 def test_a_drone_without_motors_is_broken_at_the_command_only() -> None:

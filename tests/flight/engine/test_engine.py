@@ -2,7 +2,7 @@
 
 import re
 import subprocess
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -78,6 +78,15 @@ def assert_same_bits(flight: Flight, kind: str) -> None:
 def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...], kind: str) -> None:
     """Every array of the trace: every disturbance, sensor, gate, and flights that are lost."""
     assert_same_bits(flight_of(batch, PERIOD_S), kind)
+
+
+@pytest.mark.parametrize("batch", ["truth", "late"])
+def test_drones_that_are_seen_elsewhere_have_the_bits_of_numpy(batch: str) -> None:
+    """Each at a place of its own beside the one that its controller was told."""
+    flight = flight_of(BATCHES[batch], PERIOD_S)
+    errors_m = np.random.default_rng(3).uniform(-0.1, 0.1, (3, flight.flights))
+    vehicle = replace(flight.vehicle, lever_error_m=tuple(errors_m))
+    assert_same_bits(replace(flight, vehicle=vehicle, duration_s=1.0), "pd")
 
 
 @pytest.mark.long

@@ -27,6 +27,7 @@ from mambo_sil.model.derive.derived_flight import (
     chosen_text,
     firm_words,
     flies_quick_circle,
+    fly_beside,
     fly_derived,
     fly_pushed,
     quick_rate_rad_s,
@@ -269,6 +270,22 @@ def test_the_place_that_is_seen_is_judged() -> None:
     assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) is None
     seen["seen_position_m"] = drifted.position_m
     assert _fault(SensedTrace(**columns, **seen), CRAZYFLIE, 3) == "FAR OFF, 400 mm along x in the mean"
+
+
+def test_a_drone_is_seen_elsewhere_until_it_swings() -> None:
+    """A Hummingbird, whose loop is quick, bears less than a Crazyflie; of other sensors nothing is said."""
+    reaches = []
+    for name in ("crazyflie", "hummingbird"):
+        drone = vehicle_toml.preset(name)
+        seen = fly_beside(settings_for(drone), drone)
+        assert seen is not None
+        assert seen.good
+        found = re.fullmatch(r"bears to be seen (\d+) cm below and (\d+) cm above where .*says", seen.words)
+        assert found
+        reaches.append((int(found[1]), int(found[2])))
+    assert reaches[1][0] < reaches[0][0] <= 5
+    mambo = vehicle_toml.preset("mambo")
+    assert fly_beside(preset("mambo"), mambo) is None
 
 
 def borne_m_s2(settings: Settings, drone: VehicleFile) -> float:

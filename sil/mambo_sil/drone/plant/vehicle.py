@@ -34,8 +34,13 @@ from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, FirstOrde
 STEP_S: Final = NOMINAL.step_s
 """The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
 
+Lever = tuple[PerFlight, PerFlight, PerFlight]
+
 LARGEST_LAG_S: Final = 1.0
 LARGEST_DRAG_1_S: Final = 100.0
+LARGEST_LEVER_M: Final = 1.0
+LEVER_ERRORS_M: Final = (0.05, -0.05, -0.1)
+"""How far below where they are told to be sensors lie when margins and faults try it: above is negative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +80,26 @@ def truth(state: VehicleState) -> Seen:
     return Seen(body[POSITION], velocity_m_s, body[EULER], body[RATES])
 
 
+def arm_in_world(euler_rad: FloatArray, lever_m: Lever) -> FloatArray:
+    """Return the way (3, n) from the centre of mass to a place that lies `lever_m` from it in the body."""
+    arm_m = np.empty_like(euler_rad)
+    for row in range(3):
+        arm_m[row] = lever_m[row]
+    return to_world(*sine_cosine(euler_rad), arm_m)
+
+
+def beside(seen: Seen, lever_m: Lever) -> Seen:
+    """Return what is seen at a place that lies `lever_m` (forward, right, down) from the place that is."""
+    x, y, z = lever_m
+    p, q, r = seen.rates_rad_s
+    moving_m_s = np.stack([q * z - r * y, r * x - p * z, p * y - q * x])
+    return replace(
+        seen,
+        position_m=seen.position_m + arm_in_world(seen.euler_rad, lever_m),
+        velocity_m_s=seen.velocity_m_s + to_world(*sine_cosine(seen.euler_rad), moving_m_s),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Moment:
     """Disturbances during one tick; the default is undisturbed."""
@@ -98,6 +123,8 @@ class Vehicle:
     motor_lag_s: PerFlight = NOMINAL.motor_lag_s
     drag_1_s: PerFlight = NOMINAL.body.drag_1_s
     drone: VehicleFile = NOMINAL
+    lever_error_m: Lever = (0.0, 0.0, 0.0)
+    """How far what measures lies from where `sensors.lever_m` says, along the axes of the body."""
 
     def __repr__(self) -> str:
         """Return the drone's name, mass, loop and sensors."""
@@ -116,6 +143,8 @@ class Vehicle:
         """Raise ArgumentError unless every array has one value for each flight; None: any number of them."""
         require_per_flight("motor_lag_s", self.motor_lag_s, 0.0, LARGEST_LAG_S, flights)
         require_per_flight("drag_1_s", self.drag_1_s, 0.0, LARGEST_DRAG_1_S, flights)
+        for along in self.lever_error_m:
+            require_per_flight("lever_error_m", along, -LARGEST_LEVER_M, LARGEST_LEVER_M, flights)
 
     @classmethod
     def of(cls, drone: VehicleFile) -> "Vehicle":
@@ -148,6 +177,15 @@ class Vehicle:
                 return CascadeLoop(self.drone, attitude)
             case FirstOrderAttitude() as attitude:
                 return FirstOrderDrone(self.drone, attitude)
+
+    @cached_property
+    def is_seen_beside(self) -> bool:
+        """Whether any drone is seen at another place than its controller was told."""
+        return any(bool(np.any(along)) for along in self.lever_error_m)
+
+    def measured(self, true: Seen) -> Seen:
+        """Return the true state of drones where it is measured."""
+        return beside(true, self.lever_error_m) if self.is_seen_beside else true
 
     @cached_property
     def rotors(self) -> Rotors:

@@ -1,7 +1,8 @@
 """Motion capture of n flights: late, noisy positions at a fixed rate, and the drone's own attitude.
 
 The velocity is the difference quotient of successive positions behind a first-order low-pass. Position and
-velocity are held between positions; attitude, with noise, and body rates are new at every tick.
+velocity are held between positions; attitude, with noise, and body rates are new at every tick. What is
+measured lies `lever_m` from the centre of mass: the attitude of now moves a position that arrives back to it.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.elementary import exponential
 from mambo_sil.drone.plant.randomness import Draws, Purpose
-from mambo_sil.drone.plant.vehicle import Seen
+from mambo_sil.drone.plant.vehicle import Seen, arm_in_world
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
 NOISES: Final = 6
@@ -63,28 +64,37 @@ class MocapSuite:
         self._sampling = sampling(capture.figures, step_s)
         self._noise = mocap_deviations(capture, len(seeds))
         self._draws = Draws(seeds, Purpose.SENSORS, NOISES)
-        self._late_m = [start.position_m] * self._sampling.delay_ticks
+        self._lever_m = capture.figures.lever_m
+        self._late_m = [self._at_lever(start)] * self._sampling.delay_ticks
         self._position_m = start.position_m
         self._velocity_m_s = start.velocity_m_s
         self._tick = 0
 
     def place(self, start: Seen, put: NDArray[np.bool_]) -> None:
         """Start again with the drones that are `put` (n,) elsewhere, at their true state."""
-        self._late_m = [np.where(put, start.position_m, late_m) for late_m in self._late_m]
+        self._late_m = [np.where(put, self._at_lever(start), late_m) for late_m in self._late_m]
         self._position_m = np.where(put, start.position_m, self._position_m)
         self._velocity_m_s = np.where(put, start.velocity_m_s, self._velocity_m_s)
 
     def estimate(self, true: Seen) -> Seen:
         """Return what the controllers receive at this tick."""
         noise = self._noise * self._draws.next()
-        self._late_m.append(true.position_m)
-        arriving_m = self._late_m.pop(0)
+        self._late_m.append(self._at_lever(true))
+        arriving_m, euler_rad = self._late_m.pop(0), true.euler_rad + noise[3:]
         if self._tick % self._sampling.period_ticks == 0:
             position_m = arriving_m + noise[:3]
+            if any(self._lever_m):
+                position_m = position_m - arm_in_world(euler_rad, self._lever_m)
             if self._tick > 0:
                 quotient = (position_m - self._position_m) / self._sampling.period_s
                 change = self._sampling.share * (quotient - self._velocity_m_s)
                 self._velocity_m_s = self._velocity_m_s + change
             self._position_m = position_m
         self._tick += 1
-        return Seen(self._position_m, self._velocity_m_s, true.euler_rad + noise[3:], true.rates_rad_s)
+        return Seen(self._position_m, self._velocity_m_s, euler_rad, true.rates_rad_s)
+
+    def _at_lever(self, true: Seen) -> FloatArray:
+        """Return the places (3, n) that are measured."""
+        if not any(self._lever_m):
+            return true.position_m
+        return true.position_m + arm_in_world(true.euler_rad, self._lever_m)

@@ -6,7 +6,8 @@ part of the JSON schema and of the messages.
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 LONGEST_DELAY_S = 0.2
 """Longest dead time of an attitude loop and longest delay of a sensor."""
@@ -29,6 +30,8 @@ Delay = Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)]
 Noise = Annotated[float, Field(ge=0, le=1e6)]
 Trim = Annotated[float, Field(ge=-0.2, le=0.2)]
 HalfWidth = Annotated[float, Field(ge=0, le=1e6)]
+LONGEST_ARM_M = 1.0
+Arm = Annotated[float, Field(ge=-LONGEST_ARM_M, le=LONGEST_ARM_M)]
 
 
 class Body(VehicleSection):
@@ -200,8 +203,26 @@ FirmwareName = Literal["crazyflie"]
 """A firmware whose app `generate` writes."""
 
 
-class TrueState(VehicleSection):
-    """Controller and loops get the true state."""
+def _three_arms(value: object) -> object:
+    """Return a place as a tuple; raises PydanticCustomError, one for all three numbers."""
+    numbers = list(value) if isinstance(value, list | tuple) else []
+    good = all(type(one) in (int, float) and abs(one) <= LONGEST_ARM_M for one in numbers)
+    if len(numbers) != 3 or not good:
+        raise PydanticCustomError("place", "must be 3 numbers, each in -1..1, in metres")
+    return tuple(map(float, numbers))
+
+
+class PlacedSensors(VehicleSection):
+    """What measures a position at one place of the drone."""
+
+    lever_m: Annotated[tuple[Arm, Arm, Arm], BeforeValidator(_three_arms)] = Field(
+        (0.0, 0.0, 0.0),
+        description="Where the measured place lies from the centre of mass: forward, right, down.",
+    )
+
+
+class TrueState(PlacedSensors):
+    """Controller and loops get the true state; a simulator gives it at `lever_m`."""
 
     kind: Literal["true"] = Field("true", description="No sensors: the true state.")
 
@@ -217,7 +238,7 @@ class MamboSensors(VehicleSection):
     pressure_pa2: Noise = Field(description="Variance of the pressure.")
 
 
-class MocapSensors(VehicleSection):
+class MocapSensors(PlacedSensors):
     """Motion capture of the position, a filter for the velocity, and the drone's own attitude."""
 
     kind: Literal["mocap"] = Field(description="Position by motion capture, attitude by the drone.")

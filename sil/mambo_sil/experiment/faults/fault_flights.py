@@ -1,7 +1,7 @@
 """Flights with faults: Table II's figure of eight and hover, each fault with four onsets, and a verdict.
 
 A flight has recovered when its error stays within a band until the end. The band is 1.5 times the largest
-error of the fault-free flight after the transient.
+error of the fault-free flight after the transient; of a drone that is seen elsewhere by so much wider.
 """
 
 import math
@@ -152,13 +152,14 @@ def fly_faults(
 
 def _flight(sorties: Sequence[_Sortie], period_s: float, drone: VehicleFile) -> Flight:
     hovering = np.array([sortie.course == HOVER for sortie in sorties], np.float64)
+    below_m = np.array([sortie.scenario.below_m for sortie in sorties])
     try:
         return Flight(
             Trajectories(tuple(COURSES[sortie.course] for sortie in sorties)),
             duration_s=DURATION_S,
             flights=len(sorties),
             yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.scenario.turning for sortie in sorties]),
-            vehicle=Vehicle.of(drone),
+            vehicle=replace(Vehicle.of(drone), lever_error_m=(0.0, 0.0, below_m)),
             update_period_s=period_s,
             disturbances=Disturbances(
                 push_m_s2=(HOVER_PUSH_M_S2[0] * hovering, HOVER_PUSH_M_S2[1] * hovering)
@@ -224,7 +225,7 @@ def _judge_faults(
                 row,
                 sortie,
                 error_m=error_m[:, row],
-                band_m=bands_m[kind],
+                band_m=bands_m[kind] + abs(sortie.scenario.below_m),
                 refused=refused,
                 saturated=share,
                 crash_rad=crash_rad,

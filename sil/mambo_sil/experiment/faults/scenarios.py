@@ -8,6 +8,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.link import NOT_CALLED
+from mambo_sil.drone.plant.vehicle import LEVER_ERRORS_M
 from mambo_sil.experiment.faults.fault import (
     Alteration,
     FreezeState,
@@ -36,6 +37,7 @@ class FaultScenario:
     limits:  the numbers of nmpc_limits_t set at the onset; the settings' limits return at the end.
     moved_m: displacement of the true target along x from the onset on.
     turning: whether the heading turns throughout the flight.
+    below_m: how far below where the controller takes it to be the drone is seen, throughout the flight.
     levelled: whether the caller commands zero tilt after `flights.PATIENCE` rejected steps.
     may_crash: whether no controller that flies the height by the state can be asked to stay in the air.
     """
@@ -50,6 +52,7 @@ class FaultScenario:
     answers: frozenset[int] | None = None
     moved_m: float = 0.0
     turning: bool = False
+    below_m: float = 0.0
     levelled: bool = False
     may_crash: bool = False
 
@@ -117,6 +120,15 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
+        *(
+            FaultScenario(
+                f"seen {100.0 * abs(below_m):g} cm {'below' if below_m > 0.0 else 'above'} the place told",
+                TO_THE_END,
+                below_m=below_m,
+                answers=_only(Status.OK),
+            )
+            for below_m in LEVER_ERRORS_M
+        ),
         *(_wrong_weights(settings) if method_of(settings).weight_limits else ()),
         *(_limited(settings) if method_of(settings).limiting else ()),
     )

@@ -192,10 +192,11 @@ def _tick(
     """Return n drones one tick later, and the outputs (rows, n) at this tick, for inputs (columns, n)."""
     state, suite, commands_thrust = moving.state, moving.suite, signals.axes > LEVEL_AXES
     command, push = inputs[signals.command], inputs[signals.push]
-    true = seen = truth(state)
+    true = truth(state)
+    seen = vehicle.measured(true)
     if suite is not None:
         suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[signals.noise :]))
-        seen = suite.estimate(true)
+        seen = suite.estimate(seen)
     if commands_thrust:
         thrust_n = hover_thrust_n(vehicle) + vehicle.drone.body.mass_kg * command[2]
     else:
@@ -289,4 +290,7 @@ def _repeat(vehicle: Vehicle, times: int) -> Vehicle:
 
     airframe = Airframe(*(each(getattr(vehicle.airframe, one.name)) for one in fields(Airframe)))
     lag_s, drag_1_s = each(vehicle.motor_lag_s), each(vehicle.drag_1_s)
-    return replace(vehicle, airframe=airframe, motor_lag_s=lag_s, drag_1_s=drag_1_s)
+    lever_error_m = each(vehicle.lever_error_m)
+    return replace(
+        vehicle, airframe=airframe, motor_lag_s=lag_s, drag_1_s=drag_1_s, lever_error_m=lever_error_m
+    )

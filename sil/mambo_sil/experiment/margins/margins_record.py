@@ -1,5 +1,6 @@
 """The record of the command `margins`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -71,6 +72,39 @@ class ManyDrones(BaseModel):
         ]
 
 
+class LeverMargins(BaseModel):
+    """The least margins of all loops of a drone that is seen elsewhere than its controller was told."""
+
+    model_config = ConfigDict(frozen=True)
+
+    below_m: float
+    """How far below that place; above it is negative."""
+    unstable: AxisName | None
+    """The axis that grows quickest, if one grows."""
+    gain_up: Number
+    delay_s: Number
+
+    @classmethod
+    def of(cls, below_m: float, axes: Sequence[Margins]) -> "LeverMargins":
+        """Return what the margins of all axes have in common; 0 if one is unstable."""
+        worst = max(axes, key=lambda axis: axis.poles.growth_1_s)
+        if not worst.stable:
+            return cls(below_m=below_m, unstable=worst.axis, gain_up=0.0, delay_s=0.0)
+        loops = [loop for axis in axes for loop in axis.loops.values()]
+        gain_up, delay_s = (min(getattr(loop, key) for loop in loops) for key in ("gain_up", "delay_s"))
+        return cls(below_m=below_m, unstable=None, gain_up=gain_up, delay_s=delay_s)
+
+    @property
+    def words(self) -> str:
+        """How far the loops are from instability."""
+        where = f"seen {100.0 * abs(self.below_m):g} cm {'below' if self.below_m > 0.0 else 'above'}"
+        if self.unstable is not None:
+            return f"{where} the place told: {self.unstable} is UNSTABLE"
+        return (
+            f"{where} the place told: {number(self.gain_up)} times the gain, {number(1e3 * self.delay_s)} ms"
+        )
+
+
 def _spelled(value: float | str) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
@@ -88,6 +122,7 @@ class MarginsSummary(ReportedSummary):
     update_period_s: float
     reason: str | None = None
     axes: list[Margins] | None = None
+    levers: list[LeverMargins] = Field(default_factory=list)
     many: ManyDrones | None = None
     all_figures: bool = Field(default=False, exclude=True)
     """Whether the result shows every figure unfolded."""
@@ -133,6 +168,7 @@ class MarginsSummary(ReportedSummary):
             figures = ResultTable(heads, rows, (0, -1))
             shown = figures if self.all_figures else Details("All figures", [figures])
             blocks = [Picture(panels, CAPTION, [folder / RESPONSES]), shown]
+        blocks += [Sentence(one.words) for one in self.levers]
         if self.many is not None:
             blocks += self.many.blocks
         return CommandResult(

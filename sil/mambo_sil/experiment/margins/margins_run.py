@@ -2,23 +2,31 @@
 
 import contextlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
+from mambo_sil.drone.plant.vehicle import LEVER_ERRORS_M
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.margins.axis_margins import Margins, measure_loops
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law
 from mambo_sil.experiment.margins.hover_loop import hover_loops
 from mambo_sil.experiment.margins.many_drones import (
+    FREQUENCIES,
     MeasuredDrone,
     hovering_flight,
     summarise_drones,
     write_drones,
 )
-from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES, MarginsSummary
+from mambo_sil.experiment.margins.margins_record import (
+    DRONES,
+    PICTURES,
+    RESPONSES,
+    LeverMargins,
+    MarginsSummary,
+)
 from mambo_sil.experiment.margins.response_file import responses, write_responses
 from mambo_sil.flight.names import SensorsName
 from mambo_sil.results.folders import new_results
@@ -29,6 +37,10 @@ NOT_SMOOTH: Final = (
     "motion only, so none is given"
 )
 """Why a controller without a linear law has no margins."""
+
+
+_PLACED: Final = ("true", "mocap")
+"""Sensors that measure a position at one place of the drone."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,18 @@ def axes_on(subject: MarginSubject) -> list[Margins] | None:
     return list(measure_loops(loops, flight))
 
 
+def beside(subject: MarginSubject) -> list[LeverMargins]:
+    """Return what is left of the margins on a drone that is seen below or above the place told."""
+    found = []
+    for below_m in LEVER_ERRORS_M:
+        flight = hovering_flight(subject.drone, subject.sensors, subject.settings.horizon.update_period_s)
+        seen = replace(flight.vehicle, lever_error_m=(0.0, 0.0, below_m))
+        (loops,) = hover_loops(subject.settings, replace(flight, vehicle=seen))
+        axes = measure_loops(loops, flight, count=FREQUENCIES)
+        found.append(LeverMargins.of(below_m, axes))
+    return found
+
+
 def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> MarginsSummary:
     """Return the margins of a controller; write them and their pictures to `folder`.
 
@@ -88,6 +112,7 @@ def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> M
                 update={
                     "axes": list(measure_loops(loops, flight)),
                     "reason": None,
+                    "levers": beside(subject) if subject.sensors in _PLACED else [],
                     "many": summarise_drones(found, many.origin) if many else None,
                 }
             )

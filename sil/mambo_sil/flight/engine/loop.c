@@ -100,7 +100,7 @@ void engine_start_sensors(const engine_simulation_t *simulation, flying_t *flyin
     const seen_t start = truth(&flying->state, &r);
 
     if (simulation->captured) {
-        mocap_start(simulation, &start, &flying->mocap);
+        mocap_start(simulation, &start, &r, &flying->mocap);
     } else {
         suite_start(simulation, &start, &r, &flying->suite);
     }
@@ -213,6 +213,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         real_t wanted_n;
         real_t given_n;
         seen_t truth_now;
+        seen_t measured;
         seen_t seen;
 
         if (simulation->disturbed) {
@@ -231,13 +232,14 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             }
         }
         truth_now = truth(state, &r);
-        seen = truth_now;
+        measured = simulation->seen_beside ? beside(&truth_now, &r, flight->lever_error_m) : truth_now;
+        seen = measured;
         if (simulation->captured) {
             take(draws->sensors, rows, row, 6, drawn);
-            seen = capture(simulation, flight, &truth_now, drawn, &flying->mocap);
+            seen = capture(simulation, flight, &measured, &r, drawn, &flying->mocap);
         } else if (simulation->sensed) {
             take(draws->sensors, rows, row, 8, drawn);
-            seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
+            seen = estimate(simulation, flight, &measured, &r, drawn, &flying->suite);
         }
         if ((update >= simulation->open_loop_updates) && !simulation->commands_thrust) {
             thrust_n = altitude_thrust_n(simulation, &wanted, &seen, &flying->altitude_integral_n);

@@ -23,6 +23,7 @@ typedef struct {
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
     int64_t commands_thrust;  /* whether the controllers command the thrust */
+    int64_t seen_beside;      /* whether any drone is seen at another place than its controller was told */
     int64_t target_columns;   /* of a row of targets: TARGET_COLUMNS if courses have heights */
 
     double step_s;            /* a tick */
@@ -122,6 +123,8 @@ typedef struct {
     int64_t mocap_delay_ticks;
     double mocap_period_s;
     double mocap_share;
+    int64_t mocap_beside;     /* whether the measured place is another than the centre of mass */
+    double mocap_lever_m[3];
 } engine_simulation_t;
 
 /* A group of flights, one in each lane; with one lane one flight. Rows of body_start are those of a state of the rigid
@@ -163,6 +166,7 @@ typedef struct {
 
     real_t noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
     real_t bias[6];           /* accelerometer, gyro */
+    real_t lever_error_m[3];  /* in the body, from where the controller takes what measures to be */
 } engine_flight_t;
 
 /* Random numbers of a group, for each lane a row for each tick: sensors (lanes, ticks, 8 or 6), gusts

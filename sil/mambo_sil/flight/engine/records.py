@@ -44,6 +44,7 @@ _FIRST_ORDER: Final = (
 )
 _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "thrust_decay_after")
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
+_PLACED: Final = ("mocap_beside", "mocap_lever_m")
 
 
 def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LEVEL) -> Record:
@@ -73,6 +74,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LE
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
             "commands_thrust": columns.commands_thrust,
+            "seen_beside": flight.vehicle.is_seen_beside,
             "target_columns": flight.targets_for(columns).shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
@@ -166,6 +168,7 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
             "ground_effect_radius_m": disturbances.ground_effect_radius_m,
             "delay_ticks": flight.link.delay_ticks,
             "dropped_share": flight.link.dropped_share,
+            "lever_error_m": _columns(vehicle.lever_error_m, n),
             **_noise(flight),
         },
     )
@@ -243,8 +246,10 @@ def _thrust(vehicle: Vehicle) -> dict[str, Any]:
 def _mocap(sensors: instruments.Sensors | MotionCapture | None, step_s: float) -> dict[str, Any]:
     """Return the members of the motion capture, 0 without."""
     if not isinstance(sensors, MotionCapture):
-        return dict.fromkeys(_MOCAP, 0)
-    return dict(zip(_MOCAP, astuple(mocap.sampling(sensors.figures, step_s)), strict=True))
+        return dict.fromkeys((*_MOCAP, *_PLACED), 0)
+    lever_m = sensors.figures.lever_m
+    sampled = dict(zip(_MOCAP, astuple(mocap.sampling(sensors.figures, step_s)), strict=True))
+    return sampled | dict(zip(_PLACED, (any(lever_m), lever_m), strict=True))
 
 
 def _noise(flight: Flight) -> dict[str, Any]:

@@ -53,6 +53,27 @@ static inline seen_t truth(const vehicle_state_t *state, const rotation_t *r)
     return seen;
 }
 
+/* What is seen at a place that lies `lever_m` from the one that is. */
+static inline seen_t beside(const seen_t *place, const rotation_t *r, const real_t *lever_m)
+{
+    const real_t *rates = place->rates_rad_s;
+    const real_t turning_m_s[3] = { (rates[1] * lever_m[2]) - (rates[2] * lever_m[1]),
+                                    (rates[2] * lever_m[0]) - (rates[0] * lever_m[2]),
+                                    (rates[0] * lever_m[1]) - (rates[1] * lever_m[0]) };
+    seen_t seen = *place;
+    real_t arm_m[3];
+    real_t moving_m_s[3];
+    int i;
+
+    to_world(r, lever_m, arm_m);
+    to_world(r, turning_m_s, moving_m_s);
+    for (i = 0; i < 3; i++) {
+        seen.position_m[i] = place->position_m[i] + arm_m[i];
+        seen.velocity_m_s[i] = place->velocity_m_s[i] + moving_m_s[i];
+    }
+    return seen;
+}
+
 static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, const vertical_t *wanted,
                                        const seen_t *seen, real_t *integral_n)
 {

@@ -1,7 +1,7 @@
 """Flights of derived settings on their drone: it keeps its place, also if pushed, and survives tilts."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import PlacedSensors
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import first_crash
 from mambo_sil.flight.engine.simulate import fly
@@ -53,6 +54,11 @@ BORNE_SHARE, BORNE_M_S2 = 0.6, 5.0
 
 FIRM_PUSH_M_S2: Final = 0.5
 """Push by which firm settings are compared with calm ones."""
+
+LEVERS_M: Final = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1)
+"""How far from where they are told to be sensors are tried."""
+LEVER_SWING, LEAST_SWING_RAD = 2.0, 0.002
+"""Share by which a drone that is seen elsewhere may swing more, and what any drone may."""
 
 SWINGING_M_S: Final = 0.2
 """Rms of a velocity that oscillates: 0.03 is the most of shipped drones, 0.05 that with 2 cm of noise."""
@@ -102,6 +108,32 @@ def fly_pushed(settings: Settings, drone: VehicleFile) -> FlownSettings:
     if not borne_m_s2:
         words = f"bears no steady push: its tilt limit holds {holds_m_s2:g} m/s^2"
     return FlownSettings(good=True, words=words)
+
+
+def fly_beside(settings: Settings, drone: VehicleFile) -> FlownSettings | None:
+    """See a drone that hovers farther and farther below and above the place that its controller was told.
+
+    It bears a place at which it neither leaves its target nor swings more than LEVER_SWING times as much as
+    when it is seen where it was told. None for a drone whose sensors have no such place. Raises BuildError,
+    CacheError.
+    """
+    if not isinstance(drone.sensors, PlacedSensors):
+        return None
+    calm_rad = _swing_rad(_flown(settings, drone, Hover(), START))
+    borne_m = {}
+    for side, sign in (("below", 1.0), ("above", -1.0)):
+        borne_m[side] = 0.0
+        for error_m in LEVERS_M:
+            seen = replace(Vehicle.of(drone), lever_error_m=(0.0, 0.0, sign * error_m))
+            trace = _flown(settings, drone, Hover(), START, vehicle=seen)
+            if (
+                _fault(trace, drone, axes=2)
+                or not _swing_rad(trace) < LEVER_SWING * calm_rad + LEAST_SWING_RAD
+            ):
+                break
+            borne_m[side] = error_m
+    reach = " and ".join(f"{100.0 * most_m:g} cm {side}" for side, most_m in borne_m.items())
+    return FlownSettings(good=True, words=f"bears to be seen {reach} where sensors.lever_m says")
 
 
 def firm_words(firm: Settings, calm: Settings, drone: VehicleFile) -> str:
@@ -171,6 +203,7 @@ def _flown(
     disturbances: Disturbances = CALM,
     *,
     duration_s: float = DURATION_S,
+    vehicle: Vehicle | None = None,
 ) -> Trace:
     """Return flights at headings around the whole turn, through the drone's own sensors."""
     flight = Flight(
@@ -178,7 +211,7 @@ def _flown(
         duration_s=duration_s,
         flights=HEADINGS,
         yaw_rad=2.0 * math.pi * np.arange(HEADINGS) / HEADINGS,
-        vehicle=Vehicle.of(drone),
+        vehicle=vehicle or Vehicle.of(drone),
         update_period_s=settings.horizon.update_period_s,
         seeds=tuple(range(HEADINGS)),
         offset=offset,
@@ -186,6 +219,12 @@ def _flown(
         sensors=choose_sensors(_own_sensors(drone), drone),
     )
     return fly(flight, CompiledController(settings, HEADINGS))
+
+
+def _swing_rad(trace: Trace) -> float:
+    """Return the largest rms of a tilt at the end of flights, about its mean."""
+    judged = trace.time_s >= trace.time_s[-1] - JUDGED_S
+    return float(trace.euler_rad[judged][..., :2].std(axis=0).max())
 
 
 def _fault(trace: Trace, drone: VehicleFile, axes: int) -> str | None:
