@@ -97,12 +97,10 @@ class LeverMargins(BaseModel):
     @property
     def words(self) -> str:
         """How far the loops are from instability."""
-        where = f"seen {100.0 * abs(self.below_m):g} cm {'below' if self.below_m > 0.0 else 'above'}"
+        where = f"{100.0 * abs(self.below_m):g} cm {'below' if self.below_m > 0.0 else 'above'}"
         if self.unstable is not None:
-            return f"{where} the place told: {self.unstable} is UNSTABLE"
-        return (
-            f"{where} the place told: {number(self.gain_up)} times the gain, {number(1e3 * self.delay_s)} ms"
-        )
+            return f"{where}, where {self.unstable} is UNSTABLE"
+        return f"{where}, {self.gain_up:.2g} times the gain or {1e3 * self.delay_s:.0f} ms"
 
 
 def _spelled(value: float | str) -> str:
@@ -168,7 +166,8 @@ class MarginsSummary(ReportedSummary):
             figures = ResultTable(heads, rows, (0, -1))
             shown = figures if self.all_figures else Details("All figures", [figures])
             blocks = [Picture(panels, CAPTION, [folder / RESPONSES]), shown]
-        blocks += [Sentence(one.words) for one in self.levers]
+        if self.levers:
+            blocks.append(Sentence(f"seen elsewhere: {'; '.join(one.words for one in self.levers)}"))
         if self.many is not None:
             blocks += self.many.blocks
         return CommandResult(
