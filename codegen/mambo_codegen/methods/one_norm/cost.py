@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.one_norm.predictor import Prediction, Predictor
-from mambo_codegen.methods.shared.math import Real, ordered_sum, sign
+from mambo_codegen.methods.shared.math import Real, ordered_sum
 
 
 def evaluate(
@@ -27,7 +27,8 @@ def evaluate(
 
     change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
     variation = ordered_sum(np.abs(change).swapaxes(1, 2).reshape(len(change), -1), axis=1)
-    effort = arithmetic.effort_gradient(weights[:, 1, None, None]) * sign(change)
+    slope = arithmetic.effort_gradient(weights[:, 1, None, None])
+    effort = np.where(change > 0, slope, np.where(change < 0, -slope, np.zeros_like(slope)))
 
     cost = arithmetic.tracking_cost(weights[:, 0], distance) + arithmetic.effort_cost(
         weights[:, 1], variation
