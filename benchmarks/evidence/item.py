@@ -17,8 +17,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from matplotlib.figure import Figure
+
 from benchmarks.evidence.sources import ROOT, controller_digests, git, object_ids
 from mambo_sil.results.folders import finite
+from mambo_sil.results.pictures import save
+from mambo_sil.results.style import style
 
 PICTURES: Final = ROOT / "docs" / "evidence"
 DATA: Final = PICTURES / "data"
@@ -48,6 +52,7 @@ class Item:
     tables:      return Markdown of figures, by the name that pages have at its place.
     pictures:    files of the results, by their name in docs/evidence.
     draw:        draws pictures that no command draws, into the folder of the results.
+    charts:      pictures of the figures, by their name in docs/evidence without its ending.
     variable:    environment variable that the commands want; without it the item is made only by its name.
     """
 
@@ -59,6 +64,7 @@ class Item:
     tables: Mapping[str, Callable[[Figures], str]]
     pictures: Mapping[str, str] = field(default_factory=dict)
     draw: Callable[[Path], None] | None = None
+    charts: Mapping[str, Callable[[Figures], Figure]] = field(default_factory=dict)
     variable: str = ""
 
     @property
@@ -196,8 +202,12 @@ def with_tables(page: str, tables: Mapping[str, str]) -> str:
 
 
 def write_tables(item: Item) -> list[str]:
-    """Write the tables of the figures in the stamp on all pages that have them; return the changed pages."""
-    tables = item.texts(read_stamp(item)["figures"])
+    """Write tables and charts of the figures in the stamp, tables on all pages that have them.
+
+    Returns the changed pages.
+    """
+    figures = read_stamp(item)["figures"]
+    tables = item.texts(figures)
     changed = []
     for page in pages():
         before = page.read_text("utf-8")
@@ -205,7 +215,18 @@ def write_tables(item: Item) -> list[str]:
         if after != before:
             page.write_text(after, "utf-8")
             changed.append(str(page.relative_to(ROOT)))
+    draw_charts(item, figures)
     return changed
+
+
+def draw_charts(item: Item, figures: Figures) -> None:
+    """Draw the charts of an item's figures into docs/evidence."""
+    results = ROOT / RESULTS / item.name
+    results.mkdir(parents=True, exist_ok=True)
+    for name, chart in item.charts.items():
+        with style():
+            png, _ = save(chart(figures), results / name)
+        shutil.copyfile(png, PICTURES / png.name)
 
 
 def run(command: str) -> str:

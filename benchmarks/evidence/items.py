@@ -32,6 +32,7 @@ from benchmarks.evidence.campaign_tables import (
     read_opponents,
     read_quantiles,
 )
+from benchmarks.evidence.charts import boards_chart, opponents_chart
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause, link_wires
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
@@ -209,6 +210,7 @@ ITEMS: Final = (
             "opponents-slow-motors": opponents("slow-motors"),
             "opponents-curves": opponents_curves,
         },
+        charts={"opponents": opponents_chart},
     ),
     _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
     _campaign("campaign-quick-motors", "--flights 100 ", {"campaign-quick-motors": campaign}),
@@ -263,6 +265,7 @@ ITEMS: Final = (
             "footprint-scalars": footprint_scalars,
             "compilers": compilers,
         },
+        charts={"boards": boards_chart},
     ),
     Item(
         name="footprint-crazyflie",

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.evidence import item as evidence
 from benchmarks.evidence import sources
+from benchmarks.evidence.charts import SHOWN
 from benchmarks.evidence.item import (
     DATA,
     PICTURES,
@@ -69,8 +70,31 @@ def test_a_stamp_has_all_commands_of_its_item(item: Item) -> None:
     stamp = read_stamp(item)
     assert item.stamp.read_text("utf-8") == record_lines(stamp) + "\n"
     assert stamp["commands"] == list(item.commands)
-    for name in item.pictures:
+    for name in (*item.pictures, *(f"{chart}.png" for chart in item.charts)):
         assert (PICTURES / name).stat().st_size > 10_000, name
+
+
+def test_headlines_of_charts_are_what_the_figures_say() -> None:
+    """The MPC is the closest and crashes least; fixed point saves most, without an FPU and but for AVR."""
+    figures = {item.name: read_stamp(item)["figures"] for item in ITEMS if item.charts}
+    campaigns = {
+        name: one["controllers"] for name, one in figures["opponents"].items() if "controllers" in one
+    }
+    distances = {
+        name: one["quantiles"]["seen_iae_m_s"]["0.5"]
+        for name, one in campaigns["drawn"].items()
+        if name in SHOWN
+    }
+    assert min(distances, key=lambda name: distances[name]) == "mambo"
+    for campaign in ("slow-motors", "slow-motors-circle"):
+        crashes = {name: campaigns[campaign][name]["crashed"]["count"] for name in SHOWN}
+        assert min(crashes, key=lambda name: crashes[name]) == "mambo"
+    for plain, fixed in zip(
+        figures["footprint"]["mambo"], figures["footprint"]["mambo --scalar fixed"], strict=True
+    ):
+        saves = fixed["instructions"]["mean"] < 0.5 * plain["instructions"]["mean"]
+        without_fpu = plain["instructions"]["mean"] > 3000
+        assert saves == (without_fpu and plain["name"] != "mega"), plain["name"]
 
 
 def all_tables() -> dict[str, str]:
