@@ -62,7 +62,7 @@ logVarId_t logGetVarId(const char *group, const char *name)
     return 0xffffU;
 }
 
-float logGetFloat(logVarId_t id) { return host_variances[id]; }
+void *logGetAddress(logVarId_t id) { return &host_variances[id]; }
 
 int consolePrintf(const char *format, ...)
 {

@@ -4,6 +4,7 @@
 
 #define NAN __builtin_nanf("")
 #define isfinite(value) __builtin_isfinite(value)
+#define isnan(value) __builtin_isnan(value)
 
 float asinf(float x);
 float atan2f(float y, float x);

@@ -202,7 +202,7 @@ logVarId_t logGetVarId(const char *group, const char *name)
     return ((found >= LOGGED) && (found < &LOGGED[sizeof LOGGED / sizeof LOGGED[0]])) ? (logVarId_t)(found - LOGGED) : 0xffffU;
 }
 
-float logGetFloat(logVarId_t id) { return (float)value_of(&LOGGED[id]); }
+void *logGetAddress(logVarId_t id) { return LOGGED[id].address; }
 
 const char *desk_group(void) { return host_logged[0].name; }
 const char *desk_console(void) { return console; }
@@ -295,6 +295,8 @@ static void externalize(void)
     estimate.position = (vector_t){ now_ms, (float)filter.position_m[0], (float)filter.position_m[1], (float)filter.position_m[2] };
     estimate.velocity = (vector_t){ now_ms, (float)along_m_s[0], (float)along_m_s[1], (float)along_m_s[2] };
     estimate.attitude = (attitude_t){ now_ms, (float)(DEGREES * angles_rad[0]), (float)(DEGREES * angles_rad[1]), (float)(DEGREES * angles_rad[2]) };
+    estimate.attitudeQuaternion =
+        (quaternion_t){ (float)filter.attitude[1], (float)filter.attitude[2], (float)filter.attitude[3], (float)filter.attitude[0] };
     variances[0] = (float)filter.variance[0][0];
     variances[1] = (float)filter.variance[3][3];
     variances[2] = (float)filter.variance[2][2];

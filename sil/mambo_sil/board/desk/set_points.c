@@ -121,6 +121,7 @@ static void follow_plan(uint32_t now_ms)
     current.position = (vector_t){ now_ms, (float)motion[0].value, (float)motion[1].value, (float)motion[2].value };
     current.velocity = (vector_t){ now_ms, (float)motion[0].slope, (float)motion[1].slope, (float)motion[2].slope };
     current.acceleration = (vector_t){ now_ms, (float)motion[0].curvature, (float)motion[1].curvature, (float)motion[2].curvature };
+    current.jerk = (vector_t){ now_ms, (float)motion[0].jerk, (float)motion[1].jerk, (float)motion[2].jerk };
     current.attitude.yaw = (float)(DEG_PER_RAD * motion[3].value);
     current.attitudeRate.yaw = (float)(DEG_PER_RAD * motion[3].slope);
     if ((plan == TRAJECTORY_STATE_LANDING) && (0.001 * (double)(now_ms - begun_ms) >= duration_s)) {

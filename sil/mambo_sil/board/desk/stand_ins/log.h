@@ -14,7 +14,7 @@ struct variable {
 typedef uint16_t logVarId_t;
 
 logVarId_t logGetVarId(const char *group, const char *name);
-float logGetFloat(logVarId_t id);
+void *logGetAddress(logVarId_t id);
 static inline bool logVarIdIsValid(logVarId_t id) { return id != 0xffffU; }
 
 extern const struct variable host_logged[];

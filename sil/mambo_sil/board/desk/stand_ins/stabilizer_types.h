@@ -35,6 +35,7 @@ typedef struct {
 
 typedef struct {
     attitude_t attitude; /* degrees, pitch nose up */
+    quaternion_t attitudeQuaternion;
     vector_t position;
     vector_t velocity;
 } state_t;
@@ -77,6 +78,7 @@ typedef struct {
     vector_t position;
     vector_t velocity;
     vector_t acceleration;
+    vector_t jerk;
     bool velocity_body;
     setpoint_mode_t mode;
 } setpoint_t;
