@@ -14,13 +14,15 @@ import pytest
 
 ARMED, CAN_FLY, FLYING = 2, 8, 16
 SIZES: Final = {
+    "tooQuick": 1,
     "status": 1,
     "saturated": 1,
     "lost": 1,
     "refused": 4,
     "step": 2,
     "age": 2,
-    "takeOvers": 2,
+    "takeOvers": 1,
+    "targetKnown": 1,
     "grounded": 1,
     "level": 1,
     "info": 2,
@@ -242,14 +244,15 @@ class Memory:
     ) -> int:
         """Write the trajectory, 0.3 s later."""
         data = b"".join(piece.pack() for piece in self.trajectory)
-        assert len(data) <= MEMORY_BYTES
-        assert write_failed_cb is not None
+        assert start_addr + len(data) <= MEMORY_BYTES
 
         def answer() -> None:
             if not self._drone.failing_uploads:
-                self._drone.memory = data
+                self._drone.memory = self._drone.memory[:start_addr] + data
                 self._drone.note("upload", len(data))
-            (write_failed_cb if self._drone.failing_uploads else write_finished_cb)(self, start_addr)
+            answered = write_failed_cb if self._drone.failing_uploads else write_finished_cb
+            if answered is not None:
+                answered(self, start_addr)
 
         self._drone.clock.events.append((self._drone.clock.time_s + 0.3, answer))
         return len(data)

@@ -59,12 +59,12 @@ def ready(scripts: dict[str, ModuleType], patch: pytest.MonkeyPatch) -> Drone:
     """Return a drone that is ready to fly, and put it and its clock under the scripts."""
     clock = Clock()
     logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
-    logged |= dict.fromkeys(scripts["radio"].PLACE, 0.0)
+    logged |= dict.fromkeys((*scripts["radio"].PLACE, *scripts["radio"].CHECKS), 0.0)
     logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
     logged |= dict.fromkeys(("kalman.varPX", "kalman.varPY", "kalman.varPZ", "kalman.varX"), 1e-4)
     logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}
     parameters = {
-        "nmpc.settings": int(SETTINGS.short_digest[:8], 16),
+        "nmpc.settings": int(scripts["radio"].DIGEST[:8], 16),
         "nmpc.selfTest": 0,
         "nmpc.on": 0,
         "stabilizer.estimator": 2,
@@ -97,11 +97,12 @@ def at_call(drone: Drone, name: str, after_s: float, *events: Callable[[], None]
 
 
 TICK_MS: Final = 10
+PIECE_BYTES: Final = 132
 
 
 @dataclass
 class DeskDrone(Drone):
-    """What scripts reach: calls go to the desk, logs come from it; figures that are uploaded do not fly."""
+    """What scripts reach: calls go to the desk, logs come from it."""
 
     desk: Desk | None = None
     off_m: list[float] = field(default_factory=list)
@@ -132,6 +133,14 @@ class DeskDrone(Drone):
             self.desk.land(arguments[1], arguments[0], yaw_rad)
         elif name == "go_to":
             self.desk.go_to(arguments[:3], arguments[4], arguments[3])
+        elif name == "upload":
+            self.desk.write_pieces(np.frombuffer(self.memory, np.float32).reshape(-1, 33))
+        elif name == "full_state":
+            self.desk.full_state(np.array(arguments[:3]), yaw_rad)
+        elif name == "notify":
+            self.desk.yield_()
+        elif name == "start_trajectory":
+            self.desk.start_trajectory(len(self.memory) // PIECE_BYTES)
         elif name == "stop" and int(self.logged["supervisor.info"]) & FLYING:
             self.desk.stop()
 

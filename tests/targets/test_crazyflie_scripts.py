@@ -302,8 +302,14 @@ def test_wrong_arguments_are_named(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("circle", "--rate", "2"), "the figure needs 4.6 m/s^2, and half of the tilt limit gives 2.5"),
-        (("goto", "--size", "2", "--rate", "0.7"), "the figure needs 1.4 m/s, and the speed limit is 1.2"),
+        (
+            ("circle", "--size", "0.3", "--rate", "4.5"),
+            "the figure needs 7.0 m/s^2, and tilt and thrust give 5.1: --rate 3.83 would fly",
+        ),
+        (
+            ("goto", "--size", "2", "--rate", "0.7"),
+            "the figure needs 1.4 m/s, and the speed limit is 1.2: --rate 0.6 would fly",
+        ),
         (("hover", "--log", "none/flight.csv"), "--log none/flight.csv: there is no such folder"),
     ],
 )

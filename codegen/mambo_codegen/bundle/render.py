@@ -26,6 +26,7 @@ from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix
 from mambo_codegen.bundle.sbom import with_sbom
+from mambo_codegen.bundle.reach import flown_acceleration_m_s2
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -106,6 +107,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         "variables": fmu_variables(settings),
         "pil_payload_bytes": _pil_payload_bytes(method_of(settings)),
         "for_flow": settings.observer is not None and settings.observer.position_noise >= FLOW_NOISE_M,
+        "flown_m_s2": flown_acceleration_m_s2(settings),
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"

@@ -4,11 +4,12 @@ import math
 
 import pytest
 
+from mambo_codegen.bundle.reach import FLOWN_SHARE, flown_acceleration_m_s2, largest_acceleration_m_s2
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.scenario import Scenario, flight_of
-from mambo_sil.model.derive.reach import largest_acceleration_m_s2, reach_words
+from mambo_sil.model.derive.reach import reach_words
 from tests.support.derived import settings_for
 from tests.support.scenarios import changed
 
@@ -51,3 +52,17 @@ def test_a_far_target_is_flown_to_with_it(name: str, attitude: dict[str, object]
     assert largest_acceleration_m_s2(settings) == pytest.approx(found_m_s2, rel=0.08)
     assert settings.observer.disturbance_limit_m_s2 == pytest.approx(found_m_s2, rel=0.08)
     assert reach_words(settings).endswith(f"by limits.tilt_rad = {settings.limits.tilt_rad:g}")
+
+
+def test_a_curve_may_ask_for_what_tilt_and_thrust_leave() -> None:
+    """A Crazyflie's tilt limit is the less of the two; one that is heavy for its rotors has less thrust."""
+    settings = settings_for(vehicle_toml.preset("crazyflie"), exact=True)
+    assert settings.height is not None
+    most_m_s2 = FLOWN_SHARE * largest_acceleration_m_s2(settings)
+    assert flown_acceleration_m_s2(settings) == most_m_s2
+    weak = settings.model_copy(
+        update={"height": settings.height.model_copy(update={"thrust_max_m_s2": 11.0})}
+    )
+    assert 0.0 < flown_acceleration_m_s2(weak) < 0.5 * most_m_s2
+    none = settings.model_copy(update={"height": settings.height.model_copy(update={"thrust_max_m_s2": 9.9})})
+    assert flown_acceleration_m_s2(none) == 0.0

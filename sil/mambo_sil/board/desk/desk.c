@@ -446,6 +446,9 @@ void desk_go_to(const double position_m[3], double yaw_rad, double duration_s)
     set_points_plan(position_m, yaw_rad, duration_s, false, now_ms);
 }
 
+void desk_write_pieces(int first, const double *pieces, int count) { set_points_write(first, pieces, count); }
+void desk_start_trajectory(int count) { set_points_follow(count, now_ms); }
+
 void desk_measure(int is_on) { measures = is_on; }
 
 void desk_jump(const double wanted_m[3], int frames)

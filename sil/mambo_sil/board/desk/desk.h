@@ -57,6 +57,11 @@ void desk_take_off(double z_m, double yaw_rad, double duration_s);
 void desk_land(double z_m, double yaw_rad, double duration_s);
 void desk_go_to(const double position_m[3], double yaw_rad, double duration_s);
 
+/* Write pieces of a trajectory into memory, from a place in 0..30 on, also while it flies: each has 8 coefficients of x, y, z and yaw,
+ * lowest first, and its duration. Fly the first `count`. */
+void desk_write_pieces(int first, const double *pieces, int count);
+void desk_start_trajectory(int count);
+
 /* Whether the camera, or the flow deck, measures. */
 void desk_measure(int is_on);
 

@@ -141,6 +141,15 @@ class Desk:
         """Fly to a place by a plan."""
         self._c.desk_go_to(self._vector(position_m), yaw_rad, duration_s)
 
+    def write_pieces(self, pieces: FloatArray, first: int = 0) -> None:
+        """Write pieces of a trajectory (n, 33), 8 coefficients of x, y, z and yaw and the duration."""
+        written = self._ffi.new("double[]", [float(value) for value in pieces.reshape(-1)])
+        self._c.desk_write_pieces(first, written, len(pieces))
+
+    def start_trajectory(self, count: int) -> None:
+        """Fly the first pieces in memory."""
+        self._c.desk_start_trajectory(count)
+
     def measure(self, *, on: bool) -> None:
         """Let the camera, or the flow deck, measure, or not."""
         self._c.desk_measure(on)

@@ -6,6 +6,8 @@
 #define PLAN_PERIOD_MS 10U
 #define AXES 4 /* x, y, z, yaw */
 #define DEGREE 7
+#define MOST_PIECES 31 /* what the firmware's memory holds */
+#define PIECE_NUMBERS ((AXES * (DEGREE + 1)) + 1)
 #define DEG_PER_RAD 57.2957795130823
 
 typedef struct {
@@ -17,6 +19,8 @@ static bool is_by_radio;
 static enum trajectory_state plan;
 static double coefficients[AXES][DEGREE + 1]; /* by the time in durations */
 static double duration_s;
+static double pieces[MOST_PIECES][PIECE_NUMBERS]; /* of an uploaded trajectory, each with its duration behind its coefficients */
+static int flown_pieces;                          /* of the trajectory that flies; 0: the plan of `coefficients` does */
 static uint32_t begun_ms;
 static double last_m[AXES]; /* of the last set-point, with its velocity; yaw in rad */
 static double last_m_s[AXES];
@@ -39,7 +43,8 @@ void set_points_send(const setpoint_t *setpoint, uint32_t now_ms)
 void set_points_yield(void) { is_by_radio = false; }
 enum trajectory_state set_points_state(void) { return plan; }
 
-static motion_t evaluate(const double c[DEGREE + 1], double share)
+/* Evaluate a polynomial whose time has a unit. */
+static motion_t evaluate(const double c[DEGREE + 1], double share, double unit_s)
 {
     motion_t found = { 0.0, 0.0, 0.0, 0.0 };
 
@@ -49,15 +54,45 @@ static motion_t evaluate(const double c[DEGREE + 1], double share)
         found.slope = (found.slope * share) + found.value;
         found.value = (found.value * share) + c[k];
     }
-    found.slope /= duration_s;
-    found.curvature /= duration_s * duration_s;
-    found.jerk /= duration_s * duration_s * duration_s;
+    found.slope /= unit_s;
+    found.curvature /= unit_s * unit_s;
+    found.jerk /= unit_s * unit_s * unit_s;
     return found;
+}
+
+static motion_t in_pieces(int axis, double time_s)
+{
+    const double *piece = pieces[0];
+    motion_t end;
+
+    for (int k = 0; k < flown_pieces; k++) {
+        piece = pieces[k];
+        if (time_s <= piece[PIECE_NUMBERS - 1]) {
+            return evaluate(&piece[axis * (DEGREE + 1)], time_s, 1.0);
+        }
+        time_s -= piece[PIECE_NUMBERS - 1];
+    }
+    end = evaluate(&piece[axis * (DEGREE + 1)], piece[PIECE_NUMBERS - 1], 1.0);
+    return (motion_t){ end.value, 0.0, 0.0, 0.0 };
 }
 
 static motion_t at(int axis, uint32_t now_ms)
 {
-    return evaluate(coefficients[axis], fmin(0.001 * (double)(now_ms - begun_ms) / duration_s, 1.0));
+    const double time_s = 0.001 * (double)(now_ms - begun_ms);
+
+    return (flown_pieces > 0) ? in_pieces(axis, time_s) : evaluate(coefficients[axis], fmin(time_s / duration_s, 1.0), duration_s);
+}
+
+void set_points_write(int first, const double *written, int count)
+{
+    memcpy(pieces[first], written, (size_t)count * sizeof pieces[0]);
+}
+
+void set_points_follow(int count, uint32_t now_ms)
+{
+    flown_pieces = count;
+    begun_ms = now_ms;
+    plan = TRAJECTORY_STATE_FLYING;
 }
 
 /* The polynomial from a motion to rest; without jerk at both ends. */
@@ -85,6 +120,7 @@ void set_points_plan(const double position_m[3], double yaw_rad, double wanted_s
 
         from[axis] = (plan == TRAJECTORY_STATE_IDLE) ? rest : at(axis, now_ms);
     }
+    flown_pieces = 0;
     duration_s = wanted_s;
     begun_ms = now_ms;
     for (int axis = 0; axis < AXES; axis++) {

@@ -25,6 +25,10 @@ void set_points_plan(const double position_m[3], double yaw_rad, double duration
 /* Plan a take-off or a landing: a flight up or down. */
 void set_points_lift(double z_m, double yaw_rad, double duration_s, bool lands, uint32_t now_ms);
 
+/* Write pieces of a trajectory into memory, from a place on; fly the first `count` of them. */
+void set_points_write(int first, const double *written, int count);
+void set_points_follow(int count, uint32_t now_ms);
+
 /* What the high-level commander does. */
 enum trajectory_state set_points_state(void);
 

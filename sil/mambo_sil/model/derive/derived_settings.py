@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from mambo_codegen import __version__
+from mambo_codegen.bundle.reach import tilted_m_s2
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import VEHICLE, comment
 from mambo_codegen.settings.key import spell
@@ -22,7 +23,6 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MocapSensors,
     TrueState,
 )
-from mambo_sil.model.derive.reach import tilted_m_s2
 from mambo_sil.model.derive.step_response import fit_steps
 
 UPDATE_PERIOD_S: Final = 0.01

@@ -1,0 +1,24 @@
+"""What a call of the Crazyflie's app costs, which its firmware makes every millisecond."""
+
+import pytest
+
+from benchmarks.app_cost import call_cost
+from mambo_sil.drone.vehicles import vehicle_toml
+from tests.support.derived import settings_for
+from tests.support.tools import require
+
+MOST_INSTRUCTIONS = 730
+MOST_FRAME_BYTES = 160
+
+
+@pytest.mark.long
+def test_a_call_is_short() -> None:
+    """Work on a set-point is done when it changes; between steps a call only watches the position."""
+    require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    pytest.importorskip("unicorn")
+    cost = call_cost(settings_for(vehicle_toml.preset("crazyflie"), exact=True))
+    assert 500.0 < cost.mean <= MOST_INSTRUCTIONS
+    assert cost.most > 5 * cost.mean
+    assert sum(cost.by_function.values()) == pytest.approx(cost.mean)
+    assert 10.0 * cost.by_function["advance"] > 500.0
+    assert cost.frames_bytes[0] <= MOST_FRAME_BYTES
