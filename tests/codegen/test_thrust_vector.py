@@ -10,13 +10,9 @@ from scipy.spatial.transform import Rotation
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.thrust_vector import ThrustVector
-from mambo_codegen.methods.quadratic.thrust_vector_constants import (
-    LEAST_SHARE,
-    LEAST_SPARE_M_S2,
-    SPARE_SHARE,
-    THRUST_LEFT,
-)
+from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, LEAST_SPARE_M_S2
 from mambo_codegen.methods.shared.limits import ActiveLimit
+from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT
 from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option

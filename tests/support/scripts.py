@@ -134,7 +134,7 @@ class DeskDrone(Drone):
         elif name == "go_to":
             self.desk.go_to(arguments[:3], arguments[4], arguments[3])
         elif name == "upload":
-            self.desk.write_pieces(np.frombuffer(self.memory, np.float32).reshape(-1, 33))
+            self.desk.write_pieces(np.frombuffer(self.memory, np.float32).astype(np.float64).reshape(-1, 33))
         elif name == "full_state":
             self.desk.full_state(np.array(arguments[:3]), yaw_rad)
         elif name == "notify":

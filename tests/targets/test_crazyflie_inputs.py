@@ -17,7 +17,7 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Circle
 from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.bundles import write_target
-from tests.support.crazyflie import Built, Crazyflie, Fleet, build
+from tests.support.crazyflie import Built, Crazyflie, Fleet, build, send
 
 SETTINGS = presets.preset("crazyflie")
 LOGGED = (
@@ -127,6 +127,32 @@ def test_a_slow_stream_of_set_points_is_carried_on_by_its_jerk(built: Built) -> 
         worst.append(max(errors[100:]))
     assert worst[0] < 0.01
     assert worst[1] > 1.3 * worst[0]
+
+
+def test_a_set_point_with_its_jerk_is_carried_on_by_it(built: Built) -> None:
+    """The plans of the high-level commander have it; 100 ms later the place is that of the cubic."""
+    for jerk in (0.0, 6.0):
+        app = built.app()
+        app.modes("modeAbs")
+        app.place(np.zeros(7))
+        app.setpoint.jerk.x = jerk
+        send(app, 0.0, 0.5, 1.0)
+        for _ in range(101):
+            app.tick()
+        assert app.logged("targetX") == pytest.approx(0.05 + 0.005 + jerk / 6000.0, abs=2e-4)
+        assert app.logged("targetAx") == pytest.approx(1.0 + 0.1 * jerk, abs=0.01)
+
+
+def test_a_place_that_changes_without_a_new_time_stamp_counts(app: Crazyflie) -> None:
+    """The firmware's collision avoidance moves set-points so."""
+    app.place(np.zeros(7))
+    send(app, 0.2)
+    for _ in range(20):
+        app.tick()
+    app.setpoint.position.x = 0.1
+    for _ in range(10):
+        app.tick()
+    assert app.logged("targetX") == pytest.approx(0.1)
 
 
 def test_a_jump_of_the_acceleration_is_no_jerk(app: Crazyflie) -> None:

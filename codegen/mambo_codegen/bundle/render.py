@@ -26,7 +26,6 @@ from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix
 from mambo_codegen.bundle.sbom import with_sbom
-from mambo_codegen.bundle.reach import flown_acceleration_m_s2
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import Method, method_of
@@ -34,6 +33,7 @@ from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.reach import flown_acceleration_m_s2
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
     YAW_LIMIT_RAD,

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mambo_codegen.bundle.reach import FLOWN_SHARE, flown_acceleration_m_s2, largest_acceleration_m_s2
+from mambo_codegen.numbers.reach import FLOWN_SHARE, flown_acceleration_m_s2, largest_acceleration_m_s2
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, reciprocal
+from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT
 from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR, arc_tangent
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
@@ -27,12 +28,6 @@ MOST_TILT_RAD: Final = 1.2
 
 MOST_SLOPE: Final = 4.0
 """More than any horizontal component of a thrust over its vertical one: 1/LEAST_SHARE, and rounding."""
-
-THRUST_LEFT: Final = 0.92
-"""Share of the largest thrust that height and tilt may take together: the rest is for attitude and yaw."""
-
-SPARE_SHARE: Final = 0.85
-"""Share of what the height leaves that each of right and forward may take."""
 
 LEAST_SPARE_M_S2: Final = 1.7
 """A horizontal acceleration that the height always leaves."""

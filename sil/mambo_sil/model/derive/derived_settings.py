@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from mambo_codegen import __version__
-from mambo_codegen.bundle.reach import tilted_m_s2
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.reach import tilted_m_s2
 from mambo_codegen.settings.controller_toml import VEHICLE, comment
 from mambo_codegen.settings.key import spell
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile

@@ -1,6 +1,6 @@
 """How quick a motion settings can fly, in words."""
 
-from mambo_codegen.bundle.reach import largest_acceleration_m_s2
+from mambo_codegen.numbers.reach import largest_acceleration_m_s2
 from mambo_codegen.settings.model import Settings
 
 

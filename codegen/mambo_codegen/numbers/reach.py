@@ -4,9 +4,14 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from mambo_codegen.methods.quadratic.thrust_vector_constants import SPARE_SHARE, THRUST_LEFT
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.sections import Sections
+
+THRUST_LEFT: Final = 0.92
+"""Share of the largest thrust that height and tilt may take together: the rest is for attitude and yaw."""
+
+SPARE_SHARE: Final = 0.85
+"""Share of what the height leaves that each of right and forward may take."""
 
 FLOWN_SHARE: Final = 0.95
 """Of the largest acceleration, what a curve may ask for: the rest is for corrections and drag."""
@@ -21,14 +26,14 @@ def tilted_m_s2(tilt_rad: float, attitude: Iterable[tuple[float, float]], per_ti
     return GRAVITY_M_S2 * per_tilt * math.tan(max(least_rad, 0.0))
 
 
-def largest_acceleration_m_s2(settings: Settings) -> float:
+def largest_acceleration_m_s2(settings: Sections) -> float:
     """Return the horizontal acceleration of a level flight at the tilt limit, along the weaker axis."""
     model = settings.model
     attitude = (model.roll_gain, model.roll_trim_rad), (model.pitch_gain, model.pitch_trim_rad)
     return tilted_m_s2(settings.limits.tilt_rad, attitude, model.acceleration_per_tilt)
 
 
-def flown_acceleration_m_s2(settings: Settings) -> float:
+def flown_acceleration_m_s2(settings: Sections) -> float:
     """Return the horizontal acceleration that a curve may ask for, by tilt limit and thrust."""
     largest_m_s2 = largest_acceleration_m_s2(settings)
     if settings.height is not None:
