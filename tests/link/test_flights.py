@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -177,6 +178,35 @@ def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
         return horizontal_rms_m(updates, settled_s=4.0)
 
     assert rms_m(Faults(lost=0.2, delay_s=0.02, jitter_s=0.06)) < 1.1 * rms_m(Faults(delay_s=0.05))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("stack", BOTH)
+def test_a_take_over_in_wind_keeps_the_lean(stack: str, tmp_path: Path) -> None:
+    """The autopilot leans by 10 degrees; the tilt moves by less than two, and the drone by less than 0.1 m.
+
+    A controller that began upright would let it be blown 0.4 m away. Its log has the drone without the lean.
+    """
+    settings = settings_for(drone().with_sensors("autopilot"))
+    link, updates, seen = WiredLink(stack, drone()), list[Update](), list[np.ndarray[Any, Any]]()
+
+    def watch(pilot: Pilot) -> None:
+        if pilot.life.phase is Phase.FLYING:
+            true = link.autopilot.true
+            seen.append(np.array([*true.position_m[:2, 0], *np.degrees(true.euler_rad[:2, 0])]))
+
+    with Pilot(Controller(settings), lambda: link, updates.append, watch) as pilot:
+        link.autopilot.blow((1.5, -1.0))
+        pilot.take_off(4.0)
+        place_m = pilot.state.position_m
+        pilot.follow(lambda time_s: TargetState(place_m, np.zeros(3)), 3.0)  # noqa: ARG005 - it stays
+        pilot.land()
+    moved = np.abs(np.array(seen[:300]) - seen[0])
+    assert np.hypot(*seen[0][2:]) > 9.0
+    assert moved[:, :2].max() < 0.1
+    assert moved[:, 2:].max() < 2.0
+    write_log(updates, log := tmp_path / "flight.csv")
+    assert replay_log(log, {}, settings).is_exact
 
 
 class Hovering:

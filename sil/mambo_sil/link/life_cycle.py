@@ -377,6 +377,7 @@ class LifeCycle:
         estimate = self.estimate
         if self.stack is None or estimate is None:
             return []
+        self.steering.lean.watch(estimate)
         away_m = abs(float(estimate.position_m[2] - self._place_m[2]) + self.height_m)
         if away_m > REACHED_M:
             self._rest_s = now_s

@@ -52,7 +52,7 @@ STARTS_M: Final = (0.7, -0.4, 0.0)
 SILENT_S: Final = {"PX4": 1.0, "ArduCopter": 3.0}
 """Time without set-points: PX4 leaves OFFBOARD then (COM_OF_LOSS_T), ArduCopter is level (GUID_TIMEOUT)."""
 CLIMB_M_S, DESCENT_M_S, SPEED_M_S = 1.0, 0.7, 1.5
-POSITION_1_S, VELOCITY_1_S = 0.9, 2.0
+POSITION_1_S, VELOCITY_1_S, WIND_1_S2 = 0.9, 2.0, 1.0
 LARGEST_TILT_RAD: Final = 0.35
 DISARMS_S: Final = 1.0
 """Time on the ground after which it disarms by itself."""
@@ -113,6 +113,8 @@ class SimulatedAutopilot:
         self._set_point_s, self._landed_s = -math.inf, 0.0
         self._aim_m: FloatArray = np.array(STARTS_M)
         self._yaw_rad = self.condition.yaw_rad
+        self._wind_m_s2: FloatArray = np.zeros(2)
+        """What its own controller has learnt to lean against."""
 
     @property
     def true(self) -> Seen:
@@ -237,7 +239,7 @@ class SimulatedAutopilot:
         self._state = carry_on_ground(self._state, self._there)
 
     def _hold(self, estimate: EstimatedState) -> tuple[FloatArray, float]:
-        """Return roll, pitch (2,) and thrust in N towards its own aim: its own controller, a PD."""
+        """Return roll, pitch (2,) and thrust in N towards its own aim, by its own controller, a PID."""
         if self.mode == self.stack.guided and isinstance(self._set_point, SetPosition):
             self._aim_m = self._set_point.position_m + np.array(STARTS_M) - self.error_m
         place_m = estimate.position_m + np.array(STARTS_M) - self.error_m
@@ -246,7 +248,10 @@ class SimulatedAutopilot:
         wanted_m_s[2] = np.clip(wanted_m_s[2], -CLIMB_M_S, DESCENT_M_S)
         if self.mode == self.stack.land:
             wanted_m_s[2] = DESCENT_M_S
-        north, east, down = (VELOCITY_1_S * (wanted_m_s - velocity_m_s)).tolist()
+        error_m_s = wanted_m_s - velocity_m_s
+        learnt_m_s2 = self._wind_m_s2 + self.drone.step_s * WIND_1_S2 * error_m_s[:2]
+        self._wind_m_s2 = np.zeros(2) if self.is_on_ground else learnt_m_s2
+        north, east, down = (VELOCITY_1_S * error_m_s + np.array([*self._wind_m_s2, 0.0])).tolist()
         yaw_rad = float(estimate.attitude_rad[2]) - self._error_rad
         ahead = north * math.cos(yaw_rad) + east * math.sin(yaw_rad)
         right = east * math.cos(yaw_rad) - north * math.sin(yaw_rad)

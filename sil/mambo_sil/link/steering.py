@@ -12,6 +12,7 @@ from mambo_sil.api.api_controller import Controller
 from mambo_sil.errors import LinkError
 from mambo_sil.flight.frames import turned_tilt, wrapped
 from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
+from mambo_sil.link.lean import Lean
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steady_frame import FrameJump, SteadyFrame
 from mambo_sil.model.identify.signals import UPDATES
@@ -75,6 +76,8 @@ class Steering:
         self.pushed_s = 0.0
         """For how long the disturbance has been at the limit of what the controller learns."""
         self.frame = SteadyFrame()
+        most_m_s2 = AT_LIMIT * controller.settings.observer.disturbance_limit_m_s2
+        self.lean = Lean(controller.settings.model.drag_1_s, most_m_s2)
         self.take_overs = 0
         self._steps = 0
         self._record = record
@@ -85,8 +88,9 @@ class Steering:
         self._clock_s = -math.inf
 
     def begin(self, estimate: EstimatedState) -> None:
-        """Begin anew at an estimate, with the thrust of hover."""
-        roll_rad, pitch_rad, yaw_rad = estimate.attitude_rad.tolist()
+        """Begin anew at an estimate, with the thrust of hover, and lean against the wind."""
+        self.lean.begin(self.controller.disturbance_m_s2[0])
+        roll_rad, pitch_rad, yaw_rad = self.lean.upright(estimate).attitude_rad.tolist()
         most_rad = self.controller.settings.limits.tilt_rad
         self._sent_rad = np.clip([roll_rad, pitch_rad], -most_rad, most_rad)
         self._sent_m_s2 = self.hover_m_s2
@@ -115,6 +119,8 @@ class Steering:
         self._clock_s += steps * period_s
         self._follow_frame(estimate)
         self._steps += steps
+        self.lean.fade(steps * period_s)
+        estimate = self.lean.upright(estimate)
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
             self._step(_between(last, estimate, 1.0 - left / steps), self._goal(targets(left * period_s)))
@@ -136,8 +142,8 @@ class Steering:
     def _step(self, estimate: EstimatedState, target: TargetState) -> StepOutcome:
         state = DroneState(estimate.position_m, estimate.velocity_m_s, estimate.attitude_rad)
         outcome = self.controller.step(state, target)
-        learnt_m_s2 = float(np.abs(self.controller.disturbance_m_s2).max())
-        is_pushed = learnt_m_s2 >= AT_LIMIT * self.most_disturbance_m_s2
+        push_m_s2 = self.controller.disturbance_m_s2[0] - self.lean.against_m_s2
+        is_pushed = float(np.abs(push_m_s2).max()) >= AT_LIMIT * self.most_disturbance_m_s2
         self.pushed_s = self.pushed_s + self.controller.update_period_s if is_pushed else 0.0
         return outcome
 
@@ -166,11 +172,15 @@ class Steering:
     ) -> SetAttitude:
         """Return the set-point of an outcome, and record it; the controller learns of a capped thrust."""
         roll_rad, pitch_rad, heading_rad, thrust_m_s2 = outcome.attitude_thrust("NED").tolist()
-        share = thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
+        command_rad, most_rad = np.array([roll_rad, pitch_rad]), self.controller.settings.limits.tilt_rad
+        lean_rad = self.lean.tilt_rad(float(estimate.attitude_rad[2]))
+        leaning_rad = np.clip(command_rad + lean_rad, -most_rad, most_rad)
+        more = float(np.prod(np.cos(command_rad)) / np.prod(np.cos(leaning_rad)))
+        share = more * thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
         thrust = min(max(share, LEAST_THRUST), MOST_THRUST)
         if thrust != share:
-            self.controller.set_thrust(thrust / self.hover_thrust * self.hover_m_s2)
-        self._sent_rad, self._sent_m_s2 = np.array([roll_rad, pitch_rad]), thrust_m_s2
+            self.controller.set_thrust(thrust / more / self.hover_thrust * self.hover_m_s2)
+        self._sent_rad, self._sent_m_s2 = command_rad, thrust_m_s2
         self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
         self.is_accepted = int(outcome.status) == 0
         self.away_m = float(np.linalg.norm(target.position_m - estimate.position_m))
@@ -182,7 +192,7 @@ class Steering:
             )
         )
         self._jump = None
-        turn_rad = heading_rad - float(estimate.attitude_rad[2])
+        turn_rad, (roll_rad, pitch_rad) = heading_rad - float(estimate.attitude_rad[2]), leaning_rad.tolist()
         attitude_rad = np.array([*turned_tilt(roll_rad, pitch_rad, turn_rad), heading_rad])
         return SetAttitude(estimate.time_s, attitude_rad, thrust)
 
