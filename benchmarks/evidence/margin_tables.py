@@ -8,7 +8,7 @@ from benchmarks.evidence.item import Figures
 from benchmarks.evidence.tables import Row, title
 from benchmarks.markdown import table
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.results.number_format import three_digits
 
 PRESETS: Final = ("mambo", "crazyflie")
@@ -26,7 +26,7 @@ def _cases() -> list[tuple[str, str, str]]:
     """Return preset, drone and sensors of each command: the true state, and the sensors of a campaign."""
     found: list[tuple[str, str, str]] = []
     for drone in DRONES:
-        sensors = SENSORS_OF[vehicle_toml.preset(drone).sensors.kind][-1]
+        sensors = DEFAULT_SENSORS[vehicle_toml.preset(drone).sensors.kind]
         found += [(preset, drone, seen) for preset in PRESETS for seen in dict.fromkeys(("true", sensors))]
     return found
 

@@ -8,6 +8,7 @@ import pytest
 
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_nmpc import ArgumentError, Vehicle
+from mambo_nmpc.curves import Circle
 from mambo_sil.api.simulated import SimulatedDrones
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.sensors.instruments import Sensors
@@ -202,10 +203,80 @@ def test_many_are_seen_through_cameras_in_wind() -> None:
     assert (info["status"] == 0).all()
     assert (np.abs(np.linalg.norm(seen[:, 9:12], axis=1) - info["distance_m"]) > 1e-4).all()
     for wrong, message in (
-        ({"sensors": "flow-deck"}, 'sensors = "flow-deck" must be "true" or "mocap"'),
+        ({"sensors": "flow"}, 'sensors = "flow" must be "true" or "mocap" or "flow-deck"'),
+        ({"wind_direction_rad": 90.0}, r"wind_direction_rad = 90\.0 must lie in"),
         ({"wind_speed_m_s": -1.0}, r"wind_speed_m_s = -1\.0 must lie in"),
     ):
         with pytest.raises(ArgumentError, match=message):
             make_many(2, **wrong)
     with pytest.raises(ArgumentError, match=r"actions: has shape \(2,\); it must be \(4, 2\)"):
         many.step(np.zeros(2))
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize(
+    ("vehicle", "sensors"),
+    [
+        ("crazyflie", "flow-deck"),
+        ("crazyflie", "autopilot"),
+        ("mambo", "mambo"),
+        ("mambo", "mambo-derotated"),
+    ],
+)
+def test_every_kind_of_sensors_measures(vehicle: str, sensors: str) -> None:
+    """What is seen is not the true state, and is again where an environment begins again."""
+    many = make_many(3, action="attitude", vehicle=vehicle, sensors=sensors, trajectory="hover", tilt_rad=0.3)
+    seen, info = many.reset(seed=1)
+    for _ in range(40):
+        seen, _, crashed, _, info = many.step(np.zeros((3, 2)))
+    assert not crashed.any()
+    off_m = np.abs(np.linalg.norm(seen[:, 9:12], axis=1) - info["distance_m"])
+    assert 1e-5 < off_m.max() < 0.2
+    flights = many.unwrapped._flights
+    flights.begin_again(np.random.default_rng(3), np.array([True, False, True]))
+    again, info = flights.observe({})
+    placed = [0, 2]
+    np.testing.assert_allclose(
+        np.linalg.norm(again[placed, 9:12], axis=1), info["distance_m"][placed], atol=1e-6
+    )
+    assert (again[1] == seen[1]).all()
+    for _ in range(5):
+        seen, _, crashed, _, info = many.step(np.zeros((3, 2)))
+    assert not crashed.any()
+    assert np.abs(np.linalg.norm(seen[:, 9:12], axis=1) - info["distance_m"])[placed].max() < 0.05
+
+
+def test_the_wind_blows_from_where_it_is_asked() -> None:
+    """Towards a heading: pi / 2 is to the right, where y, to the left, falls."""
+    ends = []
+    for direction_rad in (0.0, np.pi / 2.0, np.pi):
+        environment = make(
+            action="attitude", trajectory="hover", wind_speed_m_s=6.0, wind_direction_rad=direction_rad
+        )
+        start, _ = environment.reset(seed=3)
+        for _ in range(100):
+            seen, *_ = environment.step(np.zeros(2))
+        ends.append(seen[:2] - start[:2])
+    ahead, right, back = ends
+    assert ahead[0] > 0.1 > abs(ahead[1])
+    assert right[1] < -0.1
+    assert abs(right[0]) < 0.1
+    assert back[0] < -0.1
+
+
+def test_a_curve_of_one_s_own_is_followed() -> None:
+    """An object, as `fly` takes it; one whose velocity is wrong is refused."""
+    environment = make(trajectory=Circle(1.0, 0.7))
+    assert (
+        environment.reset(seed=2)[0] == make(trajectory="circle", size_m=1.0, rate_rad_s=0.7).reset(seed=2)[0]
+    ).all()
+
+    class Wrong(Circle):
+        """Moves the other way."""
+
+        def target(self, time_s: Any) -> Any:
+            """Return [x, y, vx, vy]."""
+            return super().target(time_s) * np.array([1.0, 1.0, -1.0, -1.0])
+
+    with pytest.raises(ArgumentError, match=r"trajectory: at .* its velocity along . is"):
+        make(trajectory=Wrong(1.0, 0.7))

@@ -127,18 +127,20 @@ def test_wrong_shapes_are_refused_by_name() -> None:
 
 
 class Moving:
-    """A trajectory of a program's own, whose arrays have given shapes."""
+    """A trajectory of a program's own, whose arrays have shapes by the number of times."""
 
-    def __init__(self, target: tuple[int, ...], acceleration: tuple[int, ...]) -> None:
+    def __init__(
+        self, target: Callable[[int], tuple[int, ...]], acceleration: Callable[[int], tuple[int, ...]]
+    ) -> None:
         self._shapes = target, acceleration
 
-    def target(self, time_s: Any) -> Any:  # noqa: ARG002 - the same at all times
+    def target(self, time_s: Any) -> Any:
         """Return zeros."""
-        return np.zeros(self._shapes[0])
+        return np.zeros(self._shapes[0](len(time_s)))
 
-    def acceleration(self, time_s: Any) -> Any:  # noqa: ARG002 - the same at all times
+    def acceleration(self, time_s: Any) -> Any:
         """Return zeros."""
-        return np.zeros(self._shapes[1])
+        return np.zeros(self._shapes[1](len(time_s)))
 
 
 @pytest.mark.parametrize(
@@ -149,7 +151,7 @@ class Moving:
             'sensors = "x" must be "true" or "mocap" or "flow-deck" or "autopilot" or "mambo"',
         ),
         ({"sensors": None}, "sensors = None must be"),
-        ({"sensors": "mocap"}, 'sensors = "mocap" must be "true" or "mambo"'),
+        ({"sensors": "mocap"}, r'sensors = "mocap" needs its figures, \[sensors\], in the file'),
         ({"start": "landed"}, 'start = "landed" must be "hover" or "take-off"'),
         (
             {"trajectory": "eight"},
@@ -157,8 +159,11 @@ class Moving:
         ),
         ({"trajectory": None}, "trajectory = None must be"),
         ({"trajectory": Circle}, "trajectory = .* or an object with the methods target and acceleration"),
-        ({"trajectory": Moving((101, 4), (2, 101))}, r"acceleration\(\): has shape \(2, 101\) for 101 times"),
-        ({"trajectory": Moving((101, 2, 4), (101, 2))}, "flights = 1 must be 2"),
+        (
+            {"trajectory": Moving(lambda k: (k, 4), lambda k: (2, k))},
+            r"trajectory: acceleration\(\) has shape \(2, 800\) for 800 times",
+        ),
+        ({"trajectory": Moving(lambda k: (k, 2, 4), lambda k: (k, 2))}, "flights = 1 must be 2"),
         *(({"size_m": value}, r"size_m = .* must lie in -1000\.\.1000") for value in (np.nan, 1e300)),
         *(({"rate_rad_s": value}, r"rate_rad_s = .* must lie in -100\.\.100") for value in (np.nan, 1e300)),
         *(({"duration_s": value}, r"duration_s = .* in 0\.\.3600") for value in (np.nan, -1.0, 1e300)),

@@ -115,7 +115,7 @@ def test_a_law_that_fails_loses_its_own_flights(both: CampaignFlights) -> None:
         ({"laws": {}}, ArgumentError, "laws = {} must have a controller or a law"),
         ({"laws": {"a": Pd(), "A_seen": Pd()}}, InvalidSettingsError, "would have the same names"),
         ({"draws": [1]}, ArgumentError, r"draws = \[1\] must be a mapping"),
-        ({"laws": {"a": Broken()}}, ArgumentError, r"laws\['a'\]: law.step: KeyError"),
+        ({"laws": {"a": Broken()}}, ArgumentError, "a: law.step: KeyError"),
         ({"laws": {"a b": Pd()}}, ArgumentError, 'laws = "a b" must have names of at most 40 letters'),
         ({"laws": {"a": 3}}, ArgumentError, r"laws\['a'\] = 3 must be a Controller or an object with"),
         ({"laws": [Pd()]}, ArgumentError, "laws = .* must be a mapping of names"),

@@ -101,9 +101,7 @@ def test_fly_states_the_whole_drone() -> None:
 def test_sensors_of_another_drone_are_refused() -> None:
     """With those it has."""
     _, said = run("fly", "--vehicle", "crazyflie", "--sensors", "mambo", code=2)
-    assert said == (
-        '--sensors = "mambo" must be "true" or "mocap": vehicle crazyflie has sensors.kind = "mocap"\n'
-    )
+    assert said == ('--sensors = "mambo" needs its figures, [sensors], in the file of vehicle crazyflie\n')
 
 
 def test_one_list_of_sensors_for_every_command() -> None:

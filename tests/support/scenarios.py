@@ -254,6 +254,8 @@ BATCHES: Final = {
     "lagging": captured(LAGGING),
     "space": SPACE,
     "touching": TOUCHING,
+    "flow deck": tuple(one.model_copy(update={"sensors": "flow-deck"}) for one in captured(CRAZYFLIE)),
+    "autopilot": tuple(one.model_copy(update={"sensors": "autopilot"}) for one in captured(FLOWN)[:3]),
     "flown in space": FLOWN_IN_SPACE,
     **ALTITUDES,
     "level by pid": tuple(one.model_copy(update={"altitude_loop": "pid"}) for one in captured(CRAZYFLIE)[:2]),

@@ -148,7 +148,7 @@ def test_a_simulated_flight_makes_the_same_calls(
     """It follows what they ask for, with a hop before, lands, and leaves a log, in metres and radians."""
     assert run(scripts, *arguments, "--simulate", "--laps", "1") == 0
     printed = capsys.readouterr().out
-    assert "simulated on crazyflie through motion capture" in printed
+    assert "simulated on crazyflie, sensors mocap: " in printed
     assert "it landed" in printed
     rows = np.genfromtxt("flight.csv", delimiter=",", names=True)
     for axis in "xy":

@@ -3,28 +3,30 @@
 `gymnasium.make_vec` of the same name makes n of them, whose drones are simulated together.
 """
 
+import math
 from pathlib import Path
-from typing import Any, Final, Literal, Unpack
+from typing import Any, Final, Literal, Unpack, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.adapters import load
-from mambo_nmpc.curves import CurvePoint, curve, sample
+from mambo_nmpc.curves import CurvePoint, sample
 from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.flights import as_curve
 from mambo_sil.api.options import ControllerOptions
 from mambo_sil.api.simulated import LOST_M, SimulatedDrones
 from mambo_sil.arguments import is_whole, of_shape, require, require_choice, require_number
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.frames import command_in_frame, vectors_to_ned
-from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.names import SENSORS_KINDS, SENSORS_NAMES, CurveName, SensorsName
 from mambo_sil.flight.scenario import LARGEST_WIND_M_S, choose_sensors
 from mambo_sil.flight.states import TargetState
+from mambo_sil.flight.trajectories import Trajectory
 
 gymnasium: Any = load("gymnasium", "pip install gymnasium")
 Environment: Any = gymnasium.Env
@@ -36,37 +38,68 @@ CRASH_REWARD: Final = -10.0
 MOST_STEPS: Final = 2000
 
 
+ActionName = Literal["attitude", "target"]
+
+
+class EnvironmentOptions(ControllerOptions, total=False):
+    """What an environment is like, and its controller; a missing one has the default of the first value."""
+
+    action: ActionName
+    """"target" sets x and y of a position at rest, as shares of `reach_m`, to which the generated C flies;
+    "attitude" commands roll and pitch, as shares of the tilt limit."""
+    vehicle: str | Path | Vehicle
+    """"crazyflie", another shipped drone, a vehicle.toml, or a Vehicle."""
+    trajectory: CurveName | Trajectory
+    """"bernoulli", another curve of the command `fly`, or an object as `mambo_nmpc.fly` takes it."""
+    size_m: float
+    """2 m: half-width, radius, step or height of a curve by name."""
+    rate_rad_s: float
+    """0.5 rad/s: its angular rate."""
+    reach_m: float
+    """5 m: what an action of 1 is, as a target."""
+    sensors: SensorsName
+    """"true": through what the drone is seen; others with their noise and delay."""
+    wind_speed_m_s: float
+    """0 m/s: mean wind 6 m above the ground, with its gusts."""
+    wind_direction_rad: float
+    """0, ahead: heading towards which the wind blows; pi / 2 is to the right."""
+
+
 class _Flights:
     """What the environments of n drones have in common, in arrays (n, ...)."""
 
     def __init__(
         self,
         n: int,
-        action: Literal["attitude", "target"],
-        vehicle: str | Path | Vehicle,
-        trajectory: CurveName,
+        action: ActionName = "target",
+        vehicle: str | Path | Vehicle = "crazyflie",
+        trajectory: CurveName | Trajectory = "bernoulli",
         *,
-        size_m: float,
-        rate_rad_s: float,
-        reach_m: float,
-        sensors: Literal["true", "mocap"],
-        wind_speed_m_s: float,
+        size_m: float = 2.0,
+        rate_rad_s: float = 0.5,
+        reach_m: float = 5.0,
+        sensors: SensorsName = "true",
+        wind_speed_m_s: float = 0.0,
+        wind_direction_rad: float = 0.0,
         **options: Unpack[ControllerOptions],
     ) -> None:
-        require_choice("action", action, ("attitude", "target"))
-        require_choice("sensors", sensors, ("true", "mocap"))
+        require_choice("action", action, get_args(ActionName))
+        require_choice("sensors", sensors, SENSORS_NAMES)
         require_number("reach_m", reach_m, 0.1, LOST_M)
         require_number("wind_speed_m_s", wind_speed_m_s, 0.0, LARGEST_WIND_M_S)
+        require_number("wind_direction_rad", wind_direction_rad, -math.tau, math.tau)
         require("height" not in options, "height", options.get("height"), "be left out: the plant has a loop")
         if not isinstance(vehicle, Vehicle):
             vehicle = Vehicle.of(vehicle_toml.load(str(vehicle)))
         vehicle.require_flights(n)
         self._vehicle = vehicle
-        self.n, self._action, self._curve = n, action, curve(trajectory, size_m, rate_rad_s)
-        self._controller = Controller.from_vehicle(self._vehicle, n, sensors=sensors, **options)
-        chosen = choose_sensors(sensors, self._vehicle.drone)
-        self._sensors = chosen if isinstance(chosen, MotionCapture) else None
-        self._disturbances = Disturbances(wind_speed_m_s)
+        self.n, self._action = n, action
+        measures = next(kind for kind in SENSORS_KINDS if sensors.startswith(kind))
+        self._controller = Controller.from_vehicle(self._vehicle, n, sensors=measures, **options)
+        longest_s = MOST_STEPS * self._controller.update_period_s
+        self._curve = as_curve(trajectory, size_m, rate_rad_s, longest_s)
+        self._sensors = choose_sensors(sensors, self._vehicle.drone)
+        self._disturbances = Disturbances(wind_speed_m_s, wind_direction_rad)
         self._limits = self._controller.settings.limits
         self._scale = self._limits.tilt_rad if action == "attitude" else reach_m
         self._drones = self._seeded(range(n))
@@ -156,13 +189,9 @@ class _Flights:
 class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package that need not be installed
     """A drone that is to follow a curve, in steps of the controller's update period.
 
-    action:      (2,) in -1..1: "attitude" commands roll and pitch, as shares of the tilt limit; "target" sets
-                 x and y of a position at rest, as shares of `reach_m`, to which the generated C flies. The
-                 height is that of the curve: held by the C with "target" and `[height]` in the settings, else
-                 by an altitude loop.
-    vehicle:     a shipped drone, a vehicle.toml, or a Vehicle.
-    sensors:     through which the drone is seen: "true", or "mocap" with its noise and delay.
-    wind_speed_m_s: mean wind to north 6 m above the ground, with its gusts.
+    options:     `EnvironmentOptions`.
+    action:      (2,) in -1..1. The height is that of the curve: held by the C with "target" and `[height]` in
+                 the settings, else by an altitude loop.
     observation: (15,) position, velocity, roll, pitch, yaw, then position and velocity of the curve less
                  those of the drone, in NWU: x ahead, y left, z up.
     reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode. An
@@ -171,31 +200,8 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
                  with "target" what the C says: status, saturated, active (`nmpc_limits_active`).
     """
 
-    def __init__(
-        self,
-        action: Literal["attitude", "target"] = "target",
-        vehicle: str | Path | Vehicle = "crazyflie",
-        trajectory: CurveName = "bernoulli",
-        *,
-        size_m: float = 2.0,
-        rate_rad_s: float = 0.5,
-        reach_m: float = 5.0,
-        sensors: Literal["true", "mocap"] = "true",
-        wind_speed_m_s: float = 0.0,
-        **options: Unpack[ControllerOptions],
-    ) -> None:
-        self._flights = _Flights(
-            1,
-            action,
-            vehicle,
-            trajectory,
-            size_m=size_m,
-            rate_rad_s=rate_rad_s,
-            reach_m=reach_m,
-            sensors=sensors,
-            wind_speed_m_s=wind_speed_m_s,
-            **options,
-        )
+    def __init__(self, **options: Unpack[EnvironmentOptions]) -> None:
+        self._flights = _Flights(1, **options)
         self.action_space = self._flights.action_space
         self.observation_space = self._flights.observation_space
 
@@ -222,32 +228,9 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
     metadata: Final = {"autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
 
     def __init__(
-        self,
-        num_envs: int = 1,
-        action: Literal["attitude", "target"] = "target",
-        vehicle: str | Path | Vehicle = "crazyflie",
-        trajectory: CurveName = "bernoulli",
-        *,
-        size_m: float = 2.0,
-        rate_rad_s: float = 0.5,
-        reach_m: float = 5.0,
-        sensors: Literal["true", "mocap"] = "true",
-        wind_speed_m_s: float = 0.0,
-        max_episode_steps: int = MOST_STEPS,
-        **options: Unpack[ControllerOptions],
+        self, num_envs: int = 1, *, max_episode_steps: int = MOST_STEPS, **options: Unpack[EnvironmentOptions]
     ) -> None:
-        self._flights = _Flights(
-            num_envs,
-            action,
-            vehicle,
-            trajectory,
-            size_m=size_m,
-            rate_rad_s=rate_rad_s,
-            reach_m=reach_m,
-            sensors=sensors,
-            wind_speed_m_s=wind_speed_m_s,
-            **options,
-        )
+        self._flights = _Flights(num_envs, **options)
         rule = "be a whole number of 1 or more"
         require(is_whole(max_episode_steps, 1, 2**62), "max_episode_steps", max_episode_steps, rule)
         self.num_envs, self._most_steps = num_envs, max_episode_steps

@@ -7,9 +7,9 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.flights import as_curve
 from mambo_sil.arguments import is_whole, require, require_kind
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.errors import ArgumentError
 from mambo_sil.experiment.campaign.campaign_file import (
     CampaignFile,
     completed,
@@ -22,14 +22,15 @@ from mambo_sil.experiment.campaign.campaign_flights import (
     FAILURE,
     MOST_TOGETHER,
     columns,
-    fly_law,
     fly_scenarios,
 )
+from mambo_sil.experiment.campaign.drawn_curves import spatial_curves
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw, draw
 from mambo_sil.experiment.inputs import NAME, Entrant, as_sections
 from mambo_sil.flight.controllers.own_law import Law
-from mambo_sil.flight.names import IN_SPACE, SensorsName
-from mambo_sil.flight.scenario import LARGEST_SEED, Scenario, flight_of
+from mambo_sil.flight.names import SensorsName
+from mambo_sil.flight.scenario import LARGEST_SEED, flight_of
+from mambo_sil.flight.trajectories import Trajectory, is_spatial, is_trajectory
 from mambo_sil.results.blocks import ResultTable
 from mambo_sil.results.number_format import distance
 from mambo_sil.results.terminal import table as in_lines
@@ -96,7 +97,7 @@ def campaign(
     *,
     flights: int = 100,
     seed: int = 0,
-    trajectory: str | Mapping[str, Any] = "bernoulli",
+    trajectory: str | Mapping[str, Any] | Trajectory = "bernoulli",
     size_m: float | Mapping[str, Any] = 2.0,
     rate_rad_s: float | Mapping[str, Any] = 0.5,
     duration_s: float = 20.0,
@@ -107,7 +108,8 @@ def campaign(
 
     laws:       by name, the settings of controllers, or laws of your own as for `fly`.
     vehicle:    the drone round which others are drawn, as its file has it.
-    trajectory, size_m, rate_rad_s: the curve, or what it is drawn from, such as {"uniform": [0.5, 1.5]}.
+    trajectory, size_m, rate_rad_s: the curve, or what it is drawn from, such as {"uniform": [0.5, 1.5]}; or a
+                curve of your own, an object as for `fly`, which has neither size nor rate.
     sensors:    what measures; None for the drone's own.
     draws:      values and distributions of section [draws] of campaign.toml; the others have its defaults.
 
@@ -123,16 +125,22 @@ def campaign(
         require(good, "laws", name, "have names of at most 40 letters, digits, - and _")
         has_step = callable(getattr(law, "step", None))
         require(has_step, f"laws[{name!r}]", law, "be a Controller or an object with the method step")
-    section = {"trajectory": trajectory, "size_m": size_m, "rate_rad_s": rate_rad_s, "duration_s": duration_s}
+    section: dict[str, Any] = {"size_m": size_m, "rate_rad_s": rate_rad_s, "duration_s": duration_s}
+    if not (is_own := is_trajectory(trajectory)):
+        section["trajectory"] = trajectory
     file = _file(vehicle, section | ({} if sensors is None else {"sensors": sensors}), draws)
+    own = as_curve(trajectory, 0.0, 0.0, duration_s) if is_own else None
     drawn = _draws(file, flights, seed)
     flight = file.flight.model_dump() | {"vehicle": vehicle.drone.model_dump()}
+    entrants = [_entrant(name, law) for name, law in laws.items()]
     rows: list[dict[str, Any]] = []
     for first in range(0, len(drawn), MOST_TOGETHER):
         part = drawn[first : first + MOST_TOGETHER]
-        flown = _fly(laws, [scenario(flight, one) for one in part])
+        flown = fly_scenarios(entrants, [scenario(flight, one) for one in part], curve=own)
         rows += [one | row for one, row in zip(part, flown, strict=True)]
-    spatial = any(one["trajectory"] in IN_SPACE for one in drawn)
+    spatial = spatial_curves(file.flight.trajectory) if own is None else is_spatial(own)
+    if own is not None:
+        rows = [row | {"trajectory": type(own).__name__} for row in rows]
     titles = "seed", *PARAMETERS, *columns(tuple(laws), sensed=flight["sensors"] != "true", spatial=spatial)
     failed = {name: _failures(rows, name) for name in laws}
     return CampaignFlights(
@@ -161,18 +169,8 @@ def _file(vehicle: Vehicle, flight: Mapping[str, Any], draws: Mapping[str, Any] 
     """Return what a campaign.toml with these sections says; raises ArgumentError and InvalidSettingsError."""
     require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
     require(draws is None or isinstance(draws, Mapping), "draws", draws, "be a mapping of names to draws")
-    document = {"flight": _listed(flight), "draws": _listed(draws or {})}
+    document = {"flight": dict(flight), "draws": dict(draws or {})}
     return completed(as_sections(CampaignFile, document, _SOURCE), vehicle.drone, _SOURCE, replaced=False)
-
-
-def _listed(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section whose distributions may have tuples in place of lists."""
-    return {
-        name: {way: list(one) if isinstance(one, tuple) else one for way, one in value.items()}
-        if isinstance(value, Mapping)
-        else value
-        for name, value in section.items()
-    }
 
 
 def _draws(file: CampaignFile, flights: int, seed: int) -> list[Draw]:
@@ -183,20 +181,11 @@ def _draws(file: CampaignFile, flights: int, seed: int) -> list[Draw]:
     return [draw(seed, number, found) for number in range(flights)]
 
 
-def _fly(laws: Mapping[str, Controller | Law], scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
-    """Fly flights together with each law; return one row per flight."""
-    entrants = [
-        Entrant(name, "nmpc", law.settings) for name, law in laws.items() if isinstance(law, Controller)
-    ]
-    rows: list[dict[str, Any]] = list(fly_scenarios(entrants, scenarios))
-    for name, law in laws.items():
-        if not isinstance(law, Controller):
-            try:
-                found = fly_law(name, law, scenarios)
-            except ArgumentError as error:
-                raise ArgumentError(f"laws[{name!r}]: {error}") from error
-            rows = [row | of_law for row, of_law in zip(rows, found, strict=True)]
-    return rows
+def _entrant(name: str, law: Controller | Law) -> Entrant:
+    """Return a controller, whose settings fly, or a law as the campaign flies it."""
+    if isinstance(law, Controller):
+        return Entrant(name, "nmpc", law.settings)
+    return Entrant(name, "law", law=law)
 
 
 def _failures(rows: Sequence[Mapping[str, Any]], name: str) -> dict[int, str]:

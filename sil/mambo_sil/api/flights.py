@@ -22,6 +22,7 @@ from mambo_sil.arguments import (
 from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.errors import ArgumentError, TrajectoryError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.own_law import Law, OwnLaws, period_of
 from mambo_sil.flight.crashes import detect_crashes
@@ -29,6 +30,7 @@ from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import Metrics, measure
 from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start
+from mambo_sil.flight.own_curve import check_curve
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -94,7 +96,8 @@ def fly(
                 alone, with a warning that says why, and `Flown.failures`.
     trajectory: a curve of the command `fly` with half-width, radius, step or height `size_m` and angular
                 rate `rate_rad_s`, or an object with its methods `target` and `acceleration`, and `vertical`
-                if it has a height, which the altitude loop of the vehicle then follows.
+                if it has a height, which the altitude loop of the vehicle then follows. Its velocity is
+                the derivative of its position.
     yaw_rad:    constant heading, one for all flights or an array (n,).
     sensors:    what controller and inner loops see: the truth ("true"), or the vehicle's sensors by name.
     seeds:      of sensor noise and gusts, one for each of n flights.
@@ -109,9 +112,8 @@ def fly(
     has_step = callable(getattr(controller, "step", None))
     require(has_step, "controller", controller, "be a Controller or an object with the method step")
     require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
-    require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
-    require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
     require_number("duration_s", duration_s, 0.0, LONGEST_S)
+    curve = as_curve(trajectory, size_m, rate_rad_s, duration_s)
     require_number("measured_from_s", measured_from_s, 0.0, max(0.0, duration_s - period_of(controller)))
     require_choice("sensors", sensors, SENSORS_NAMES)
     require_choice("start", start, STARTS)
@@ -122,7 +124,7 @@ def fly(
     require_per_flight("wind_speed_m_s", wind_speed_m_s, 0.0, LARGEST_WIND_M_S, len(given))
     require_per_flight("wind_direction_rad", wind_direction_rad, -math.tau, math.tau, len(given))
     flight = Flight(
-        _curve(trajectory, size_m, rate_rad_s),
+        curve,
         duration_s=duration_s,
         flights=len(given),
         start=start,
@@ -144,16 +146,23 @@ def fly(
     return Flown(trace, measure(trace, measured_from_s), crashed, laws.failures)
 
 
-def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:
-    """Return the curve called `trajectory`, or `trajectory` itself; raises ArgumentError for others."""
+def as_curve(trajectory: object, size_m: float, rate_rad_s: float, duration_s: float) -> Trajectory:
+    """Return the curve called `trajectory`, or `trajectory` itself, checked for the time of a flight.
+
+    Raises ArgumentError for others.
+    """
+    require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
+    require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
     for name, curve in CURVES.items():
         if isinstance(trajectory, str) and trajectory == name:
             return curve(size_m, rate_rad_s)
     rule = f"be {', '.join(map(spell, CURVES))} or an object with the methods target and acceleration"
     require(is_trajectory(trajectory), "trajectory", trajectory, rule)
-    flown = cast("Trajectory", trajectory)
-    require(bool(np.isfinite(flown.target(np.zeros(1))).all()), "trajectory", trajectory, "be finite at 0 s")
-    return flown
+    try:
+        check_curve("trajectory", cast("Trajectory", trajectory), duration_s)
+    except TrajectoryError as error:
+        raise ArgumentError(str(error)) from error
+    return cast("Trajectory", trajectory)
 
 
 def _require_push(push_m_s2: object, flights: int) -> None:

@@ -14,7 +14,7 @@ from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION
 from mambo_sil.drone.plant.vehicle import Seen, Vehicle, VehicleState, truth
-from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
+from mambo_sil.drone.sensors.suites import AnySensors, suite_of
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.controllers.thrust_controller import ThrustDelivery
 from mambo_sil.flight.crashes import least_level
@@ -28,7 +28,7 @@ _HEIGHT_M: Final = 1.0
 class SimulatedDrones:
     """The plant of the command `fly`, in NumPy; its altitude loop, if it is asked, has feed-forward.
 
-    sensors:      motion capture through which drones are seen; None for the true state.
+    sensors:      through which drones are seen; None for the true state.
     disturbances: wind and push; their events by time do not happen.
     seeds:        of noise and gusts, one for each of n drones.
     """
@@ -39,7 +39,7 @@ class SimulatedDrones:
         update_period_s: float,
         seeds: Sequence[int] = (0,),
         *,
-        sensors: MotionCapture | None = None,
+        sensors: AnySensors | None = None,
         disturbances: Disturbances | None = None,
     ) -> None:
         self.drone, self._vehicle, self.n = vehicle.drone, vehicle, len(seeds)
@@ -53,7 +53,7 @@ class SimulatedDrones:
         self._thrust_n = np.full(self.n, self.drone.hover_demand_n)
         self._world = World(disturbances or Disturbances(), vehicle, seeds, _HEIGHT_M)
         true = truth(self._state)
-        self._suite = None if sensors is None else MocapSuite(sensors, seeds, true, self.drone.step_s)
+        self._suite = suite_of(sensors, seeds, true, self.drone.step_s)
         self._seen = true
 
     def place(self, position_m: FloatArray, chosen: NDArray[np.bool_] | None = None) -> None:

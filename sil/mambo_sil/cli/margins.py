@@ -1,25 +1,23 @@
 """The command margins: how far a controller on a drone is from instability."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_codegen.errors import echo
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
     OptionalResults,
+    OptionalSensors,
     Source,
     load,
     load_drone,
-    sensors_option,
     show_result,
 )
 from mambo_sil.cli.progress import counting_bar, progress_bar
-from mambo_sil.errors import FlightError
-from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
+from mambo_sil.flight.names import SensorsName
 from mambo_sil.results.folders import SUMMARY
 
 if TYPE_CHECKING:
@@ -35,14 +33,7 @@ def margins(
     source: Source = "mambo",
     *,
     vehicle: Drone = None,
-    sensors: Annotated[
-        SensorsName | None,
-        sensors_option(
-            SENSORS_NAMES,
-            "State that controller and inner loops get, as of `fly`; by default the true one, with "
-            "--campaign that of the campaign.",
-        ),
-    ] = None,
+    sensors: OptionalSensors = None,
     campaign: Annotated[
         str | None,
         typer.Option(
@@ -128,17 +119,9 @@ def _campaign(
     Its drone is `vehicle`, else the one that its file names, else `of_settings`, the one of the settings.
     """
     from mambo_sil.experiment.campaign import campaign_file
-    from mambo_sil.flight.scenario import choose_sensors
 
     default = named == _DEFAULT
     own = default or not campaign_file.names_drone(Path(named))
     chosen = vehicle or (of_settings if own else None)
     drawing = campaign_file.default(chosen) if default else campaign_file.read(Path(named), chosen)
-    if sensors is None:
-        return drawing
-    try:
-        choose_sensors(sensors, drawing.drone)
-    except FlightError as error:
-        raise InvalidSettingsError((f"--sensors: {error}",)) from None
-    flight = drawing.file.flight.model_copy(update={"sensors": sensors})
-    return replace(drawing, file=drawing.file.model_copy(update={"flight": flight}))
+    return drawing if sensors is None else drawing.with_sensors(sensors)

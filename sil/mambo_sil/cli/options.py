@@ -13,6 +13,7 @@ from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, U
 from mambo_codegen.plain_file import find_obstacle
 from mambo_codegen.settings.toml_file import BOARDS, PRESETS
 from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.flight.names import SENSORS_NAMES, SensorsName
 from mambo_sil.results.terminal import result_text
 
 if TYPE_CHECKING:
@@ -73,14 +74,21 @@ Workers = Annotated[
 
 
 def sensors_option(names: Sequence[str], about: str) -> Any:
-    """Return the option that chooses sensors by name."""
+    """Return the option that chooses sensors by name; its help is `about`, and the names."""
 
     def read(text: str) -> str:
         if text not in names:
             raise typer.BadParameter(f"{text!r} is not one of {', '.join(map(repr, names))}.")
         return text
 
+    about = f"{about}: {', '.join(names)}."
     return typer.Option(help=about, parser=read, metavar="NAME", autocompletion=_completing(names))
+
+
+OptionalSensors = Annotated[
+    SensorsName | None,
+    sensors_option(SENSORS_NAMES, "What measures, in place of the sensors of file or drone"),
+]
 
 
 Boards = Annotated[

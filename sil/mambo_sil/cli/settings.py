@@ -186,7 +186,7 @@ def design(
         SensorsKind | None,
         sensors_option(
             SENSORS_KINDS,
-            "What measures, in place of the file's sensors: true, mocap, flow-deck, autopilot, mambo.",
+            "What measures, in place of the file's sensors",
         ),
     ] = None,
     firm: Annotated[

@@ -4,9 +4,10 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 """
 
 import difflib
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar, get_args, get_origin
 
@@ -21,7 +22,7 @@ from mambo_codegen.settings.toml_file import parse_document, read_text
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.controllers.own_law import LawFile
+from mambo_sil.flight.controllers.own_law import Law, LawFile, period_of
 from mambo_sil.flight.names import PD_NAMES, PdName
 
 NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -44,30 +45,37 @@ class Entrant:
 
     name: str
     kind: Literal[PdName, "nmpc", "law"]
-    settings: Settings
+    settings: Settings = field(default_factory=Settings)
     """A PD uses their update period only, a law nothing."""
-    law: LawFile | None = None
+    law: LawFile | Law | None = None
+    """In a file, or an object of a program."""
 
     @property
     def update_period_s(self) -> float:
-        """Time from one control step to the next."""
-        return self.settings.horizon.update_period_s if self.law is None else self.law.update_period_s
+        """Time from one control step to the next; raises ArgumentError for that of a law."""
+        return self.settings.horizon.update_period_s if self.law is None else period_of(self.law)
 
     @property
     def controller(self) -> str:
         """What a record of a flight calls it."""
-        return self.kind if self.law is None else self.law.named
+        return self.law.named if isinstance(self.law, LawFile) else self.kind
 
     def document(self) -> dict[str, Any]:
-        """Return the controller as plain values, for other processes and for files."""
-        law = {} if self.law is None else {"law": asdict(self.law)}
-        return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump(), **law}
+        """Return the controller as plain values, for other processes and for files; of laws only a file's."""
+        flies = (
+            {"law": asdict(self.law)}
+            if isinstance(self.law, LawFile)
+            else {"settings": self.settings.model_dump()}
+        )
+        return {"name": self.name, "kind": self.kind, **flies}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> "Entrant":
-        """Return the controller that `document` describes."""
-        law = LawFile(**document["law"]) if "law" in document else None
-        return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]), law)
+        """Return the controller that `document`, perhaps from a file, describes."""
+        name, kind = document["name"], document["kind"]
+        if "law" in document:
+            return cls(name, kind, law=LawFile(**document["law"]))
+        return cls(name, kind, Settings.model_validate_json(json.dumps(document["settings"])))
 
 
 def read_as(model: type[File], path: Path) -> File:
@@ -125,7 +133,7 @@ def load_entrant(named: str, folder: Path, place: str) -> Entrant:
     """
     for pd in PD_NAMES:
         if named == pd:
-            return Entrant(pd, pd, Settings())
+            return Entrant(pd, pd)
     settings = load_settings(named, folder, place)
     name = named if named in presets.names() else Path(named).stem
     if not NAME.fullmatch(name) or name in PD_NAMES:
@@ -157,7 +165,7 @@ def load_any_entrant(named: str, folder: Path, place: str) -> Entrant:
     if not NAME.fullmatch(name):
         rule = "must have a class of at most 40 letters, digits and _: results are named after it"
         raise InvalidSettingsError((f"{place}: {echo(named)} {rule}",))
-    return Entrant(name, "law", Settings(), law)
+    return Entrant(name, "law", law=law)
 
 
 def _explain(details: ErrorDetails, model: type[FileSection]) -> str:

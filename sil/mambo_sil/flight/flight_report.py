@@ -24,6 +24,7 @@ from mambo_sil.flight.fences import measure_limits, nears_limit, walls_m
 from mambo_sil.flight.flight_marks import NO_MARKS, FlightMarks
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES, flies_settings
+from mambo_sil.flight.own_curve import is_curve_file
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_npz
 from mambo_sil.results.blocks import (
@@ -154,6 +155,7 @@ class FlySummary(FlightSummary):
     yaw_rad: float
     push_m_s2: tuple[float, float]
     wind_speed_m_s: float
+    wind_direction_rad: float = 0.0
     sensors: str
     altitude_loop: str = "stock"
     seed: int
@@ -185,9 +187,15 @@ class FlySummary(FlightSummary):
             "start": f"{self.start}, heading {self.yaw_rad:g} rad",
             "altitude loop": self.altitude_loop,
             "disturbances": "push {:g}, {:g} m/s^2".format(*self.push_m_s2)
-            + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
+            + f"; wind with gusts {self.wind_speed_m_s:g} m/s{self._direction}; "
+            f"motor lag {self.motor_lag_s:g} s",
         }
         return self._result(folder, self._flier, f"Flight: {self._flier}, {self.trajectory}", self, facts)
+
+    @property
+    def _direction(self) -> str:
+        """The heading of the wind, where it is not north."""
+        return f" towards {self.wind_direction_rad:g} rad" if self.wind_direction_rad else ""
 
     def _remarks(self) -> Iterator[str]:
         yield from super()._remarks()
@@ -245,12 +253,13 @@ def about_flight(name: str, flown: FlySummary | Scenario) -> str:
 
 
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:
-    shape = "" if flown.size_m is None else f", {flown.size_m:g} m"
-    if flown.rate_rad_s is not None:
+    own = is_curve_file(flown.trajectory)
+    shape = "" if own or flown.size_m is None else f", {flown.size_m:g} m"
+    if not own and flown.rate_rad_s is not None:
         shape += f", {flown.rate_rad_s:g} rad/s"
     return {
         "vehicle": flown.vehicle.name,
-        "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
+        "trajectory": f"{Path(flown.trajectory).name}{shape}, {flown.duration_s:g} s",
         "state": "true" if flown.sensors == "true" else f"estimated, sensors {flown.sensors}",
     }
 

@@ -9,7 +9,7 @@ gives the same bits alone and in a batch.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Final, Protocol
@@ -29,9 +29,8 @@ from mambo_sil.drone.plant.ground import carry_on_ground
 from mambo_sil.drone.plant.link import NOT_CALLED, Drops, Link, Wire
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
 from mambo_sil.drone.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
-from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import Sensors
-from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
+from mambo_sil.drone.sensors.suites import AnySensors, suite_of
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
@@ -128,7 +127,7 @@ class Flight:
     offset: Offset | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     link: Link = field(default_factory=Link)
-    sensors: Sensors | MotionCapture | None = None
+    sensors: AnySensors | None = None
     """Sensors behind the estimates that position controller and stock loops receive; None: the true state."""
     altitude: AltitudeLaw = field(default_factory=AltitudeLaw)
     """What holds the height."""
@@ -257,7 +256,7 @@ def fly(
     delivery = ThrustDelivery(drone, flight.flights)
     take_off_n = np.full(flight.flights, loops.take_off_thrust_n(drone))
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
-    suite = suite_of(flight, seeds, truth(state))
+    suite = suite_of(flight.sensors, seeds, truth(state), step_s)
     trace = allocate_trace(times_s, flight.traced_targets, sensed=suite is not None)
     drops, first = Drops(flight.link, seeds), first_command(flight, state, has_thrust=has_thrust)
     caller, wire = _Caller(controller, drops, targets, trace, first), Wire(flight.link, first)
@@ -308,17 +307,6 @@ def first_command(flight: Flight, state: VehicleState, *, has_thrust: bool) -> F
         return level
     hover_m_s2 = GRAVITY_M_S2 / flight.vehicle.drone.thrust_gain
     return np.concatenate([level, np.where(z_m < 0.0, hover_m_s2, 0.0)[np.newaxis]])
-
-
-def suite_of(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
-    """Return the sensors of n flights; None: the true state."""
-    match flight.sensors:
-        case MotionCapture() as capture:
-            return MocapSuite(capture, seeds, start, flight.vehicle.drone.step_s)
-        case Sensors() as sensors:
-            return Suite(sensors, seeds, start)
-        case None:
-            return None
 
 
 def open_loop_updates(flight: Flight, times_s: FloatArray) -> int:

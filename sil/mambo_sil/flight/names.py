@@ -11,17 +11,15 @@ SensorsKind = Literal["true", "mocap", "flow-deck", "autopilot", "mambo"]
 """What measures: nothing, since the true state is known; motion capture; a flow deck; the estimator of PX4 or
 ArduPilot; what the Mambo has."""
 SensorsName = Literal[SensorsKind, "mambo-derotated"]
-"""`mambo-derotated` subtracts the rotation of the camera from the optical flow; `flow-deck` is for --app,
-`autopilot` for the command `pilot`."""
-SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
-    "true": ("true",),
-    "mocap": ("true", "mocap"),
-    "flow-deck": ("true",),
-    "autopilot": ("true",),
-    "mambo": ("true", "mambo", "mambo-derotated"),
+"""`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
+DEFAULT_SENSORS: Final[dict[SensorsKind, SensorsName]] = {
+    "true": "true",
+    "mocap": "mocap",
+    "flow-deck": "flow-deck",
+    "autopilot": "autopilot",
+    "mambo": "mambo-derotated",
 }
-"""Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default. A
-flow deck is simulated on the desk alone, the estimator of an autopilot by `pilot --simulate` alone."""
+"""The sensors with which a drone flies by default, by the kind in its file."""
 PdName = Literal["pd", "pd-feedforward", "pid-feedforward"]
 """The laws without a model: the stock PD of the paper, the PD with feed-forward of the target's velocity and
 acceleration, and the PID with feed-forward, low-pass and feedback of the tilt."""

@@ -21,30 +21,37 @@ from pydantic import (
     model_validator,
 )
 
-from mambo_codegen.errors import echo
+from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.plain_file import guess_name, read_plain_file
-from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL, Airframe, airframe_of
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.link import Link
 from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.sensors.drift import DriftingEstimate
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MotionCapture
+from mambo_sil.drone.sensors.suites import AnySensors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
+from mambo_sil.drone.vehicles.vehicle_sections import (
+    AutopilotSensors,
+    FlowDeckSensors,
+    MamboSensors,
+    MocapSensors,
+    TrueState,
+)
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.names import (
     CONTROLLER_NAMES,
-    SENSORS_OF,
+    CURVE_NAMES,
     AltitudeName,
-    CurveName,
     SensorsName,
     Start,
 )
-from mambo_sil.flight.trajectories import CURVES, Trajectories
+from mambo_sil.flight.own_curve import curve_named
+from mambo_sil.flight.trajectories import Trajectories, Trajectory
 
 FORMAT: Final = 2
 """Of a record: other keys have another number."""
@@ -60,6 +67,8 @@ LARGEST_WIND_M_S: Final = 50.0
 _NAMES: Final = "|".join(CONTROLLER_NAMES)
 RecordedController = Annotated[str, Field(pattern=rf"^(?:{_NAMES}|.*\.py:\w+)$")]
 """A controller by name, or a law of the user's own, FILE.py:CLASS."""
+RecordedCurve = Annotated[str, Field(pattern=rf"^(?:{'|'.join(CURVE_NAMES)}|.*\.py:\w+|.*\.(?i:csv))$")]
+"""A curve by name, or the user's own, FILE.csv or FILE.py:CLASS."""
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 
@@ -92,7 +101,7 @@ class Scenario(_Record):
     seed: int = Field(0, ge=0, le=LARGEST_SEED)
     """Seed of sensor noise, gusts and dropped updates."""
 
-    trajectory: CurveName = "bernoulli"
+    trajectory: RecordedCurve = "bernoulli"
     size_m: float = Field(2.0, ge=-LARGEST_SIZE_M, le=LARGEST_SIZE_M)
     rate_rad_s: float = Field(0.5, ge=-LARGEST_RATE_RAD_S, le=LARGEST_RATE_RAD_S)
     duration_s: float = Field(100.0, gt=0.0, le=LONGEST_S)
@@ -174,10 +183,13 @@ SHARED_KEYS: Final = ("vehicle", "duration_s", "start", "sensors", "altitude_loo
 """Keys that must be equal in all flights of one simulation."""
 
 
-def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
-    """Return one simulation with a flight for each scenario, in order.
+def flight_of(
+    scenarios: Sequence[Scenario], update_period_s: float, curve: Trajectory | None = None
+) -> Flight:
+    """Return one simulation with a flight for each scenario, in order; all of `curve`, if it is given.
 
-    Raises `FlightError` for no scenario, or if the scenarios differ in one of `SHARED_KEYS`.
+    Raises `FlightError` for no scenario, or if the scenarios differ in one of `SHARED_KEYS`, and as
+    `load_curve`.
     """
     if not scenarios:
         raise FlightError("flights = 0 must be 1 or more")
@@ -195,14 +207,10 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         """Return the fields that a record has in common with a scenario."""
         return {field.name: each(field.name) for field in fields(kind) if field.name in Scenario.model_fields}
 
-    curves = {
-        (s.trajectory, repr(s.size_m), repr(s.rate_rad_s)): CURVES[s.trajectory](s.size_m, s.rate_rad_s)
-        for s in scenarios
-    }
     n, drone = len(scenarios), first.vehicle
     delays = np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64)
     return Flight(
-        Trajectories(tuple(curves[s.trajectory, repr(s.size_m), repr(s.rate_rad_s)] for s in scenarios)),
+        curve or _curves(scenarios),
         duration_s=first.duration_s,
         flights=n,
         start=first.start,
@@ -219,24 +227,43 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
     )
 
 
-def choose_sensors(
-    name: SensorsName, drone: VehicleFile, **parameters: Any
-) -> Sensors | MotionCapture | None:
-    """Return the sensors called `name` of a drone; `parameters` as of `Sensors`.
+def _curves(scenarios: Sequence[Scenario]) -> Trajectories:
+    """Return the curves that scenarios name, each made once."""
+    curves = {
+        (s.trajectory, repr(s.size_m), repr(s.rate_rad_s)): curve_named(s.trajectory, s.size_m, s.rate_rad_s)
+        for s in scenarios
+    }
+    return Trajectories(tuple(curves[s.trajectory, repr(s.size_m), repr(s.rate_rad_s)] for s in scenarios))
 
-    Raises FlightError if it has others.
+
+def choose_sensors(name: SensorsName, drone: VehicleFile, **parameters: Any) -> AnySensors | None:
+    """Return the sensors called `name` of a drone, None for the true state; `parameters` as of `Sensors`.
+
+    Raises FlightError if its file has no figures of them.
     """
-    if name == "true":
-        return None
-    match drone.sensors:
-        case MocapSensors() as figures if name == "mocap":
-            return MotionCapture(figures, parameters.get("noise_scale", 1.0))
-        case MamboSensors() as figures if name in SENSORS_OF["mambo"]:
+    try:
+        figures = drone.with_sensors("mambo" if name == "mambo-derotated" else name).sensors
+    except InvalidSettingsError as error:
+        raise FlightError(str(error)) from None
+    noise_scale = parameters.get("noise_scale", 1.0)
+    match figures:
+        case TrueState():
+            return None
+        case MocapSensors():
+            return MotionCapture(figures, noise_scale)
+        case MamboSensors():
             return Sensors(figures=figures, derotated=name == "mambo-derotated", **parameters)
-    raise FlightError(
-        f"sensors = {spell(name)} must be {' or '.join(map(spell, SENSORS_OF[drone.sensors.kind]))}: "
-        f"vehicle {echo(drone.name)} has sensors.kind = {spell(drone.sensors.kind)}"
-    )
+        case FlowDeckSensors() | AutopilotSensors():
+            return DriftingEstimate(figures, noise_scale)
+
+
+def has_sensors(drone: VehicleFile, name: SensorsName) -> bool:
+    """Return whether the file of a drone has the figures of sensors."""
+    try:
+        choose_sensors(name, drone)
+    except FlightError:
+        return False
+    return True
 
 
 class Record(_Record):

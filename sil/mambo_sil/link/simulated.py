@@ -14,14 +14,11 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances, World
 from mambo_sil.drone.plant.ground import carry_on_ground
 from mambo_sil.drone.plant.vehicle import Seen, Vehicle, truth
-from mambo_sil.drone.sensors.autopilot import EstimatorErrors
+from mambo_sil.drone.sensors.suites import suite_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.flight.frames import turned_tilt, wrapped
-from mambo_sil.flight.loop import Flight, suite_of
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.flight.scenario import choose_sensors
-from mambo_sil.flight.trajectories import Hover
 from mambo_sil.link.messages import read_order, send_record
 from mambo_sil.link.records import (
     SET_MODE,
@@ -95,16 +92,10 @@ class SimulatedAutopilot:
         """Whether it sends nothing."""
         seeds = (self.condition.seed,)
         vehicle = Vehicle.of(drone)
-        sensors = choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone)
-        flight = Flight(Hover(), vehicle=vehicle, update_period_s=drone.step_s, seeds=seeds, sensors=sensors)
+        sensors = choose_sensors(DEFAULT_SENSORS[drone.sensors.kind], drone)
         self._vehicle, self._there = vehicle, np.ones(1, np.bool_)
         self._state = vehicle.at_rest(np.array(STARTS_M)[:, np.newaxis], self.condition.yaw_rad, 0.0)
-        self._errors = (
-            EstimatorErrors(drone.sensors, self.condition.seed, drone.step_s)
-            if isinstance(drone.sensors, AutopilotSensors)
-            else None
-        )
-        self._suite = suite_of(flight, seeds, truth(self._state))
+        self._suite = suite_of(sensors, seeds, truth(self._state), drone.step_s)
         self._seeds = seeds
         self.blow((0.0, 0.0))
         self._rates: dict[Stream, float] = dict(ALWAYS)
@@ -159,10 +150,6 @@ class SimulatedAutopilot:
         attitude_rad[2] = float(wrapped(attitude_rad[2]))
         position_m = seen.position_m[:, 0] - np.array(STARTS_M) + self.error_m
         velocity_m_s = seen.velocity_m_s[:, 0] + self.drift_m_s
-        if self._errors is not None:
-            self._errors.advance()
-            position_m = position_m + self._errors.position_m
-            velocity_m_s = velocity_m_s + self._errors.velocity_m_s
         rates_rad_s = seen.rates_rad_s[:, 0]
         return EstimatedState(self.time_s, position_m, velocity_m_s, attitude_rad, self._resets, rates_rad_s)
 

@@ -1,4 +1,4 @@
-"""Motion capture: rate, delay, filter and noise as its figures say; errors of an autopilot in closed form."""
+"""Motion capture: rate, delay, filter and noise as its figures say."""
 
 from typing import Any
 
@@ -8,15 +8,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mambo_sil.drone.plant.vehicle import Seen
-from mambo_sil.drone.sensors.autopilot import EstimatorErrors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
-from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors, MocapSensors
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
 FloatArray = NDArray[np.float64]
 
 STEP_S = 0.002
-TICK_S, COUNT = 0.01, 100_000
-AUTOPILOT = AutopilotSensors(velocity_error_m_s=0.2, velocity_error_s=0.5)
 
 
 def figures(**changed: Any) -> MocapSensors:
@@ -111,28 +108,3 @@ def test_noise_has_the_standard_deviation_of_its_figure(scale: float) -> None:
         assert position[::5, axis].std() == pytest.approx(scale * 0.002, rel=0.03)
         assert angles[:, axis].std() == pytest.approx(scale * 0.01, rel=0.02)
     assert np.abs(np.corrcoef(angles.reshape(ticks * 3, flights)[:, :8].T) - np.eye(8)).max() < 0.3
-
-
-def test_the_errors_have_their_size_and_their_time() -> None:
-    """S of the velocity, S T / sqrt 2 of the position, and 1/e of the correlation after T."""
-    errors = EstimatorErrors(AUTOPILOT, 3, TICK_S)
-    found = np.empty((COUNT, 2, 3))
-    for row in found:
-        errors.advance()
-        row[:] = errors.position_m, errors.velocity_m_s
-    position_m, velocity_m_s = found[:, 0], found[:, 1]
-    np.testing.assert_allclose(velocity_m_s.std(axis=0), 0.2, rtol=0.08)
-    np.testing.assert_allclose(position_m.std(axis=0), 0.2 * 0.5 / np.sqrt(2.0), rtol=0.1)
-    late = round(0.5 / TICK_S)
-    after = np.mean(velocity_m_s[late:] * velocity_m_s[:-late]) / np.mean(velocity_m_s**2)
-    assert abs(after - np.exp(-1.0)) < 0.06
-
-
-def test_the_seed_decides() -> None:
-    """And nothing else."""
-    first, again, other = (EstimatorErrors(AUTOPILOT, seed, TICK_S) for seed in (1, 1, 2))
-    for each in (first, again, other):
-        for _ in range(100):
-            each.advance()
-    np.testing.assert_array_equal(first.velocity_m_s, again.velocity_m_s)
-    assert not np.array_equal(first.velocity_m_s, other.velocity_m_s)

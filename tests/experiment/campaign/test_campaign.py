@@ -231,7 +231,7 @@ BAD = {
     "[flight]\nduration_s = 0": "flight.duration_s = 0 must lie in 1..3600",
     '[flight]\ntrajectory = "spiral"': 'flight.trajectory = "spiral" must be one of bernoulli, gerono',
     '[flight]\ntrajectory = { choice = ["circle", "spiral"] }': "must be one of bernoulli, gerono, lissajous",
-    "[flight]\ntrajectory = { choice = [] }": "take-off-and-landing, or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = { choice = [] }": "take-off-and-landing, FILE.csv, FILE.py:CLASS, or { choice",
     "[flight]\ntrajectory = { uniform = [0, 1] }": "or { choice = [name, ...] } of them",
     '[flight]\ntrajectory = { choice = ["circle"], uniform = [0, 1] }': "or { choice = [name, ...] } of them",
     "[flight]\ntrajectory = 3": "flight.trajectory = 3 must be one of bernoulli",
@@ -372,7 +372,7 @@ def test_a_file_names_its_drone(tmp_path: Path) -> None:
         "(did you mean my.toml?)"
     ]
     assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
-        'flight.sensors = "mambo" must be "true" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'
+        'flight.sensors = "mambo" needs its figures, [sensors], in the file of vehicle crazyflie'
     ]
     both = written(tmp_path, '[flight]\nvehicle = "mambo"\nsensors = "mambo"\n')
     assert campaign_file.read(both, "crazyflie").file.flight.sensors == "mocap"

@@ -20,7 +20,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.trajectories import Hover
 from tests.support.derived import settings_for
@@ -184,7 +184,7 @@ def swings(settings: Settings, drone: VehicleFile) -> bool:
         vehicle=Vehicle.of(drone),
         update_period_s=settings.horizon.update_period_s,
         offset=Offset((1e-3, 1e-3, -1e-3)),
-        sensors=choose_sensors(SENSORS_OF[drone.sensors.kind][-1], drone),
+        sensors=choose_sensors(DEFAULT_SENSORS[drone.sensors.kind], drone),
     )
     trace = fly(flight, CompiledController(settings))
     if detect_crashes(trace, drone).any():
@@ -198,7 +198,7 @@ def swings(settings: Settings, drone: VehicleFile) -> bool:
 
 def unstable(settings: Settings, drone: VehicleFile) -> bool:
     """Return whether margins call one of the axes unstable, or say that the height is not held."""
-    sensors = SENSORS_OF[drone.sensors.kind][-1]
+    sensors = DEFAULT_SENSORS[drone.sensors.kind]
     flight = hovering_flight(drone, sensors, settings.horizon.update_period_s)
     try:
         (loops,) = hover_loops(settings, flight)

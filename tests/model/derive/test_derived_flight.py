@@ -17,7 +17,7 @@ from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.model.derive import derived_flight
@@ -79,7 +79,7 @@ def test_a_drone_that_oscillates_is_seen() -> None:
     found = fly_derived(settings_for(drone), drone)
     assert not found.good
     assert found.words.startswith("flown for 10 s: OSCILLATES, by 0.")
-    assert found.words.endswith(f"(through sensors {SENSORS_OF['mambo'][-1]})")
+    assert found.words.endswith(f"(through sensors {DEFAULT_SENSORS['mambo']})")
 
 
 @pytest.mark.first_is_quick

@@ -12,7 +12,7 @@ from mambo_sil.experiment.margins.axis_margins import AxisMargins, HeightMargins
 from mambo_sil.experiment.margins.corners import at_ends, corners
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.many_drones import measure_drone
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.model.derive.derived_margins import JudgedMargins, _reserve, _without, judge_margins
 from tests.support.derived import settings_for
 from tests.support.scenarios import CRAZYFLIE, changed
@@ -175,7 +175,7 @@ def test_the_cause_is_the_property_without_which_most_is_left(
     left = {
         words: min(map(_reserve, measure_drone(settings_for(other), other, seen)))
         for (words, other), seen in zip(
-            _without(drone, height=False), (SENSORS_OF["mocap"][-1], "true"), strict=True
+            _without(drone, height=False), (DEFAULT_SENSORS["mocap"], "true"), strict=True
         )
     }
     cause = max(left, key=lambda words: left[words])

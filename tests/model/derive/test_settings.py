@@ -15,7 +15,7 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.names import SENSORS_OF, CurveName
+from mambo_sil.flight.names import DEFAULT_SENSORS, CurveName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from mambo_sil.model.derive.derived_margins import missing_height
@@ -45,7 +45,7 @@ def flown(settings: Settings, drone: VehicleFile, curve: CurveName, *, noisy: bo
             rate_rad_s=rate_rad_s,
             duration_s=20.0,
             yaw_rad=2.0 * math.pi * number / HEADINGS,
-            sensors=SENSORS_OF[drone.sensors.kind][-1] if noisy else "true",
+            sensors=DEFAULT_SENSORS[drone.sensors.kind] if noisy else "true",
             seed=number,
         )
         for number in range(HEADINGS)

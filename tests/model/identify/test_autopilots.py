@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.drone.sensors.autopilot import EstimatorErrors
+from mambo_sil.drone.plant.vehicle import Seen
+from mambo_sil.drone.sensors.drift import DriftingEstimate, DriftSuite
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.errors import LogError
@@ -127,10 +128,11 @@ def test_a_package_that_is_missing_is_named(
 
 def errors_m(sensors: AutopilotSensors, seed: int, jump_m: float = 0.0) -> FloatArray:
     """Return estimate less seen position (2, m): it errs so, jumps after 35 s, and is 1 m off; with noise."""
-    errors, drift = EstimatorErrors(sensors, seed, STEP_S), []
-    for _ in range(round(DURATION_S / STEP_S)):
-        errors.advance()
-        drift.append(errors.position_m[:2])
+    suite, true = (
+        DriftSuite(DriftingEstimate(sensors), (seed,), STEP_S),
+        Seen(*(np.zeros((3, 1)) for _ in range(4))),
+    )
+    drift = [suite.estimate(true).position_m[:2, 0] for _ in range(round(DURATION_S / STEP_S))]
     found = np.array(drift).T + 1.0 + CAMERA_M * np.random.default_rng(seed).standard_normal((2, len(drift)))
     found[:, round(35.0 / STEP_S) :] += jump_m
     return found

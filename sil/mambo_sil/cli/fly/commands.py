@@ -12,6 +12,7 @@ from mambo_sil.cli.fly.fly_options import Conditions, Course, OtherFlight, Outpu
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
+    OptionalSensors,
     Results,
     Scalar,
     Source,
@@ -25,10 +26,12 @@ from mambo_sil.cli.options import (
 )
 from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.names import SensorsName
 from mambo_sil.results.folders import SUMMARY, new_results
 from mambo_sil.results.terminal import sentence
 
 if TYPE_CHECKING:
+    from mambo_sil.experiment.campaign.campaign_file import Campaign
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
 
 
@@ -73,6 +76,7 @@ def campaign(
         output_option("Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
     vehicle: Drone = None,
+    sensors: OptionalSensors = None,
     flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=1_000_000)] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
@@ -89,7 +93,8 @@ def campaign(
         raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
 
     with counting_bar("starting", "flights", flights) as bar:
-        summary = _fly_campaign(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
+        chosen = _campaign(source, vehicle, sensors)
+        summary = _fly_campaign(chosen, output, flights, bar, workers=workers, scheduler=scheduler)
     from mambo_sil.experiment.campaign.campaign_records import RECORDS
     from mambo_sil.experiment.campaign.campaign_report import PICTURE
     from mambo_sil.experiment.campaign.store import TABLE
@@ -98,9 +103,16 @@ def campaign(
     show_result(summary, output, files, as_json=as_json)
 
 
+def _campaign(source: Path | None, vehicle: str | None, sensors: SensorsName | None) -> "Campaign":
+    """Return a campaign, with another drone and other sensors if these are named."""
+    from mambo_sil.experiment.campaign import campaign_file
+
+    found = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
+    return found if sensors is None else found.with_sensors(sensors)
+
+
 def _fly_campaign(
-    source: Path | None,
-    vehicle: str | None,
+    chosen: "Campaign",
     output: Path,
     flights: int,
     bar: Bar,
@@ -112,12 +124,10 @@ def _fly_campaign(
 
     Print in how many of these flights a law of the user's own failed, and why in one of them.
     """
-    from mambo_sil.experiment.campaign import campaign_file
     from mambo_sil.experiment.campaign.campaign_report import finish
     from mambo_sil.experiment.campaign.campaign_run import fly_missing, missing_flights, open_campaign
     from mambo_sil.experiment.campaign.executors import cluster, processes
 
-    chosen = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
     failures = dict[str, list[str]]()
 
     def failed(name: str, flight: int, reason: str) -> None:

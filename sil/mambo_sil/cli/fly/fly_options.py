@@ -23,12 +23,12 @@ from mambo_sil.cli.options import (
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import (
     CONTROLLER_NAMES,
-    CURVE_NAMES,
     SENSORS_NAMES,
     AltitudeName,
     SensorsName,
     Start,
 )
+from mambo_sil.flight.own_curve import FORMS
 
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
@@ -36,7 +36,7 @@ RATE_RAD_S: Final = 0.5
 CurveChoice = Annotated[
     str,
     typer.Option(
-        help=f"{', '.join(CURVE_NAMES)}, or a CSV file with time_s, x_m, y_m, or duration, x^0, x^1 ...",
+        help=f"{FORMS}: a file has columns time_s, x_m, y_m, or duration, x^0, x^1 ..., or your own class.",
         metavar="CURVE",
     ),
 ]
@@ -88,8 +88,7 @@ class Conditions:
         SensorsName,
         sensors_option(
             SENSORS_NAMES,
-            "What state all loops get: true; mocap, motion capture; mambo or mambo-derotated, by optical "
-            "flow with its rotation or without; flow-deck, with --app.",
+            "What state all loops get, true or as these measure it",
         ),
     ] = "true"
     altitude_loop: Annotated[
@@ -106,8 +105,12 @@ class Conditions:
     ] = "0,0"
     wind: Annotated[
         str,
-        typer.Option(help="Mean wind to north 6 m high in m/s, with its gusts; gusts: 7.7.", metavar="WIND"),
+        typer.Option(help="Mean wind 6 m high in m/s, with its gusts; gusts: 7.7.", metavar="WIND"),
     ] = "none"
+    wind_direction_rad: Annotated[
+        float,
+        typer.Option(help="Heading towards which it blows: 0 north, 1.57 east.", metavar="RAD"),
+    ] = 0.0
     seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.", metavar="N")] = 0
 
 

@@ -1,6 +1,5 @@
 """Run the flight that the options of `fly` describe."""
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,7 +33,7 @@ from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import CONTROLLER_NAMES, SIZED, TIMED, PdName, flies_settings
-from mambo_sil.flight.polynomials import read_course
+from mambo_sil.flight.own_curve import FORMS, check_curve, curve_named, is_curve_file, load_curve
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -123,7 +122,9 @@ def described_flight(
     period_s = settings.horizon.update_period_s if law is None else period_of(law)
     curve = curve_of(course)
     _demand_angle("--yaw-rad", course.yaw_rad)
-    disturbances = Disturbances(_wind_speed_m_s(conditions.wind), push_m_s2=_push_m_s2(conditions.push))
+    _demand_angle("--wind-direction-rad", conditions.wind_direction_rad)
+    wind = _wind_speed_m_s(conditions.wind), conditions.wind_direction_rad
+    disturbances = Disturbances(*wind, push_m_s2=_push_m_s2(conditions.push))
     vehicle = _vehicle(conditions, drone)
     try:
         sensors = choose_sensors(conditions.sensors, drone)
@@ -156,7 +157,6 @@ def summary_fields(
     course: Course, conditions: Conditions, runner: Runner, flight: Flight, settings: Settings
 ) -> dict[str, Any]:
     """Return the fields of a `FlySummary` that do not follow from the trace."""
-    file = None if course.trajectory in CURVES else Path(course.trajectory)
     has_settings = flies_settings(runner.controller)
     size_m, rate_rad_s = _size_and_rate(course)
     return (vars(course) | vars(conditions) | vars(runner)) | {
@@ -169,9 +169,10 @@ def summary_fields(
         "size_m": size_m,
         "rate_rad_s": rate_rad_s,
         "duration_s": _flown_s(flight),
-        "trajectory_sha256": file and hashlib.sha256(file.read_bytes()).hexdigest(),
+        "trajectory_sha256": load_curve(course.trajectory)[1] if is_curve_file(course.trajectory) else None,
         "push_m_s2": flight.disturbances.push_m_s2,
         "wind_speed_m_s": flight.disturbances.wind_speed_m_s,
+        "wind_direction_rad": flight.disturbances.wind_direction_rad,
     }
 
 
@@ -262,16 +263,14 @@ def _on_board(runner: Runner, settings: Settings) -> PositionController:
 
 
 def curve_of(course: Course) -> Trajectory:
-    """Return the curve by name, or the course of a file; raises FlightError and TrajectoryError."""
+    """Return the curve by name, or that of a file; raises FlightError and TrajectoryError."""
     size_m, rate_rad_s = _size_and_rate(course)
-    for name, curve in CURVES.items():
-        if name == course.trajectory:
-            return curve(size_m or 0.0, rate_rad_s or 0.0)
-    if not course.trajectory.lower().endswith(".csv"):
-        raise TrajectoryError(
-            f"--trajectory {echo(course.trajectory)} must be {', '.join(CURVES)} or a file ending in .csv"
-        )
-    return read_course(Path(course.trajectory))
+    if course.trajectory not in CURVES and not is_curve_file(course.trajectory):
+        raise TrajectoryError(f"--trajectory {echo(course.trajectory)} must be {FORMS}")
+    curve = curve_named(course.trajectory, size_m or 0.0, rate_rad_s or 0.0)
+    if is_curve_file(course.trajectory):
+        check_curve(echo(course.trajectory), curve, course.duration_s)
+    return curve
 
 
 def _size_and_rate(course: Course) -> tuple[float | None, float | None]:

@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -83,6 +84,15 @@ class Attitude:
         self._gate_m_s2 = TILT_GATE * GRAVITY_M_S2
         self._forces: list[FloatArray] = []
 
+    def place(self, euler_rad: FloatArray, put: NDArray[np.bool_]) -> None:
+        """Start again with the drones that are `put` (n,) elsewhere, at rest."""
+        self.euler_rad = np.where(put, euler_rad, self.euler_rad)
+        self.sines, self.cosines = sine_cosine(self.euler_rad)
+        weight = np.zeros_like(euler_rad)
+        weight[2] = -GRAVITY_M_S2
+        at_rest = to_body(euler_rad, weight)
+        self._forces = [np.where(put, at_rest, force) for force in self._forces]
+
     def shut_gate(self) -> None:
         """Correct the angles no more by the accelerometer, as noise does for most of a flight."""
         self._gate_m_s2 = 0.0
@@ -120,6 +130,10 @@ class _LowPass:
     def __init__(self, start: FloatArray) -> None:
         self._state = [start / (8.0 * LOW_PASS_B)] * 3
 
+    def place(self, start: FloatArray, put: NDArray[np.bool_]) -> None:
+        """Start again in the flights that are `put` (n,)."""
+        self._state = [np.where(put, start / (8.0 * LOW_PASS_B), one) for one in self._state]
+
     def update(self, value: FloatArray) -> FloatArray:
         """Return the output at this tick for the input at this tick."""
         first, second, third = self._state
@@ -141,6 +155,15 @@ class Altitude:
         self._predicted = self.z_m, self.velocity_m_s
         self._gains = altitude_gains()
         self._low_pass = _LowPass(np.stack([z_m, z_m]))
+
+    def place(self, z_m: FloatArray, velocity_m_s: FloatArray, put: NDArray[np.bool_]) -> None:
+        """Start again with the drones that are `put` (n,) elsewhere."""
+        self.z_m = np.where(put, z_m, self.z_m)
+        self.velocity_m_s = np.where(put, velocity_m_s, self.velocity_m_s)
+        pairs = zip((z_m, velocity_m_s), self._predicted, strict=True)
+        predicted_m, predicted_m_s = (np.where(put, fresh, one) for fresh, one in pairs)
+        self._predicted = predicted_m, predicted_m_s
+        self._low_pass.place(np.stack([z_m, z_m]), put)
 
     def update(self, readings: Readings, acceleration_m_s2: FloatArray) -> None:
         """Correct with the readings; predict the next tick with the acceleration (n,) along world z."""
@@ -173,6 +196,11 @@ class Velocity:
         self._predicted = self.velocity_m_s
         self._gain = velocity_gain()
 
+    def place(self, velocity_m_s: FloatArray, put: NDArray[np.bool_]) -> None:
+        """Start again with the drones that are `put` (n,) elsewhere."""
+        self.velocity_m_s = np.where(put, velocity_m_s, self.velocity_m_s)
+        self._predicted = np.where(put, velocity_m_s, self._predicted)
+
     def update(
         self, readings: Readings, tilt_rad: FloatArray, z_m: FloatArray, acceleration_m_s2: FloatArray
     ) -> None:
@@ -203,6 +231,14 @@ class Suite:
         velocity_m_s = to_body(start.euler_rad, start.velocity_m_s)[:2]
         self._velocity = Velocity(velocity_m_s, derotated=sensors.derotated)
         self._position_m = start.position_m[:2].copy()
+
+    def place(self, start: Seen, put: NDArray[np.bool_]) -> None:
+        """Start again with the drones that are `put` (n,) elsewhere, at rest."""
+        self._instruments.place(start, put)
+        self._attitude.place(start.euler_rad, put)
+        self._altitude.place(start.position_m[2], start.velocity_m_s[2], put)
+        self._velocity.place(to_body(start.euler_rad, start.velocity_m_s)[:2], put)
+        self._position_m = np.where(put, start.position_m[:2], self._position_m)
 
     def shut_gate(self) -> None:
         """Correct roll and pitch no more by the accelerometer, as noise does for most of a flight."""

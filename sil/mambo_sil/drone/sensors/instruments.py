@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.airframe import NOMINAL
@@ -104,6 +105,24 @@ class Instruments:
         self._flow_m_s = _measure_flow(start)
         self._tick = 0
         self._delayed: list[Readings] = []
+
+    def place(self, start: Seen, put: NDArray[np.bool_]) -> None:
+        """Measure from now on the drones that are `put` (n,) elsewhere, at rest."""
+        self._velocity_m_s = np.where(put, start.velocity_m_s, self._velocity_m_s)
+        motion, height_m = self._measure_motion(start), -start.position_m[2]
+        self._motion = np.where(put, motion, self._motion)
+        self._imu = np.where(put, np.stack([motion, np.zeros_like(motion)]), self._imu)
+        self._flow_m_s = np.where(put, _measure_flow(start), self._flow_m_s)
+        sonar_m, pressure_pa = np.maximum(height_m, SONAR_MIN_M), -PA_PER_M * height_m
+        self._delayed = [
+            Readings(
+                imu=np.where(put, motion + self._bias, one.imu),
+                sonar_m=np.where(put, sonar_m, one.sonar_m),
+                pressure_pa=np.where(put, pressure_pa, one.pressure_pa),
+                flow_m_s=np.where(put, self._flow_m_s, one.flow_m_s),
+            )
+            for one in self._delayed
+        ]
 
     def read(self, true: Seen) -> Readings:
         """Return the readings that reach the estimators at this tick, measured `DELAY_TICKS` earlier."""

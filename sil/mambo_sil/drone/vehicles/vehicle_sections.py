@@ -259,13 +259,23 @@ class MocapSensors(PlacedSensors):
 
 
 class FlowDeckSensors(VehicleSection):
-    """A Crazyflie's flow deck: optical flow and range to the floor; what the app flies over on the desk."""
+    """A Crazyflie's flow deck: optical flow and range to the floor; nothing measures where the drone is.
+
+    The defaults are the errors of a hover at 1 m on the desk.
+    """
 
     kind: Literal["flow-deck"] = Field("flow-deck", description="Optical flow and range, on a Crazyflie.")
+    velocity_error_m_s: Noise = Field(
+        0.034, description="Standard deviation of the velocity's error along x and y, which drift."
+    )
+    velocity_error_s: Annotated[float, Field(ge=0.05, le=10)] = Field(
+        0.7, description="Correlation time of all errors."
+    )
+    height_error_m: Noise = Field(0.002, description="Standard deviation of the height's error.")
 
 
 class AutopilotSensors(VehicleSection):
-    """The estimator of an autopilot, whose velocity errs slowly; what `pilot --simulate` flies by."""
+    """The estimator of an autopilot, whose velocity errs slowly."""
 
     kind: Literal["autopilot"] = Field("autopilot", description="The estimator of PX4 or ArduPilot.")
     velocity_error_m_s: Noise = Field(0.12, description="Standard deviation of the velocity's error.")

@@ -5,7 +5,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -24,6 +24,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.experiment.campaign.distributions import Distribution, parse
+from mambo_sil.experiment.campaign.drawn_curves import identity_of_files, located, spatial_curves
 from mambo_sil.experiment.campaign.parameters import (
     OF_THE_CURVE,
     PARAMETERS,
@@ -34,8 +35,8 @@ from mambo_sil.experiment.campaign.parameters import (
 )
 from mambo_sil.experiment.inputs import Entrant, File, FileSection, load_any_entrant, load_drone, read_as
 from mambo_sil.flight.controllers.own_law import LawFile, OwnLaws
-from mambo_sil.flight.names import IN_SPACE, SENSORS_OF, AltitudeName, SensorsName, Start
-from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
+from mambo_sil.flight.names import DEFAULT_SENSORS, AltitudeName, SensorsName, Start
+from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of, has_sensors
 
 _LONGEST_LIST: Final = 10
 _RARE: Final = 1e-9
@@ -120,8 +121,16 @@ class Campaign:
     @property
     def spatial(self) -> bool:
         """Whether any flight may follow a course with a height."""
-        drawn = self.file.flight.trajectory
-        return any(drawn.domain.value(number) in IN_SPACE for number in drawn.numbers)
+        return spatial_curves(self.file.flight.trajectory)
+
+    def with_sensors(self, sensors: SensorsName) -> "Campaign":
+        """Return the campaign with other sensors; raises InvalidSettingsError."""
+        try:
+            choose_sensors(sensors, self.drone)
+        except FlightError as error:
+            raise InvalidSettingsError((f"--{error}",)) from None
+        flight = self.file.flight.model_copy(update={"sensors": sensors})
+        return replace(self, file=self.file.model_copy(update={"flight": flight}))
 
     def draw(self, flight: int) -> Draw:
         """Return seed and parameters of flight number `flight`."""
@@ -133,11 +142,12 @@ class Campaign:
         controllers = [entrant.document() for entrant in self.entrants]
         for one in controllers:
             one.get("law", {}).pop("named", None)  # the same wherever its file is
-        return document | {"controllers": controllers, "vehicle": self.drone.model_dump()}
+        files = {"controllers": controllers, "vehicle": self.drone.model_dump()}
+        return document | files | identity_of_files(self.file.flight.trajectory)
 
     def places(self) -> dict[str, Any]:
         """Return where the files of laws are, by the names of the controllers."""
-        laws = {one.name: one.law.named for one in self.entrants if one.law is not None}
+        laws = {one.name: one.law.named for one in self.entrants if isinstance(one.law, LawFile)}
         return {"laws": laws} if laws else {}
 
 
@@ -177,10 +187,10 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
     campaign = Campaign(file, entrants, drone)
     for entrant, named in zip(entrants, file.controllers, strict=True):
         place, drawn = f"{source}: controllers: {echo(named)}", campaign.draw(0)
-        if entrant.law is None:
-            demand_flyable(entrant.settings, campaign.flight, drawn, place)
-        else:
+        if isinstance(entrant.law, LawFile):
             _demand_command(entrant.law, campaign.flight, drawn, place)
+        else:
+            demand_flyable(entrant.settings, campaign.flight, drawn, place)
     return campaign
 
 
@@ -233,16 +243,20 @@ def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -
         if vehicle is None
         else vehicle_toml.load(vehicle)
     )
-    return completed(file, drone, source, replaced=vehicle is not None), drone
+    return completed(file, drone, source, folder, replaced=vehicle is not None), drone
 
 
-def completed(file: File, drone: VehicleFile, source: str, *, replaced: bool) -> File:
+def completed(file: File, drone: VehicleFile, source: str, folder: Path = Path(), *, replaced: bool) -> File:
     """Return a file with what depends on the drone, which may be `replaced` by another than the file's.
+
+    Curves of the user's own lie in `folder`.
 
     Raises InvalidSettingsError.
     """
     content: Any = file
     flight = _with_drone(content.flight, drone, source, replaced=replaced)
+    trajectory = located(flight.trajectory, flight.duration_s, folder, f"{source}: flight.trajectory")
+    flight = flight.model_copy(update={"trajectory": trajectory})
     given = content.draws.model_fields_set
     own = {name: found for name, found in defaults_of(drone).items() if name not in given}
     draws = content.draws.model_copy(update=own)
@@ -267,10 +281,9 @@ def _with_drone(flight: FlightSection, drone: VehicleFile, source: str, *, repla
 
     If the drone is `replaced`, its own sensors replace those that it has not. Raises InvalidSettingsError.
     """
-    possible = SENSORS_OF[drone.sensors.kind]
     sensors = flight.sensors
-    if sensors is None or (replaced and sensors not in possible):
-        sensors = possible[-1]
+    if sensors is None or (replaced and not has_sensors(drone, sensors)):
+        sensors = DEFAULT_SENSORS[drone.sensors.kind]
     try:
         choose_sensors(sensors, drone)
     except FlightError as error:

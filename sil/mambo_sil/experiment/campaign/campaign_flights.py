@@ -13,7 +13,7 @@ from mambo_codegen import __version__
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.errors import WorkerError
+from mambo_sil.errors import ArgumentError, WorkerError
 from mambo_sil.experiment.campaign.campaign_file import scenario
 from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
@@ -29,6 +29,7 @@ from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
 from mambo_sil.flight.names import PD_NAMES
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.flight.trajectories import Trajectory
 from mambo_sil.results.metric_names import SEEN
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
@@ -93,18 +94,23 @@ def fly_batch(
 
 
 def fly_scenarios(
-    entrants: Sequence[Entrant], scenarios: Sequence[Scenario], report: Report = report_share
+    entrants: Sequence[Entrant],
+    scenarios: Sequence[Scenario],
+    report: Report = report_share,
+    *,
+    curve: Trajectory | None = None,
 ) -> list[Row]:
     """Fly flights together with every controller; return one row per flight, in order.
 
+    `curve` takes the place of the curves that the scenarios name.
     Calls `report`, by default the worker's pool's, with the share done. Raises BuildError if there is no
-    compiler, FlightError for flights that cannot be simulated together.
+    compiler, FlightError for flights that cannot be simulated together, ArgumentError for what is no law.
     """
     rows: list[Row] = [{} for _ in scenarios]
     compiled = [one for one in entrants if one.law is None]
     flown = 0
     for period_s in dict.fromkeys(entrant.update_period_s for entrant in compiled):
-        flight = flight_of(scenarios, period_s)
+        flight = flight_of(scenarios, period_s, curve)
         these = [one for one in compiled if one.update_period_s == period_s]
         share = part_of(report, flown, len(entrants), len(these))
         for group in fly_groups(flight, [_controller(one, scenarios, flight) for one in these], share):
@@ -117,27 +123,26 @@ def fly_scenarios(
         flown += len(these)
     for entrant in entrants:
         if entrant.law is not None:
-            found = fly_law(
-                entrant.name, _load(entrant.law), scenarios, part_of(report, flown, len(entrants))
-            )
+            law = _load(entrant.law) if isinstance(entrant.law, LawFile) else entrant.law
+            flight = flight_of(scenarios, period_of(law), curve)
+            found = _fly_law(entrant.name, law, flight, part_of(report, flown, len(entrants)))
             rows = [row | of_law for row, of_law in zip(rows, found, strict=True)]
             flown += 1
     report(0.0)
     return rows
 
 
-def fly_law(name: str, law: Law, scenarios: Sequence[Scenario], report: Report = report_share) -> list[Row]:
-    """Fly flights together with a law of the user's own; return one row per flight, with why it failed.
-
-    Raises as `fly_scenarios`, and ArgumentError for what is no law.
-    """
-    flight = flight_of(scenarios, period_of(law))
-    laws = OwnLaws(law, flight)
+def _fly_law(name: str, law: Law, flight: Flight, report: Report) -> list[Row]:
+    """Fly flights together with a law of the user's own; return one row per flight, with why it failed."""
+    try:
+        laws = OwnLaws(law, flight)
+    except ArgumentError as error:
+        raise ArgumentError(f"{name}: {error}") from error
     trace = fly(flight, laws, report)
-    results = _evaluate(trace, method_of(Settings()).tilt_limit_rad, scenarios[0].vehicle)
+    results = _evaluate(trace, method_of(Settings()).tilt_limit_rad, flight.vehicle.drone)
     rows: list[Row] = [
         {f"{name}_{key}": values[number] for key, values in results.items()}
-        for number in range(len(scenarios))
+        for number in range(flight.flights)
     ]
     for number, failure in laws.failures.items():
         rows[number][f"{name}_{FAILURE}"] = failure

@@ -12,14 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from mambo_codegen import __version__
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.campaign.campaign_flights import DIGEST
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import DATABASE, FlightStore, Value, convert_os_errors, read_flight
 from mambo_sil.experiment.inputs import Entrant
-from mambo_sil.flight.controllers.own_law import LawFile
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import GENERATOR
 
@@ -62,11 +60,10 @@ def campaign_record(path: Path) -> Record | None:
         row = read_flight(folder / DATABASE, int(matched[1]))
     except (OSError, ValueError, TypeError, KeyError, sqlite3.Error):
         return None
-    settings = Settings.model_validate_json(json.dumps(document["settings"]))
-    law = LawFile(held["laws"][matched[2]], **document["law"]) if "law" in document else None
+    if "law" in document:
+        document |= {"law": document["law"] | {"named": held["laws"][matched[2]]}}
     vehicle = VehicleFile.model_validate_json(json.dumps(held["vehicle"])).model_dump()
-    entrant = Entrant(document["name"], document["kind"], settings, law)
-    return _record(held["flight"] | {"vehicle": vehicle}, entrant, row)
+    return _record(held["flight"] | {"vehicle": vehicle}, Entrant.from_document(document), row)
 
 
 def _record(section: dict[str, Any], entrant: Entrant, row: dict[str, Value]) -> Record:

@@ -8,9 +8,10 @@ library's differ between processors.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any, Final, Literal
 
@@ -39,11 +40,13 @@ class Domain:
     high: float
     whole: bool = False
     names: tuple[str, ...] = ()
+    is_file: Callable[[str], bool] | None = None
+    """Whether a name that is not among these names a file, which is as good."""
 
     @classmethod
-    def of_names(cls, names: tuple[str, ...]) -> "Domain":
+    def of_names(cls, names: tuple[str, ...], is_file: Callable[[str], bool] | None = None) -> "Domain":
         """Return the domain of names."""
-        return cls(0, len(names) - 1, whole=True, names=names)
+        return cls(0, len(names) - 1, whole=True, names=names, is_file=is_file)
 
     def value(self, number: float) -> float | str:
         """Return the value that `number` represents: a name, a whole number, or itself."""
@@ -106,7 +109,7 @@ class Distribution:
 
     def text(self) -> str:
         """Return the distribution in words, as in "1", "1 .. 2" or "circle or step"."""
-        names = self.domain.names
+        names = [Path(name).name for name in self.domain.names]
         words = [names[int(one)] if names else f"{one:g}" for one in self.numbers]
         match self.kind:
             case "choice":
@@ -178,8 +181,11 @@ def _parse_names(value: Any, domain: Domain) -> Distribution:
             kind: Kind = "choice"
         case _:
             kind, chosen = "constant", [value]
-    if not all(isinstance(one, str) and one in domain.names for one in chosen):
-        raise ValueError(f"must be one of {', '.join(domain.names)}, or {{ choice = [name, ...] }} of them")
+    is_file = domain.is_file or (lambda _: False)
+    if not all(isinstance(one, str) and (one in domain.names or is_file(one)) for one in chosen):
+        forms = ", ".join((*domain.names, *(("FILE.csv", "FILE.py:CLASS") if domain.is_file else ())))
+        raise ValueError(f"must be one of {forms}, or {{ choice = [name, ...] }} of them")
+    domain = Domain.of_names(tuple(dict.fromkeys((*domain.names, *chosen))), domain.is_file)
     return Distribution(kind, tuple(float(domain.names.index(one)) for one in chosen), domain)
 
 

@@ -14,6 +14,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL, airframe_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.flight.names import CURVE_NAMES
+from mambo_sil.flight.own_curve import is_curve_file
 from mambo_sil.flight.scenario import Scenario
 
 
@@ -58,7 +59,7 @@ PARAMETERS: Final[dict[str, Distribution]] = {
     "payload_time_s": _parameter(0.0, 3600.0, 0.0),
     **_axes("impulse", "_n_s", "xyz", (-1.0, 1.0), 0.0),
     "impulse_time_s": _parameter(0.0, 3600.0, 0.0),
-    "trajectory": parse("bernoulli", Domain.of_names(CURVE_NAMES)),
+    "trajectory": parse("bernoulli", Domain.of_names(CURVE_NAMES, is_curve_file)),
     "size_m": _parameter(-1000.0, 1000.0, 2.0),
     "rate_rad_s": _parameter(-100.0, 100.0, 0.5),
     "vertical_gust_m_s2": _parameter(-100.0, 100.0, 0.0),
@@ -82,7 +83,7 @@ def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> D
     shares = np.random.Generator(np.random.Philox(numbers)).random(len(PARAMETERS))
     drawn: Draw = {"seed": int(noise.generate_state(1, np.uint64)[0] >> np.uint64(1))}
     for name, share in zip(PARAMETERS, shares.tolist(), strict=True):
-        drawn[name] = PARAMETERS[name].domain.value(distributions[name].quantile(share))
+        drawn[name] = distributions[name].domain.value(distributions[name].quantile(share))
     return drawn
 
 

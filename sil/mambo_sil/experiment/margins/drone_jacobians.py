@@ -16,12 +16,12 @@ from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.loops import Demand, altitude_thrust
 from mambo_sil.drone.plant.rotors import WRENCH_SIGNS
 from mambo_sil.drone.plant.vehicle import Moment, Vehicle, VehicleState, truth
-from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import FLOW_IMAGES_PER_TICKS, Sensors
 from mambo_sil.drone.sensors.mocap import MotionCapture, sampling
+from mambo_sil.drone.sensors.suites import noises_of, suite_of
 from mambo_sil.experiment.margins.rebuild import GivenDraws, rebuild
-from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, suite_of
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
 
 SETTLE_S: Final = 0.3
 """Time in which the estimators come to rest before the drone is linearised."""
@@ -116,7 +116,7 @@ def repeating_ticks(flight: Flight) -> int:
             period = FLOW_IMAGES_PER_TICKS[1]
         case MotionCapture() as capture:
             period = sampling(capture.figures, flight.vehicle.drone.step_s).period_ticks
-        case None:
+        case _:
             period = 1
     return math.lcm(flight.ticks_per_update, period)
 
@@ -129,7 +129,7 @@ def drone_jacobians(flight: Flight, axes: int = LEVEL_AXES) -> DroneJacobians:
     n, vehicle, ticks, signals = flight.flights, flight.vehicle, repeating_ticks(flight), Signals(axes)
     state = _hovering(vehicle, n, signals)
     moving = _Moving(state, _still_sensors(flight, state))
-    inputs = np.zeros((signals.noise + _noises(flight), n))
+    inputs = np.zeros((signals.noise + noises_of(flight.sensors), n))
     settling = -(-round(SETTLE_S / vehicle.drone.step_s) // ticks) * ticks
     for _ in range(settling):
         moving, _ = _tick(vehicle, moving, inputs, signals)
@@ -168,22 +168,12 @@ def _still_sensors(flight: Flight, state: VehicleState) -> Any:
     if isinstance(given, Sensors):
         unbiased = (0.0, 0.0, 0.0)
         given = replace(given, accelerometer_bias_m_s2=unbiased, gyro_bias_rad_s=unbiased)
-    suite = suite_of(replace(flight, sensors=given), (0,) * flight.flights, truth(state))
-    suite = rebuild(suite, flight.flights, np.copy, GivenDraws(np.zeros((_noises(flight), flight.flights))))
+    n = flight.flights
+    suite = suite_of(given, (0,) * n, truth(state), flight.vehicle.drone.step_s)
+    suite = rebuild(suite, n, np.copy, GivenDraws(np.zeros((noises_of(given), n))))
     if isinstance(suite, Suite):
         suite.shut_gate()
     return suite
-
-
-def _noises(flight: Flight) -> int:
-    """Return how many random numbers the sensors of one drone use in a tick."""
-    match flight.sensors:
-        case Sensors():
-            return instruments.NOISES
-        case MotionCapture():
-            return mocap.NOISES
-        case None:
-            return 0
 
 
 def _tick(

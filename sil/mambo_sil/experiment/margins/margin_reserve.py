@@ -11,7 +11,7 @@ from mambo_sil.experiment.margins.axis_margins import Margins, PlaceName
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.experiment.margins.margin_figures import number
-from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.flight.names import DEFAULT_SENSORS, SensorsName
 from mambo_sil.results.summary import Number
 
 LEAST_SHARE: Final = 0.8
@@ -62,7 +62,7 @@ class Reserve:
 
 def sensors_of(drone: VehicleFile) -> SensorsName:
     """Return the sensors through which a drone's loops are measured: its own."""
-    return SENSORS_OF[drone.sensors.kind][-1]
+    return DEFAULT_SENSORS[drone.sensors.kind]
 
 
 def margins_of(settings: Settings, drone: VehicleFile, whose: str) -> MarginReference:

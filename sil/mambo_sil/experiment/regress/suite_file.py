@@ -23,8 +23,8 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_flights import INDICES, OF_LIMITS
 from mambo_sil.experiment.inputs import FileSection, load_drone, read_as
-from mambo_sil.flight.names import SENSORS_OF
-from mambo_sil.flight.scenario import Scenario
+from mambo_sil.flight.names import DEFAULT_SENSORS
+from mambo_sil.flight.scenario import Scenario, has_sensors
 
 SUITES: Final = ShippedFiles(
     "suites",
@@ -247,8 +247,8 @@ def _suite(file: SuiteFile, name: str, folder: Path, source: str, vehicle: str |
 
 def _replace_drone(values: Mapping[str, Values], drone: VehicleFile) -> dict[str, Values]:
     """Return the values of a group's keys with another drone, and its own sensors for those it has not."""
-    possible = SENSORS_OF[drone.sensors.kind]
-    sensors = (one if one in possible else possible[-1] for one in values.get("sensors", ("true",)))
+    own = DEFAULT_SENSORS[drone.sensors.kind]
+    sensors = (one if has_sensors(drone, one) else own for one in values.get("sensors", ("true",)))
     return {VEHICLE: (drone,), **values} | {VEHICLE: (drone,), "sensors": tuple(dict.fromkeys(sensors))}
 
 

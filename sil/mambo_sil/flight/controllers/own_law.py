@@ -1,9 +1,6 @@
 """Laws of a program's own, which fly in place of a controller's C."""
 
 import copy
-import hashlib
-import importlib.util
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, cast
@@ -18,6 +15,7 @@ from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.flight.columns import LEVEL, SPACE, STATE, TARGET, Columns
 from mambo_sil.flight.controllers.thrust_controller import Applied
 from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.own_file import load_object, whole_name
 from mambo_sil.flight.states import DroneState, TargetState, unchecked
 
 RULE: Final = "return roll and pitch in rad, or these and the thrust over mass in m/s^2"
@@ -62,8 +60,7 @@ class LawFile:
 
         Raises FlightError as `load_law`, and for a law whose update period is no number in 0.001..1.
         """
-        file, _, name = named.rpartition(":")
-        whole = f"{(folder / file).resolve()}:{name}"
+        whole = whole_name(named, folder)
         law, sha256 = _loaded(whole)
         try:
             period_s = period_of(law)
@@ -88,40 +85,12 @@ def load_law(named: str) -> Law:
 
 
 def _loaded(named: str) -> tuple[Law, str]:
-    """Return a new law, and the SHA-256 of its file and of the modules beside it that it imports.
-
-    These are not kept: another law may have others of the same names.
-    """
-    file, _, name = named.rpartition(":")
-    path, before = Path(file), set(sys.modules)
-    module_name = f"law_{path.stem}"  # a file numpy.py takes nobody's place
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    if spec is None or spec.loader is None or not path.is_file():
-        raise FlightError(f"{echo(named)}: there is no file {echo(file)}")
-    module = importlib.util.module_from_spec(spec)
-    folder = path.resolve().parent
-    sys.modules[module_name] = module
-    sys.path.insert(0, str(folder))
-    try:
-        spec.loader.exec_module(module)
-        law = getattr(module, name)()
-    except (Exception, SystemExit) as error:
-        raise FlightError(f"{echo(named)}: {type(error).__name__}: {echo(str(error))}") from error
-    finally:
-        sys.path.remove(str(folder))
-        beside = {
-            one: Path(source)
-            for one in set(sys.modules) - before
-            if (source := getattr(sys.modules[one], "__file__", None)) and folder in Path(source).parents
-        }
-        for one in beside:
-            del sys.modules[one]
+    """Return a new law, and the SHA-256 of what it is made of; raises as `load_object`."""
+    law, sha256 = load_object(named)
     if not callable(getattr(law, "step", None)):
-        raise FlightError(f"{echo(named)}: {echo(name)} has no method step(state, target)")
-    digest = hashlib.sha256(path.read_bytes())
-    for one in sorted(beside.keys() - {module_name}):
-        digest.update(beside[one].read_bytes())
-    return cast("Law", law), digest.hexdigest()
+        name = echo(named.rpartition(":")[2])
+        raise FlightError(f"{echo(named)}: {name} has no method step(state, target)")
+    return cast("Law", law), sha256
 
 
 def period_of(law: object) -> float:

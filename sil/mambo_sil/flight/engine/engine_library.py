@@ -20,6 +20,7 @@ from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 SOURCES: Final = ("evaluation.c", "faults.c", "loop.c", "pd.c")
 HEADERS: Final = (
     "cascade.h",
+    "drift.h",
     "elementary.h",
     "engine.h",
     "first_order.h",

@@ -101,6 +101,8 @@ void engine_start_sensors(const engine_simulation_t *simulation, flying_t *flyin
 
     if (simulation->captured) {
         mocap_start(simulation, &start, &r, &flying->mocap);
+    } else if (simulation->drifting) {
+        drift_start(&flying->drift);
     } else {
         suite_start(simulation, &start, &r, &flying->suite);
     }
@@ -237,6 +239,9 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         if (simulation->captured) {
             take(draws->sensors, rows, row, 6, drawn);
             seen = capture(simulation, flight, &measured, &r, drawn, &flying->mocap);
+        } else if (simulation->drifting) {
+            take(draws->sensors, rows, row, 3, drawn);
+            seen = drift(simulation, flight, &measured, drawn, &flying->drift);
         } else if (simulation->sensed) {
             take(draws->sensors, rows, row, 8, drawn);
             seen = estimate(simulation, flight, &measured, &r, drawn, &flying->suite);

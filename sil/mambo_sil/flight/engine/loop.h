@@ -6,6 +6,7 @@
 #ifndef ENGINE_LOOP_H
 #define ENGINE_LOOP_H
 
+#include "drift.h"
 #include "first_order.h"
 #include "ground.h"
 #include "mocap.h"
@@ -17,6 +18,7 @@ typedef struct {
     vehicle_state_t state;
     suite_t suite;
     mocap_t mocap;
+    drift_t drift;
     late_t late;
     gusts_t gusts;
     wire_t wire;

@@ -19,6 +19,7 @@ typedef struct {
     int64_t dropping;         /* whether any flight drops updates */
     int64_t sensed;           /* whether controllers receive estimates */
     int64_t captured;         /* whether these come from motion capture */
+    int64_t drifting;         /* whether from a filter whose estimates drift */
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
     int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
@@ -125,6 +126,10 @@ typedef struct {
     double mocap_share;
     int64_t mocap_beside;     /* whether the measured place is another than the centre of mass */
     double mocap_lever_m[3];
+
+    /* Estimates that drift. */
+    double drift_keep;
+    double drift_corrected_s[3];
 } engine_simulation_t;
 
 /* A group of flights, one in each lane; with one lane one flight. Rows of body_start are those of a state of the rigid
@@ -164,12 +169,12 @@ typedef struct {
     whole_t delay_ticks;
     real_t dropped_share;
 
-    real_t noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
+    real_t noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; position, angles; velocity */
     real_t bias[6];           /* accelerometer, gyro */
     real_t lever_error_m[3];  /* in the body, from where the controller takes what measures to be */
 } engine_flight_t;
 
-/* Random numbers of a group, for each lane a row for each tick: sensors (lanes, ticks, 8 or 6), gusts
+/* Random numbers of a group, for each lane a row for each tick: sensors (lanes, ticks, 8, 6 or 3), gusts
  * (lanes, 1 + ticks, 3) with a first row for their start, and drops (lanes, updates). NULL where the simulation needs
  * none. */
 typedef struct {

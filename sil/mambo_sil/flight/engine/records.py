@@ -15,8 +15,10 @@ from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M
 from mambo_sil.drone.plant.rotors import LEAST_YAW, wrench_per_command
 from mambo_sil.drone.plant.vehicle import STEP_S, Vehicle
-from mambo_sil.drone.sensors import estimators, instruments, mocap
+from mambo_sil.drone.sensors import drift, estimators, instruments, mocap
+from mambo_sil.drone.sensors.drift import DriftingEstimate
 from mambo_sil.drone.sensors.mocap import MotionCapture
+from mambo_sil.drone.sensors.suites import AnySensors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import (
     CascadeAttitude,
@@ -43,6 +45,7 @@ _FIRST_ORDER: Final = (
     *("yaw_lag_s", "yaw_decay", "acceleration_per_tilt_g", "trim_rad"),
 )
 _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "thrust_decay_after")
+_DRIFT: Final = ("drift_keep", "drift_corrected_s")
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 _PLACED: Final = ("mocap_beside", "mocap_lever_m")
 
@@ -59,6 +62,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LE
         _attitude(drone)
         | _thrust(flight.vehicle)
         | _mocap(sensors, step_s)
+        | _drift(sensors, step_s)
         | {
             "flights": flight.flights,
             "updates": len(times_s),
@@ -70,6 +74,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, columns: Columns = LE
             "dropping": bool(np.any(flight.link.dropped_share)),
             "sensed": sensors is not None,
             "captured": isinstance(sensors, MotionCapture),
+            "drifting": isinstance(sensors, DriftingEstimate),
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
@@ -243,7 +248,7 @@ def _thrust(vehicle: Vehicle) -> dict[str, Any]:
     return {"thrust_lags": 1} | dict(zip(_THRUST, found, strict=True))
 
 
-def _mocap(sensors: instruments.Sensors | MotionCapture | None, step_s: float) -> dict[str, Any]:
+def _mocap(sensors: AnySensors | None, step_s: float) -> dict[str, Any]:
     """Return the members of the motion capture, 0 without."""
     if not isinstance(sensors, MotionCapture):
         return dict.fromkeys((*_MOCAP, *_PLACED), 0)
@@ -252,12 +257,21 @@ def _mocap(sensors: instruments.Sensors | MotionCapture | None, step_s: float) -
     return sampled | dict(zip(_PLACED, (any(lever_m), lever_m), strict=True))
 
 
+def _drift(sensors: AnySensors | None, step_s: float) -> dict[str, Any]:
+    """Return the members of estimates that drift, 0 without."""
+    if not isinstance(sensors, DriftingEstimate):
+        return dict.fromkeys(_DRIFT, 0)
+    return dict(zip(_DRIFT, astuple(drift.fading(sensors.figures, step_s)), strict=True))
+
+
 def _noise(flight: Flight) -> dict[str, Any]:
     """Return noise and biases of the sensors, 0 without."""
     sensors, n = flight.sensors, flight.flights
     noise, bias = np.zeros((n, instruments.NOISES)), np.zeros((n, 6))
     if isinstance(sensors, MotionCapture):
         noise[:, : mocap.NOISES] = mocap.mocap_deviations(sensors, n).T
+    elif isinstance(sensors, DriftingEstimate):
+        noise[:, : drift.NOISES] = drift.drift_deviations(sensors, n, flight.vehicle.drone.step_s).T
     elif sensors is not None:
         noise = instruments.noise_deviations(sensors, n).T
         bias = _columns((*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s), n)

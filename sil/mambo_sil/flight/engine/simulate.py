@@ -11,8 +11,7 @@ import numpy as np
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.drone.plant.randomness import Purpose, generators
-from mambo_sil.drone.sensors import instruments, mocap
-from mambo_sil.drone.sensors.mocap import MotionCapture
+from mambo_sil.drone.sensors.suites import noises_of
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.thrust_controller import adapted
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
@@ -208,8 +207,8 @@ class _Buffers:
     """Random numbers of one group at a time, from the same streams as in NumPy."""
 
     def __init__(self, flight: Flight, lanes: int, updates: int, ticks: int) -> None:
-        width = mocap.NOISES if isinstance(flight.sensors, MotionCapture) else instruments.NOISES
-        self.sensors = np.empty((lanes, ticks, width)) if flight.sensors is not None else None
+        width = noises_of(flight.sensors)
+        self.sensors = np.empty((lanes, ticks, width)) if width else None
         self.gusts = np.empty((lanes, ticks + 1, 3)) if flight.disturbances.windy else None
         self.drops = np.empty((lanes, updates)) if np.any(flight.link.dropped_share) else None
         self._record = ffi.new(

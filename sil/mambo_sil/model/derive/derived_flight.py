@@ -21,7 +21,7 @@ from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.flown_settings import FlownSettings
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.metrics import height_error_m
-from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.flight.names import DEFAULT_SENSORS, SensorsName
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.flight.trajectories import Hover, Trajectory
@@ -192,7 +192,7 @@ def flies_quick_circle(settings: Settings, drone: VehicleFile) -> bool:
 
 
 def _own_sensors(drone: VehicleFile) -> SensorsName:
-    return SENSORS_OF[drone.sensors.kind][-1]
+    return DEFAULT_SENSORS[drone.sensors.kind]
 
 
 def _flown(

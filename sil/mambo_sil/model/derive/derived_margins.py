@@ -14,7 +14,7 @@ from mambo_sil.experiment.margins.axis_margins import PLACES, Margins
 from mambo_sil.experiment.margins.corners import Ends, at_ends, corners, intervals, uncertain
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.experiment.margins.margin_figures import verdict
-from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.flight.names import DEFAULT_SENSORS, SensorsName
 from mambo_sil.model.derive.derived_settings import controller_text
 
 LEAST_GAIN: Final = 1.5
@@ -53,7 +53,7 @@ def judge_margins(
     Of a drone with intervals, which `identify` writes, each axis has the margins of the worst of their ends;
     `progress` is called with the share of these that is measured. Raises BuildError, CacheError.
     """
-    sensors = SENSORS_OF[drone.sensors.kind][-1]
+    sensors = DEFAULT_SENSORS[drone.sensors.kind]
     where = "true state" if sensors == "true" else f"through sensors {sensors}"
     if drone.uncertainty is not None:
         where = f"{where}, at the worst of the intervals in [uncertainty]"

@@ -21,6 +21,7 @@ from mambo_sil.experiment.campaign.campaign_file import (
     load_its_drone,
 )
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
+from mambo_sil.experiment.campaign.drawn_curves import identity_of_files
 from mambo_sil.experiment.campaign.parameters import Draw, draw
 from mambo_sil.experiment.inputs import FileSection, format_value, load_settings, read_as
 
@@ -120,6 +121,7 @@ class Tuning:
             "base": self.base.model_dump(),
             "search": search,
             "vehicle": self.drone.model_dump(),
+            **identity_of_files(self.file.flight.trajectory),
         }
 
 
