@@ -40,7 +40,7 @@ class Empty:
 
 
 @dataclass(frozen=True)
-class Measured:
+class TimedFlights:
     """A function that flies, and how many commands of one drone it takes."""
 
     name: str
@@ -48,12 +48,12 @@ class Measured:
     run: Callable[[], object]
 
 
-def flown(name: str, law: Any) -> Measured:
+def flown(name: str, law: Any) -> TimedFlights:
     """Return a campaign of 20 flights of 10 s with a law."""
     vehicle, flights, duration_s = Vehicle.from_preset("crazyflie"), 20, 10.0
     calm = {"wind_speed_m_s": 0.0}
     commands = round(flights * duration_s * RATE_HZ)
-    return Measured(
+    return TimedFlights(
         name,
         commands,
         lambda: campaign(
@@ -62,7 +62,7 @@ def flown(name: str, law: Any) -> Measured:
     )
 
 
-def rotorpy() -> Measured:
+def rotorpy() -> TimedFlights:
     """Return RotorPy's own loop with its own controller, on a circle for 5 s."""
     duration_s = 5.0
     environment = Environment(
@@ -71,14 +71,14 @@ def rotorpy() -> Measured:
         trajectory=ThreeDCircularTraj(center=np.zeros(3), radius=np.ones(3), freq=np.full(3, 0.2)),
         sim_rate=RATE_HZ,
     )
-    return Measured(
+    return TimedFlights(
         "RotorPy's `Environment` with its SE3Control",
         round(duration_s * RATE_HZ),
         lambda: environment.run(t_final=duration_s, use_mocap=False, terminate=False, plot=False),
     )
 
 
-def stepped(name: str, environment: Any, steps: int = 50) -> Measured:
+def stepped(name: str, environment: Any, steps: int = 50) -> TimedFlights:
     """Return an environment of Gymnasium with random commands."""
     environment.reset(seed=1)
     action = environment.action_space.sample()
@@ -89,10 +89,10 @@ def stepped(name: str, environment: Any, steps: int = 50) -> Measured:
         for part in seen.values() if isinstance(seen, dict) else (seen,):
             np.asarray(part)  # waits for what computes still
 
-    return Measured(name, steps * getattr(environment, "num_envs", 1), run)
+    return TimedFlights(name, steps * getattr(environment, "num_envs", 1), run)
 
 
-def cases() -> list[Measured]:
+def cases() -> list[TimedFlights]:
     """Return what is measured; the first is the measure."""
     theirs, many = "DroneFigureEightTrajectory-v0", {"num_envs": MANY}
     pybullet = HoverAviary(pyb_freq=5 * RATE_HZ, ctrl_freq=RATE_HZ)

@@ -165,6 +165,20 @@ def test_a_simulated_flight_makes_the_same_calls(
         assert np.degrees(np.median(rows["nmpcinYaw"])) == pytest.approx(120.0, abs=1.0)
 
 
+@pytest.mark.parametrize("name", ["flow-deck", "true"])
+def test_a_simulated_flight_is_measured_by_the_sensors_that_are_named(
+    name: str, scripts: dict[str, ModuleType], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Over a flow deck it drifts while the log says that it stands; an unknown name is one sentence."""
+    assert run(scripts, "hover", "--simulate", "--sensors", name) == 0
+    printed = capsys.readouterr().out
+    off_cm = float(printed.split(" in the mean, ")[1].split(" cm")[0])
+    assert f"simulated on crazyflie, sensors {name}: " in printed
+    assert (off_cm > 3.0) == (name == "flow-deck")
+    assert run(scripts, "hover", "--simulate", "--sensors", "gps") == 1
+    assert 'No flight: sensors = "gps" must be "true" or "mocap"' in capsys.readouterr().err
+
+
 def test_the_simulated_planner_moves_as_the_firmware_s(scripts: dict[str, ModuleType], folder: Path) -> None:
     """From rest to rest, a go_to in motion without a jump, and a set-point that is carried on."""
     flown = scripts["simulated_drone"].SimulatedDrone(folder, "crazyflie")
