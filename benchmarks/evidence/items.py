@@ -390,6 +390,18 @@ ITEMS: Final = (
         variable="SIMULATORS",
     ),
     Item(
+        name="speed",
+        commands=("python -m benchmarks.speed.beside_simulators",),
+        controllers=("design crazyflie --sensors true",),
+        paths=(
+            *("sil/mambo_nmpc/adapters/gymnasium.py", "sil/mambo_sil/api/simulated.py"),
+            *(f"{_EXPERIMENT}/campaign/campaign_flights.py", "benchmarks/speed/beside_simulators.py"),
+        ),
+        read=read_printed,
+        tables={"speed": printed},
+        variable="SIMULATORS",
+    ),
+    Item(
         name="pyflyt",
         commands=(f"python -m benchmarks.simulators pyflyt {RESULTS}/pyflyt/pyflyt",),
         controllers=("design cf2x-pyflyt --sensors true",),
