@@ -76,6 +76,12 @@ def share_of_fixed() -> str:
     return f"{100 * min(shares):.0f} to {100 * max(shares):.0f}"
 
 
+def processor_time(what: str) -> float:
+    """Return the processor time of a row of `speed` that begins so, over that of a controller in C."""
+    found = next(one for one in figures("speed")["rows"] if one["what flies"].startswith(what))
+    return float(found["processor time"])
+
+
 def crashes(campaign: str, controller: str = "mambo") -> str:
     """Return how many of 300 light drones with slow motors crash."""
     return str(figures("opponents")[campaign]["controllers"][controller]["crashed"]["count"])
@@ -154,6 +160,26 @@ OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compati
 HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
 BOARDS, LIBRARIES = "docs/evidence/boards.md", "docs/how-to/libraries.md"
 FIGURES = [
+    Figure(
+        "docs/reference/python.md",
+        r"A law takes at least (\d+) times",
+        lambda: f"{processor_time('an empty law'):.0f}",
+    ),
+    Figure(
+        "docs/evidence/simulators.md",
+        r"does nothing takes (\d+) times",
+        lambda: f"{processor_time('an empty law'):.0f}",
+    ),
+    Figure(
+        "docs/evidence/simulators.md",
+        r"own controller takes (\d+) times as long as that",
+        lambda: f"{processor_time('RotorPy') / processor_time('an empty law'):.0f}",
+    ),
+    Figure(
+        "docs/how-to/simulators.md",
+        r"1,000 of them make (\d+) times as many",
+        lambda: f"{round(processor_time('Gymnasium, 1 drone') / processor_time('Gymnasium, 1,000'), -1):.0f}",
+    ),
     Figure(BOARDS, r"float32 takes (\d+) instructions on an ARM926", lambda: instructions("mambo")),
     Figure(BOARDS, r"ARM926, and fixed point (\d+)", lambda: instructions("mambo", FIXED)),
     Figure(BOARDS, r"takes \*\*(\S+) KB of flash", lambda: f"{board('crazyflie')['flash_bytes'] / 1000:.1f}"),

@@ -19,7 +19,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF
+from mambo_sil.flight.names import DEFAULT_SENSORS
 from mambo_sil.flight.polynomials import PiecesInSpace
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import Trace
@@ -130,7 +130,7 @@ class Drones:
             update_period_s=period_s,
             seeds=tuple(range(flights)),
             offset=_in_flight(course, yaw_rad) if moving else None,
-            sensors=choose_sensors(SENSORS_OF[vehicle.drone.sensors.kind][-1], vehicle.drone),
+            sensors=choose_sensors(DEFAULT_SENSORS[vehicle.drone.sensors.kind], vehicle.drone),
         )
         trace = fly(flight, CompiledController(self.settings, flights))
         return FlownPlan(
