@@ -243,13 +243,18 @@ def test_numbers_of_the_limits_are_changed_by_their_names() -> None:
     for settings in (MAMBO, with_option(height_settings(), "limits.speed_m_s", 3.0)):
         limiting = method_of(settings).limiting
         assert limiting is not None
-        names = ["speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt"]
-        names += ["floor", "ceiling", "climb", "descent"] if settings.height is not None else []
-        for index, name in enumerate(names):
-            expected = limiting.limits.tolist()
-            expected[index] = 0.123
-            assert with_limits(settings, **{name: 0.123}) == tuple(expected)
-    assert square_fence(2.5) == {"x_min": -2.5, "y_min": -2.5, "x_max": 2.5, "y_max": 2.5}
+        places = {"speed_m_s": [0], "braking_m_s2": [1], "fence_min_m": [2, 3], "fence_max_m": [4, 5]}
+        places |= {"tilt_rad": [6]}
+        if settings.height is not None:
+            places |= {"floor_m": [7], "ceiling_m": [8], "climb_m_s": [9], "descent_m_s": [10]}
+        assert list(limiting.named) == list(places)
+        for name, columns in places.items():
+            expected = limiting.limits.copy()
+            expected[columns] = 0.123
+            assert with_limits(settings, **{name: [0.123] * len(columns)}) == tuple(expected.tolist())
+        with pytest.raises(KeyError, match="speed_limit"):
+            with_limits(settings, speed_limit=1.0)
+    assert square_fence(2.5) == {"fence_min_m": (-2.5, -2.5), "fence_max_m": (2.5, 2.5)}
     assert walls_m(MAMBO, 2.5) == square(2.5)
 
 

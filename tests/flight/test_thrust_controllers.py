@@ -74,7 +74,7 @@ def test_a_command_is_the_thrust_over_the_gain() -> None:
 def test_faults_have_the_bits_of_numpy() -> None:
     """Every effect of a fault, limits that change in flight, and callers that level out to hover."""
     settings = height_settings()
-    limits = with_limits(settings, speed=0.5, climb=0.5)
+    limits = with_limits(settings, speed_m_s=0.5, climb_m_s=0.5)
     changes = (
         Adjustment(1, 10, "set_limits", (math.nan,) * len(limits)),
         Adjustment(4, 30, "set_limits", limits),

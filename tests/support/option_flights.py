@@ -143,7 +143,7 @@ class OptionFlights:
     def _other(self) -> Any:
         """Return a setter with its values; nothing for settings that have none."""
         if self.method.limiting:
-            return "set_limits", with_limits(self.settings, **square_fence(0.4), speed=0.8)
+            return "set_limits", with_limits(self.settings, **square_fence(0.4), speed_m_s=0.8)
         return ("set_weights", (800.0, 3.0)) if self.method.weight_limits else ()
 
     @cached_property

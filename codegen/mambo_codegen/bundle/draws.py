@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.inputs import Rows
-from mambo_codegen.methods.shared.limits_constants import LimitsConstants
+from mambo_codegen.methods.shared.limits_constants import LimitsConstants, in_order
 from mambo_codegen.methods.shared.math import Real, rounded
 from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
@@ -138,11 +138,15 @@ def _limits_scales(limits: LimitsConstants | None, wall_m: float) -> tuple[float
     """
     if limits is None:
         return ()
-    speed_m_s, braking_m_s2, *_ = limits.limits.tolist()
-    tilt_rad, vertical = float(limits.limits[6]), limits.limits[9:].tolist()
-    walls = (-wall_m, wall_m, wall_m, wall_m)
-    height = (wall_m, wall_m, *vertical) if vertical else ()
-    return (min(speed_m_s, _MOST_SPEED_M_S), braking_m_s2, *walls, tilt_rad, *height)
+    own = limits.named
+    drawn = {
+        "speed_m_s": min(own["speed_m_s"], _MOST_SPEED_M_S),
+        "fence_min_m": (-wall_m, wall_m),
+        "fence_max_m": (wall_m, wall_m),
+    }
+    if "floor_m" in own:
+        drawn |= {"floor_m": wall_m, "ceiling_m": wall_m}
+    return tuple(in_order(own | drawn).tolist())
 
 
 def tiny_m(method: Method) -> float:

@@ -144,7 +144,7 @@ def _limits(settings: Settings) -> list[FmuVariable]:
     most_m_s2 = method.limiting.tilted.at(settings.limits.tilt_rad)
     ends = {
         "velocity": (SMALLEST_LIMIT, ranges.velocity_m_s),
-        "braking": (SMALLEST_LIMIT, max(most_m_s2, float(method.limiting.limits[1]))),
+        "braking": (SMALLEST_LIMIT, max(most_m_s2, method.limiting.named["braking_m_s2"])),
         "position": (-ranges.position_m, ranges.position_m),
     }
     return [

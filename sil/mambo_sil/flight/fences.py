@@ -5,8 +5,10 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.shared.limits_constants import in_order
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import hypotenuse
@@ -19,10 +21,6 @@ from mambo_sil.flight.traces import Trace
 
 Walls = tuple[float, float, float, float, float, float]
 """x_min, y_min, floor, x_max, y_max, ceiling of a fence, m, heights up; infinity for no wall."""
-
-LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
-HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
-"""The numbers of nmpc_limits_t, in their order; the last are for a controller of the height."""
 
 FAST: Final = 0.5
 """Share of the speed limit beyond which a flight shows its speed."""
@@ -45,20 +43,19 @@ class LimitMetrics:
 LIMIT_METRICS: Final = tuple(field.name for field in fields(LimitMetrics))
 
 
-def with_limits(settings: Settings, **changed: float) -> tuple[float, ...]:
-    """Return the numbers of nmpc_limits_t for settings that have limits, with some of LIMITS changed."""
+def with_limits(settings: Settings, **changed: ArrayLike) -> tuple[float, ...]:
+    """Return the numbers of nmpc_limits_t for settings that have limits, with some of its members changed."""
     limiting = method_of(settings).limiting
     if limiting is None:
         raise FlightError(
             "the settings have no limits: give limits.speed_m_s, limits.braking_m_s2 or a fence"
         )
-    own = dict(zip((*LIMITS, *HEIGHT_LIMITS), limiting.limits.tolist(), strict=False))
-    return tuple((own | changed).values())
+    return tuple(in_order(limiting.named | changed).tolist())
 
 
-def square_fence(half_width_m: float) -> dict[str, float]:
-    """Return the walls of a square round the origin, by their names in LIMITS."""
-    return {f"{axis}_{end}": sign * half_width_m for axis in "xy" for end, sign in (("min", -1), ("max", 1))}
+def square_fence(half_width_m: float) -> dict[str, tuple[float, float]]:
+    """Return the walls of a square round the origin, by their members of nmpc_limits_t."""
+    return {"fence_min_m": (-half_width_m, -half_width_m), "fence_max_m": (half_width_m, half_width_m)}
 
 
 def fenced(

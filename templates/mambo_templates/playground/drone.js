@@ -1,11 +1,10 @@
 /* One drone on the field: a module and its flight, update by update. */
-const LIMITS = 11, FENCE_AT = 2; /* most numbers of nmpc_limits_t; the first of its fence: least x and y, largest x and y */
 const LIMIT_NAMES = ["speed", "braking", "fence", "tilt", "height", "thrust"]; /* the bits of nmpc_limits_active */
 const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array };
 
 class Drone {
   constructor(module, entry, data) {
-    Object.assign(this, { module, entry, offsets: data.offsets, columns: data.columns, real: KINDS[entry.scalar], shown: true });
+    Object.assign(this, { module, entry, offsets: data.offsets, columns: data.columns, places: data.limits, real: KINDS[entry.scalar], shown: true });
     this.simulation = module.put(bytesOf(data.simulation));
     this.flight = module.put(bytesOf(data.flight));
     this.flying = module.space(module.calls.playground_flying_bytes());
@@ -15,7 +14,7 @@ class Drone {
     const arrays = TRACE_AXES.map((axes) => module.space(8 * axes));
     this.trace = module.pointers(...arrays);
     this.weights = module.space(2 * this.real.BYTES_PER_ELEMENT);
-    this.limits = module.space(LIMITS * this.real.BYTES_PER_ELEMENT);
+    this.limits = module.space(this.places.count * this.real.BYTES_PER_ELEMENT);
     this.status = module.space(4);
     this.curve = module.space(48);
     /* What is read and written at every update; memory must not grow from here on. */
@@ -43,11 +42,11 @@ class Drone {
     return this.entry.metre !== null;
   }
 
-  /* Replaces the fence, in m, null by the settings' fence; returns whether the controller takes it. */
+  /* Replaces the fence, in m, least x and y, largest x and y, null by the settings' fence; returns whether the controller takes it. */
   enclose(fence) {
-    const { calls, self } = this.module, numbers = this.module.at(this.limits, LIMITS, this.real);
+    const { calls, self } = this.module, numbers = this.module.at(this.limits, this.places.count, this.real);
     calls.nmpc_default_limits(this.limits);
-    if (fence) numbers.set(fence.map((value) => value * this.entry.metre), FENCE_AT);
+    if (fence) numbers.set(fence.map((value) => value * this.entry.metre), this.places.fence);
     calls.nmpc_host_set_limits(self, 1, this.limits, this.status);
     return this.module.at(this.status, 1, Int32Array)[0] === 0;
   }

@@ -14,7 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.methods.shared.constants import Constants
 from mambo_codegen.methods.shared.inputs import choose
 from mambo_codegen.methods.shared.limits_arithmetic import LimitsArithmetic
-from mambo_codegen.methods.shared.limits_constants import LEAST_TURN_M2_S2, SPELLING, LimitsConstants
+from mambo_codegen.methods.shared.limits_constants import (
+    LEAST_TURN_M2_S2,
+    SPELLING,
+    LimitsConstants,
+    of_member,
+)
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
@@ -165,8 +170,9 @@ class LimitsLaw:
 
     def check(self, limits: Real) -> Rows:
         """Return whether limits (n, k) may be set (n,), but for the height's; not if one is NaN."""
-        speed, braking, tilt = limits[:, 0], limits[:, 1], limits[:, 6]
-        low, high, reach = limits[:, 2:4], limits[:, 4:6], self._ranges.position
+        speed, braking, tilt = (of_member(limits, one) for one in ("speed_m_s", "braking_m_s2", "tilt_rad"))
+        low, high = of_member(limits, "fence_min_m"), of_member(limits, "fence_max_m")
+        reach = self._ranges.position
         most = self._products.tilt_product(self._slope, tilt) - self._trim
         good: Rows = (
             (speed >= self._smallest_speed)
@@ -181,9 +187,10 @@ class LimitsLaw:
 
     def bounds(self, limits: Real) -> Bounds:
         """Derive what the steps need from good limits (n, k), but for the height's."""
-        products, speed = self._products, limits[:, 0]
-        low, high = limits[:, 2:4], limits[:, 4:6]
-        braking = products.least_braking(limits[:, 1] + limits[:, 1], speed)
+        products, speed = self._products, of_member(limits, "speed_m_s")
+        low, high = of_member(limits, "fence_min_m"), of_member(limits, "fence_max_m")
+        braking_limit = of_member(limits, "braking_m_s2")
+        braking = products.least_braking(braking_limit + braking_limit, speed)
         margin = products.margin(braking, speed)
         return Bounds(
             centre_m=products.half(low + high),
@@ -193,7 +200,7 @@ class LimitsLaw:
             near_m=products.near(braking),
             speed_m_s=speed,
             braking=braking,
-            tilt_rad=limits[:, 6],
+            tilt_rad=of_member(limits, "tilt_rad"),
         )
 
     def _turn_speed(self, memory: LimitsMemory, velocity: Real) -> tuple[LimitsMemory, Real]:

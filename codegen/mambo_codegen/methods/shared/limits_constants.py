@@ -5,14 +5,16 @@ k = K_e / K_v. All limits are limits of that velocity: `limits.c` derives them.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.numbers.fixed_point import fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.port import taken
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import DEFAULTS, Sections
@@ -39,13 +41,19 @@ TURN_SHARE: Final = 0.9
 LEAST_TURN_M2_S2: Final = 4e-5
 """The smallest turn that limits a speed: its square has a root in float32."""
 
-LIMITS: Final = ("velocity", "braking", *["position"] * 4, "angle")
+_MEMBERS: Final = [row.member for row in taken.LIMITS for _ in range(int(row.count))]
+PLACES: Final = {row.member: _MEMBERS.index(row.member) for row in taken.LIMITS}
+"""The place of each member of nmpc_limits_t among its numbers, the first of a fence's two."""
+
+LIMITS: Final = tuple(row.quantity for row in taken.LIMITS if not row.when for _ in range(int(row.count)))
 """The quantity of each number in nmpc_limits_t, in their order."""
 
-HEIGHT_LIMITS: Final = ("position", "position", "velocity", "velocity")
-"""The same of the further ones with a height: floor, ceiling, climb and descent."""
+HEIGHT_LIMITS: Final = tuple(row.quantity for row in taken.LIMITS if row.when)
+"""The same of the further ones with a height, which stand last."""
 
-LATER_LIMITS: Final = ("limits.speed_m_s", "limits.braking_m_s2", "limits.fence")
+LATER_LIMITS: Final = tuple(
+    f"limits.{key}" for key in type(DEFAULTS.limits).model_fields if key != "tilt_rad"
+)
 """Keys that the settings' digest leaves out at their defaults."""
 
 SHARE_BITS: Final = 30
@@ -92,6 +100,12 @@ class LimitsConstants:
         return (*LIMITS, *HEIGHT_LIMITS)[: len(self.limits)]
 
     @property
+    def named(self) -> dict[str, Any]:
+        """The limits by their members of nmpc_limits_t, each a float, or the two of a fence."""
+        present = {member: place for member, place in PLACES.items() if place < len(self.limits)}
+        return {member: of_member(self.limits, member).tolist() for member in present}
+
+    @property
     def knee_s2(self) -> float:
         """The distance up to which the approach speed is linear, over twice the braking limit."""
         return 1 / (2 * self.approach_1_s * self.approach_1_s)
@@ -112,10 +126,22 @@ class LimitsConstants:
         return self.approach_1_s / self.near_share
 
 
+def of_member(limits: NDArray[Any], member: str) -> Any:
+    """Return the numbers of a member of nmpc_limits_t of limits (..., k): (...), or (..., 2) of a fence."""
+    place, count = PLACES[member], _MEMBERS.count(member)
+    return limits[..., place] if count == 1 else limits[..., place : place + count]
+
+
+def in_order(named: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """Return limits (k,) by their members of nmpc_limits_t in its order. Raises KeyError for another name."""
+    members = sorted(named, key=PLACES.__getitem__)
+    return np.concatenate([np.ravel(np.asarray(named[member], np.float64)) for member in members])
+
+
 def has_limits(settings: Sections) -> bool:
-    """Return whether the settings limit speed, braking or place."""
-    limits = settings.limits
-    return bool(limits.speed_m_s or limits.braking_m_s2) or limits.fence != DEFAULTS.limits.fence
+    """Return whether the settings have another limit than the tilt limit."""
+    tilt_rad = DEFAULTS.limits.tilt_rad
+    return settings.limits.model_copy(update={"tilt_rad": tilt_rad}) != DEFAULTS.limits
 
 
 def limits_constants(settings: Sections, approach_1_s: float, tilted: TiltAcceleration) -> LimitsConstants:
@@ -126,11 +152,15 @@ def limits_constants(settings: Sections, approach_1_s: float, tilted: TiltAccele
     return LimitsConstants(
         approach_1_s=approach_1_s,
         tilted=tilted,
-        limits=np.array(
-            [
-                *(limits.speed_m_s or ranges.velocity_m_s, braking_m_s2, *low, *high, limits.tilt_rad),
-                *_height_limits(settings),
-            ]
+        limits=in_order(
+            {
+                "speed_m_s": limits.speed_m_s or ranges.velocity_m_s,
+                "braking_m_s2": braking_m_s2,
+                "fence_min_m": low,
+                "fence_max_m": high,
+                "tilt_rad": limits.tilt_rad,
+                **_height_limits(settings),
+            }
         ),
         is_tracked=settings.cost.norm == "quadratic" or settings.target.acceleration == "tracked",
     )
@@ -184,21 +214,26 @@ def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> 
         return dict.fromkeys(("braking", "approach", "knee", "slope"), 0)
     slope = found.tilted.slope_m_s2_rad
     return {
-        "braking": fractional_bits(16 * slope * found.limits[LIMITS.index("angle")]),
+        "braking": fractional_bits(16 * slope * found.named["tilt_rad"]),
         "approach": min(fractional_bits(found.steepest_1_s), 29 + velocity - position),
         "knee": fractional_bits(found.knee_s2),
         "slope": fractional_bits(SPELLING * slope),
     }
 
 
-def _height_limits(settings: Sections) -> tuple[float, ...]:
-    """Return floor, ceiling, climb and descent; none without a height."""
+def _height_limits(settings: Sections) -> dict[str, float]:
+    """Return floor, ceiling, climb and descent, by their members; none without a height."""
     height, fence, reach_m = settings.height, settings.limits.fence, settings.ranges.position_m
     if height is None:
-        return ()
+        return {}
     is_walled = fence.floor_m < fence.ceiling_m
-    walls = (fence.floor_m, fence.ceiling_m) if is_walled else (-reach_m, reach_m)
-    return (*walls, height.climb_m_s, height.descent_m_s)
+    floor_m, ceiling_m = (fence.floor_m, fence.ceiling_m) if is_walled else (-reach_m, reach_m)
+    return {
+        "floor_m": floor_m,
+        "ceiling_m": ceiling_m,
+        "climb_m_s": height.climb_m_s,
+        "descent_m_s": height.descent_m_s,
+    }
 
 
 ONE_NORM_TILT: Final = TiltAcceleration(GRAVITY_M_S2, 0.0)

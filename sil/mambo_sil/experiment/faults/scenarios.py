@@ -165,7 +165,9 @@ def _limited(settings: Settings) -> tuple[FaultScenario, ...]:
             answers=_only(Status.OK, Status.BAD_STATE),
         ),
         FaultScenario(f"fence of {2 * FENCE_M:g} m, 5 s", 5.0, limits=near, answers=ok),
-        FaultScenario("speed limit 0.5 m/s, 5 s", 5.0, limits=with_limits(settings, speed=0.5), answers=ok),
+        FaultScenario(
+            "speed limit 0.5 m/s, 5 s", 5.0, limits=with_limits(settings, speed_m_s=0.5), answers=ok
+        ),
         FaultScenario("limits NaN, 5 s", 5.0, limits=(_NAN,) * len(near), answers=refused),
         FaultScenario(
             "fence inside out, 5 s", 5.0, limits=with_limits(settings, **square_fence(-1.0)), answers=refused

@@ -6,12 +6,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.shared.limits_constants import PLACES
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.controllers.compiled import CompiledController
 
 Limits = Mapping[int, FloatArray]
-"""The limits (11,) that are set before an update, by its number, in the order of nmpc_limits_t."""
+"""The limits (k,) that are set before an update, by its number, in the order of nmpc_limits_t."""
 
 
 class LimitParameter(NamedTuple):
@@ -22,18 +23,28 @@ class LimitParameter(NamedTuple):
     is_least: bool = False
 
 
-_TILT, _BRAKE = LimitParameter("TILT", 6), LimitParameter("BRAKE", 1)
+_TILT, _BRAKE = (
+    LimitParameter("TILT", PLACES["tilt_rad"]),
+    LimitParameter("BRAKE", PLACES["braking_m_s2"]),
+)
 PARAMETERS: Final = (
-    *(_TILT, _BRAKE, LimitParameter("SPEED", 0), LimitParameter("CLIMB", 9), LimitParameter("DESCENT", 10)),
-    *(LimitParameter("X_MIN", 2, is_least=True), LimitParameter("X_MAX", 4)),
-    *(LimitParameter("Y_MIN", 3, is_least=True), LimitParameter("Y_MAX", 5)),
-    *(LimitParameter("Z_MIN", 7, is_least=True), LimitParameter("Z_MAX", 8)),
+    _TILT,
+    _BRAKE,
+    LimitParameter("SPEED", PLACES["speed_m_s"]),
+    LimitParameter("CLIMB", PLACES["climb_m_s"]),
+    LimitParameter("DESCENT", PLACES["descent_m_s"]),
+    LimitParameter("X_MIN", PLACES["fence_min_m"], is_least=True),
+    LimitParameter("X_MAX", PLACES["fence_max_m"]),
+    LimitParameter("Y_MIN", PLACES["fence_min_m"] + 1, is_least=True),
+    LimitParameter("Y_MAX", PLACES["fence_max_m"] + 1),
+    LimitParameter("Z_MIN", PLACES["floor_m"], is_least=True),
+    LimitParameter("Z_MAX", PLACES["ceiling_m"]),
 )
 """In the order in which the module sets them."""
 
 
 def flown_limits(settings: Settings, parameters: Mapping[str, float]) -> FloatArray | None:
-    """Return the limits (11,) of the module with `parameters`, by their names behind MC_NMPC_.
+    """Return the limits (k,) of the module with `parameters`, by their names behind MC_NMPC_.
 
     As the module does: a parameter that is looser than the settings, or 0, changes nothing; less tilt leaves
     less braking; and one that the controller refuses is left out by itself. None without limits in the

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.shared.limits_constants import HEIGHT_LIMITS, LIMITS, PLACES
 from mambo_codegen.port.taken import AHEAD_S
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -152,6 +153,7 @@ def _simulation(flight: Flight) -> dict[str, Any]:
     return {
         "period_s": flight.update_period_s,
         "ahead_s": AHEAD_S,
+        "limits": {"count": len(LIMITS) + len(HEIGHT_LIMITS), "fence": PLACES["fence_min_m"]},
         "columns": {
             "level": LEVEL.target,
             "target": SPACE.target,
