@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.inputs import Status
 from mambo_codegen.methods.shared.limits import ActiveLimit, LimitsLaw
@@ -14,6 +15,7 @@ from mambo_codegen.methods.shared.limits_arithmetic import ROOT_ERROR, LimitsAri
 from mambo_codegen.methods.shared.limits_constants import LATER_LIMITS, NEAR_SHARE
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.limits_section import Limits
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import SCALARS
 from tests.support.quadratic import told
@@ -285,6 +287,23 @@ def test_settings_refuse_limits_that_cannot_be_kept(base: str, limits: dict[str,
     with pytest.raises(ValidationError) as caught:
         Settings.model_validate(document | {"limits": document["limits"] | limits})
     assert [".".join(map(str, one["loc"])) for one in caught.value.errors()] == [fault]
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("key", [key for key in Limits.model_fields if key != "fence"])
+def test_a_limit_that_the_settings_admit_may_be_set(key: str, base: str) -> None:
+    """The settings refuse what `nmpc_set_limits` would refuse: else the default limits could not be set."""
+    values, admitted = np.geomspace(0.05, 2000.0, 25).tolist(), []
+    for value in values:
+        try:
+            limiting = method_of(settings := limited(base, **{key: value})).limiting
+        except InvalidSettingsError:
+            continue
+        assert limiting is not None
+        set_to = method_of(settings).reference_controller(1).set_limits([limiting.limits])
+        assert set_to.tolist() == [Status.OK], value
+        admitted.append(value)
+    assert 0 < len(admitted) < len(values)
 
 
 @pytest.mark.parametrize("base", [*BASES, "table1"])
