@@ -1,12 +1,14 @@
 """Trajectories: shapes, velocities, rest before t = 0, and waypoint files."""
 
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mambo_nmpc import curves
 from mambo_sil.errors import TrajectoryError
 from mambo_sil.flight.height_profiles import (
     HOVER_HEIGHT_M,
@@ -17,7 +19,7 @@ from mambo_sil.flight.height_profiles import (
     UpAndDown,
     helix_climb,
 )
-from mambo_sil.flight.names import IN_SPACE, SIZED, TIMED, CurveName
+from mambo_sil.flight.names import CURVE_NAMES, IN_SPACE, SIZED, TIMED, CurveName
 from mambo_sil.flight.trajectories import CURVES as CURVES_BY_NAME
 from mambo_sil.flight.trajectories import (
     Bernoulli,
@@ -150,6 +152,17 @@ def test_curves_have_names_sizes_and_rates() -> None:
         "take-off-and-landing": InSpace(Hover(), TakeOffAndLanding(2.0)),
     }
     assert helix_climb(-0.5, 0.5) == helix_climb(0.5, 0.5)
+
+
+def test_every_curve_has_its_name_its_class_and_its_row() -> None:
+    """The command line has its name, Python its class, and the page of the plant a row of its table."""
+    assert tuple(CURVES_BY_NAME) == CURVE_NAMES
+    made = (curve(1.0, 1.0) for curve in CURVES_BY_NAME.values())
+    assert {type(getattr(one, "plan", one)).__name__ for one in made} <= set(curves.__all__)
+    page = (Path(__file__).parents[2] / "docs" / "explanation" / "plant.md").read_text("utf-8")
+    table = page.partition("\n| curve | course | height |\n")[2].partition("\n\n")[0]
+    named = [name for row in table.splitlines() for name in re.findall("`([^`]+)`", row.split("|")[1])]
+    assert sorted(named) == sorted(CURVE_NAMES)
 
 
 def test_hover_stays_at_the_origin() -> None:
