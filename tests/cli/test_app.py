@@ -38,7 +38,8 @@ def test_a_broken_bound_fails() -> None:
         (("--wind", "gusts"), "leave out --wind"),
         (("--events", "camera-lost", "--trajectory", "circle"), "leave out --trajectory"),
         (("--sensors", "mambo"), "--sensors mambo must be mocap or flow-deck with --app"),
-        (("--trajectory", "points.csv"), "--trajectory points.csv must be bernoulli, gerono"),
+        (("--trajectory", "points"), "--trajectory points must be bernoulli, gerono"),
+        (("--trajectory", "points.csv"), "points.csv: cannot be read"),
         (("--events", "wrong.toml"), "heigt_m is not a key of this file; did you mean height_m?"),
         (("--events", "late.toml"), "nmpc.tild is not a parameter of this app"),
     ],
@@ -101,3 +102,21 @@ def test_events_are_for_an_app() -> None:
     """Without it nothing would read them."""
     _, error = run("fly", "--events", "camera-lost", code=2)
     assert "it is for a flight with --app" in unwrapped(error)
+
+
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_pieces_of_a_plan_are_flown_from_where_they_begin() -> None:
+    """From the height of the first point, x ahead and y to the left, to the last point."""
+    rest_to_rest = "0,0,0,0,{0},{1},{2},{3}"
+
+    def axis(start: float, metres: float) -> str:
+        numbers = (metres * factor / 3.0**power for power, factor in ((4, 35), (5, -84), (6, 70), (7, -20)))
+        return f"{start}" + rest_to_rest.format(*numbers)[1:]
+
+    header = ",".join(("duration", *(f"{name}^{power}" for name in ("x", "y", "z", "yaw") for power in range(8))))
+    row = ",".join(("3.0", axis(0.0, 0.5), axis(0.0, 1.0), axis(0.8, 0.4), "0,0,0,0,0,0,0,0"))
+    Path("lap.csv").write_text(f"{header}\n{row}\n", "utf-8")
+    arguments = "--app", "crazyflie", "--trajectory", "lap.csv", "--duration-s", "5", "--no-pictures"
+    run("fly", "crazyflie", *arguments)
+    last = Path("flight/trace.csv").read_text("utf-8").splitlines()[-1].split(",")
+    assert [float(one) for one in last[1:4]] == pytest.approx([0.5, 1.0, 1.2], abs=0.06)

@@ -11,7 +11,8 @@ from mambo_sil.board.desk.desk_flight import Desk
 from mambo_sil.board.desk.events_file import SENSORS, EventSection, EventsFile, MeasureName
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
-from mambo_sil.flight.trajectories import CURVES, vertical_of
+from mambo_sil.flight.polynomials import read_course
+from mambo_sil.flight.trajectories import CURVES, Trajectory, vertical_of
 
 SAMPLE_MS: Final = 10
 SWITCHED_ON_MS: Final = 1500
@@ -45,16 +46,29 @@ class DeskTrace:
     console: str
 
 
+def _curve(file: EventsFile) -> tuple[Trajectory, float, float]:
+    """Return the curve, which sign its second axis has to the left, and the height that stands for `height_m`.
+
+    A curve by name is mirrored; a file's course goes where it says, and begins at `height_m`.
+    Raises TrajectoryError.
+    """
+    for name, curve in CURVES.items():
+        if name == file.trajectory:
+            return curve(file.size_m, file.rate_rad_s), 1.0, HOVER_HEIGHT_M
+    course = read_course(Path(file.trajectory))
+    return course, -1.0, float(vertical_of(course, 0.0)[0])
+
+
 class _Course:
     """The target every 10 ms, in the firmware's frame, and the set-points of it that a radio sends."""
 
     def __init__(self, file: EventsFile, seed: int) -> None:
-        curve = CURVES[file.trajectory](file.size_m, file.rate_rad_s)
+        curve, left, begins_m = _curve(file)
         times_s = 0.001 * SAMPLE_MS * np.arange(round(1000.0 * file.duration_s) // SAMPLE_MS + 2)
         level = curve.target(times_s).reshape(-1, 2, 2)
-        level = np.concatenate([level, curve.acceleration(times_s)[:, np.newaxis]], axis=1)
+        level = np.concatenate([level, curve.acceleration(times_s)[:, np.newaxis]], axis=1) * (1.0, left)
         self._motions = np.concatenate([level, vertical_of(curve, times_s)[:, :, np.newaxis]], axis=2)
-        self._motions[:, 0] += (*-self._motions[0, 0, :2], file.height_m - HOVER_HEIGHT_M)
+        self._motions[:, 0] += (*-self._motions[0, 0, :2], file.height_m - begins_m)
         self._how, self._height_m = file.set_points, file.height_m
         self._random = np.random.default_rng(seed)
         self._sent: list[Motion] = []

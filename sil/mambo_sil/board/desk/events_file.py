@@ -36,6 +36,9 @@ MeasureName = Literal[
 """Measures of a flight; `desk_report` says what they are."""
 SENSORS: Final = {"mocap": DeskSensors.MOCAP, "flow-deck": DeskSensors.FLOW_DECK}
 
+CourseFile = Annotated[str, Field(pattern=r"(?i)\.csv$")]
+"""Name of a file of waypoints or polynomial pieces."""
+
 _Metres = Annotated[float, Field(ge=-100.0, le=100.0)]
 _Vector = Annotated[tuple[_Metres, _Metres, _Metres], Strict(False)]
 
@@ -120,7 +123,8 @@ class BoundSection(FileSection):
 class EventsFile(FileSection):
     """A flight on the desk: the drone takes off by a plan, hovers, then the course begins at time 0."""
 
-    trajectory: CurveName = "hover"
+    trajectory: CurveName | CourseFile = "hover"
+    """A curve by name; or a file of waypoints or polynomial pieces, whose first point is where the drone is."""
     size_m: float = Field(1.0, ge=-100.0, le=100.0)
     rate_rad_s: float = Field(1.0, ge=-10.0, le=10.0)
     height_m: float = Field(1.0, ge=0.1, le=10.0)

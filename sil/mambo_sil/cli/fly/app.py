@@ -1,6 +1,7 @@
 """`fly --app`: fly a generated app on the desk, with what surrounds it in its firmware."""
 
-from typing import Final, get_args
+from pathlib import Path
+from typing import Any, Final, get_args
 
 import typer
 from pydantic import ValidationError
@@ -15,6 +16,8 @@ from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course
 from mambo_sil.cli.options import load, show_result
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.polynomials import read_course
+from mambo_sil.flight.trajectories import known_of, vertical_of
 from mambo_sil.results.folders import new_results
 
 OF_AN_APP: Final = frozenset(
@@ -69,23 +72,39 @@ def fly_app(
 
 
 def _course(course: Course) -> EventsFile:
-    """Return the flight of a curve by name, without events; raises FlightError."""
+    """Return the flight of a curve, without events; raises FlightError, TrajectoryError."""
     names: tuple[CurveName, ...] = get_args(CurveName)
     for name in names:
         if course.trajectory == name:
-            try:
-                return EventsFile(
-                    trajectory=name,
-                    size_m=SIZE_M if course.size_m is None else course.size_m,
-                    rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
-                    duration_s=course.duration_s,
-                )
-            except ValidationError as error:
-                fault = error.errors()[0]
-                option = str(fault["loc"][0]).replace("_", "-")
-                rule = fault["msg"].replace("Input should", "must")
-                raise FlightError(f"--{option} = {fault['input']} {rule} with --app") from None
-    raise FlightError(f"--trajectory {echo(course.trajectory)} must be {', '.join(names)} with --app")
+            return _without_events(
+                trajectory=name,
+                size_m=SIZE_M if course.size_m is None else course.size_m,
+                rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
+                duration_s=course.duration_s,
+            )
+    if not course.trajectory.lower().endswith(".csv"):
+        raise FlightError(
+            f"--trajectory {echo(course.trajectory)} must be {', '.join(names)}, or a file ending in .csv, "
+            "with --app"
+        )
+    flown = read_course(Path(course.trajectory))
+    return _without_events(
+        trajectory=course.trajectory,
+        height_m=float(vertical_of(flown, 0.0)[0]),
+        duration_s=course.duration_s,
+        set_points={"acceleration": bool(known_of(flown))},
+    )
+
+
+def _without_events(**keys: Any) -> EventsFile:
+    """Return a flight without events; raises FlightError, which names the option."""
+    try:
+        return EventsFile(**keys)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        option = str(fault["loc"][0]).replace("_", "-")
+        rule = fault["msg"].replace("Input should", "must")
+        raise FlightError(f"--{option} = {fault['input']} {rule} with --app") from None
 
 
 def _with_sensors(file: EventsFile, name: str) -> EventsFile:
