@@ -113,7 +113,9 @@ def test_pieces_of_a_plan_are_flown_from_where_they_begin() -> None:
         numbers = (metres * factor / 3.0**power for power, factor in ((4, 35), (5, -84), (6, 70), (7, -20)))
         return f"{start}" + rest_to_rest.format(*numbers)[1:]
 
-    header = ",".join(("duration", *(f"{name}^{power}" for name in ("x", "y", "z", "yaw") for power in range(8))))
+    header = ",".join(
+        ("duration", *(f"{name}^{power}" for name in ("x", "y", "z", "yaw") for power in range(8)))
+    )
     row = ",".join(("3.0", axis(0.0, 0.5), axis(0.0, 1.0), axis(0.8, 0.4), "0,0,0,0,0,0,0,0"))
     Path("lap.csv").write_text(f"{header}\n{row}\n", "utf-8")
     arguments = "--app", "crazyflie", "--trajectory", "lap.csv", "--duration-s", "5", "--no-pictures"

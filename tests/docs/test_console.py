@@ -16,11 +16,11 @@ NAMES = [str(page.relative_to(DOCS)) for page in RUN]
 LONG = {
     *(
         f"tutorials/{name}.md"
-        for name in ("crazyflie", "first-flight", "own-drone", "paper", "px4-ardupilot")
+        for name in ("crazyflie", "first-flight", "lap", "own-drone", "paper", "px4-ardupilot")
     ),
     *(f"how-to/{name}.md" for name in ("campaign", "crazyflie", "design", "footprint", "identify")),
     "how-to/simulators.md",
-    *(f"how-to/{name}.md" for name in ("own-firmware", "regress", "replay", "verify")),
+    *(f"how-to/{name}.md" for name in ("own-firmware", "plan", "regress", "replay", "verify")),
 }
 """Pages whose commands take two seconds or more of an idle core."""
 ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")

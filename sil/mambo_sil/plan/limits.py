@@ -37,12 +37,14 @@ class FlightLimit:
 
     weights: (ORDERS, 3) of position to snap along each axis.
     offset:  (3,) that is added.
+    scale:   what 1 is of the limit itself: of the thrust, the part beyond the weight.
     """
 
     name: str
     weights: FloatArray
     offset: FloatArray
     rule: Rule
+    scale: float = 1.0
 
     def of(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return share of the limit less 1, and its gradient, of motions (ORDERS, ..., 3)."""
@@ -143,9 +145,11 @@ def _walls(settings: Settings) -> tuple[tuple[int, float, float], ...]:
 
 def limits_of(figures: Figures, share: float = 1.0) -> list[FlightLimit]:
     """Return the limits; `share` of what the weakest drone has beyond its weight, and of the tilt if less."""
+    usable_m_s2 = _usable_m_s2(figures, share)
+    spare_share = 1.0 - GRAVITY_M_S2 / usable_m_s2
     return [
         FlightLimit("tilt", *_commanded(figures), _cone(min(share, 1.0) * figures.slope)),
-        FlightLimit("thrust", *_commanded(figures), _ellipsoid(_usable_m_s2(figures, share))),
+        FlightLimit("thrust", *_commanded(figures), _ellipsoid(usable_m_s2), spare_share),
         FlightLimit("least thrust", *_commanded(figures), _above(figures.least_thrust_m_s2)),
         *(
             FlightLimit(name, _of(1), np.zeros(3), _below(np.array([0.0, 0.0, sign]), most_m_s))

@@ -114,6 +114,9 @@ def make_plan(
         flown = search.fly(course)
     else:
         course, share, flown = search.quickest(lambda share: limits_of(figures, share))
+        if rate < 1.0:
+            course = course.slower(rate)
+            flown = search.fly(course)
     yaw = headings_of(points, course.duration_s, closed=closed)
     return Planned(
         tuple(points), course, limits_of(figures, share), share, flown, yaw, settings.height is not None
@@ -150,7 +153,6 @@ class _Search:
             course = solve(first_course(self.first, limits), limits, report)
             course = slowed(course, limits)
             self._require(course, limits)
-            course = course.slower(self.rate)
             self.progress("flying", begun + 0.7 / TRIES)
             flown = self.fly(course)
             if flown.misses(SURE * reach_m).any():
@@ -227,7 +229,7 @@ def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: Fl
     tau = DENSE[sample]
     time_s = course.duration_s[:piece].sum() + tau * course.duration_s[piece]
     name = limits[limit].name
-    amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * over.max():.0f} %"
+    amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * limits[limit].scale * over.max():.0f} %"
     where = f"between points {piece + 1} and {(piece + 1) % len(course.choice.place_m) + 1}"
     for knot, near in ((piece, tau < 0.1), (piece + 1, tau > 0.9)):
         if near:

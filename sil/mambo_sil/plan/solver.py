@@ -23,13 +23,15 @@ SAMPLES: Final = 17
 TAU: Final = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 """Times in a piece at which limits are held, denser towards its ends, where the snap is largest."""
 BASIS: Final = basis(TAU)
-ROUNDS, STEPS = 14, 25
+ROUNDS, STEPS = 14, 40
 """Most updates of the multipliers, and most steps between two of them."""
 LEEWAY: Final = 0.003
 """What is left of each limit, so that times between the samples keep it too."""
 HELD, SETTLED = 0.012, 0.002
 """It is enough if no limit is passed by more than HELD, and the time has changed by no more than SETTLED: the
 plan is then flown so much slower that all limits hold."""
+STILL: Final = 2e-6
+"""A step that takes off less of the time is the last one."""
 PRICE_PER_S: Final = 10.0
 """First price of a passed limit over the mean duration of a piece."""
 LONGEST_STEP: Final = 0.5
@@ -160,7 +162,7 @@ class _Lagrangian:
             elif ratio < 0.25:
                 damping *= 2.0
             state, cost = found, tried_cost
-            if gain < 2e-5 * state.course.time_s:
+            if gain < STILL * state.course.time_s:
                 break
         return state, min(damping, 1.0)
 

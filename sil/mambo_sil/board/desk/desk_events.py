@@ -47,7 +47,7 @@ class DeskTrace:
 
 
 def _curve(file: EventsFile) -> tuple[Trajectory, float, float]:
-    """Return the curve, which sign its second axis has to the left, and the height that stands for `height_m`.
+    """Return the curve, the sign of its second axis to the left, and the height that stands for `height_m`.
 
     A curve by name is mirrored; a file's course goes where it says, and begins at `height_m`.
     Raises TrajectoryError.

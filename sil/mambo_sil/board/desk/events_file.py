@@ -124,7 +124,7 @@ class EventsFile(FileSection):
     """A flight on the desk: the drone takes off by a plan, hovers, then the course begins at time 0."""
 
     trajectory: CurveName | CourseFile = "hover"
-    """A curve by name; or a file of waypoints or polynomial pieces, whose first point is where the drone is."""
+    """A curve by name, or a file of waypoints or polynomial pieces, which begins where the drone is."""
     size_m: float = Field(1.0, ge=-100.0, le=100.0)
     rate_rad_s: float = Field(1.0, ge=-10.0, le=10.0)
     height_m: float = Field(1.0, ge=0.1, le=10.0)
