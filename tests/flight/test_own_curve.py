@@ -128,7 +128,7 @@ def test_a_file_holds_a_class_or_points(tmp_path: Path) -> None:
     assert not is_curve_file("circle")
     with pytest.raises(TrajectoryError, match="NUMBER has no methods target"):
         load_curve(f"{own}:NUMBER")
-    with pytest.raises(FlightError, match="AttributeError: module 'own_own' has no attribute 'Large'"):
+    with pytest.raises(FlightError, match=r"own\.py:Large: the file has no Large"):
         load_curve(f"{own}:Large")
     with pytest.raises(FlightError, match="there is no file"):
         load_curve(f"{tmp_path / 'other.py'}:Small")

@@ -34,7 +34,11 @@ def load_object(named: str) -> tuple[Any, str]:
     sys.path.insert(0, str(folder))
     try:
         spec.loader.exec_module(module)
+        if not hasattr(module, name):
+            raise FlightError(f"{echo(named)}: the file has no {echo(name)}")
         made = getattr(module, name)()
+    except FlightError:
+        raise
     except (Exception, SystemExit) as error:
         raise FlightError(f"{echo(named)}: {type(error).__name__}: {echo(str(error))}") from error
     finally:

@@ -66,7 +66,6 @@ class DriftSuite:
 
     def __init__(self, drift: DriftingEstimate, seeds: Sequence[int], step_s: float) -> None:
         self._step_s, self._fading = step_s, fading(drift.figures, step_s)
-        self._corrected_s = np.array(self._fading.corrected_s)[:, np.newaxis]
         self._noise_m_s = drift_deviations(drift, len(seeds), step_s)
         self._draws = Draws(seeds, Purpose.SENSORS, NOISES)
         self._position_m = np.zeros((NOISES, len(seeds)))
@@ -79,7 +78,7 @@ class DriftSuite:
 
     def estimate(self, true: Seen) -> Seen:
         """Return what the controllers receive at this tick."""
-        gone_m_s = self._velocity_m_s - self._position_m / self._corrected_s
+        gone_m_s = self._velocity_m_s - self._position_m / np.array(self._fading.corrected_s)[:, np.newaxis]
         self._position_m = self._position_m + self._step_s * gone_m_s
         noise_m_s = self._noise_m_s * self._draws.next()
         self._velocity_m_s = self._fading.keep * self._velocity_m_s + noise_m_s
