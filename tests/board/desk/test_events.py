@@ -19,7 +19,14 @@ FLOW = ("flow-low", "flow-hover", "flow-high", "flow-noise", "flow-ends")
 HEADING = ("heading-30-degrees",)
 """The app cannot know the heading, and swings until the filter has learnt it: scripts ask, or hop first."""
 ONLY_WITH_A_HEIGHT = ("floor-then-land", "mass-in-grams", "table-above-its-height", "table-at-its-height")
-NOT_THE_PRESETS = (*RATTLING, *DISORDER, *FAR, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT)
+QUICKER_THAN_THE_PRESET = ("heavy-and-quick", "planned-again")
+"""The preset has small angles and less tilt: it is farther off."""
+HELD_BY_THE_FIRMWARE = ("pull-up", "reflections", "sagging-cell", "swapped-markers")
+"""The preset leaves the height to the firmware, which loses more; swapped markers move it 1 cm farther."""
+NOT_THE_PRESETS = (
+    *(*RATTLING, *DISORDER, *FAR, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT),
+    *(*QUICKER_THAN_THE_PRESET, *HELD_BY_THE_FIRMWARE),
+)
 NAMES = [
     pytest.param(name, marks=[pytest.mark.xfail(strict=True)] * (name in (*RATTLING, *HEADING)))
     for name in events_file.EVENTS.names()
@@ -41,6 +48,16 @@ def test_an_event_keeps_its_bounds(name: str, app: Path, flow_app: Path) -> None
     """With the settings that `design crazyflie` writes, over a flow deck with those for it."""
     assert events_file.load(name).bounds
     assert breaks(flow_app if name in FLOW else app, name) == []
+
+
+def test_a_flight_says_how_much_of_its_distance_is_drift(app: Path) -> None:
+    """A drone that is pushed to one side drifts by what it is off; on a circle the distances cancel."""
+    file = events_file.load("push").model_copy(update={"measured_from_s": 1.0, "duration_s": 2.0})
+    pushed = measure(fly_events(app, file), file)
+    assert pushed["drift_m"] > 0.95 * pushed["mean_m"] > 0.05
+    file = events_file.load("sagging-cell")
+    flown = measure(fly_events(app, file), file)
+    assert 0.0 < flown["drift_m"] < 0.3 * flown["mean_m"]
 
 
 @pytest.mark.parametrize("name", RATTLING)

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#define LEAST_CELL 0.75 /* of the thrust, with a cell that is empty */
 #define STEPS_PER_MS 10
 #define STEP_S 1e-4
 #define LARGEST_FORCE_N 0.12       /* of a rotor */
@@ -122,15 +123,18 @@ static void step(airframe_t *airframe, const desk_flight_t *flight, const double
 {
     double torque_n_m[3] = { 0.0, 0.0, 0.0 }, thrust_n = 0.0, r[3][3], force_m_s2[3];
     const double ground_m = ground_below(flight, airframe->position_m);
+    const double cell = fmax(1.0 - (flight->sag_1_s * airframe->time_s), LEAST_CELL);
 
+    airframe->time_s += STEP_S;
+    airframe->push_s -= STEP_S;
     for (int k = 0; k < MOTORS; k++) {
         double force_n;
 
         airframe->speeds[k] += (STEP_S / flight->rotor_lag_s) * (sqrt(motors[k]) - airframe->speeds[k]);
-        force_n = flight->thrust_gain * LARGEST_FORCE_N * airframe->speeds[k] * airframe->speeds[k];
+        force_n = cell * flight->thrust_gain * flight->motor_gains[k] * LARGEST_FORCE_N * airframe->speeds[k] * airframe->speeds[k];
         thrust_n += force_n;
-        torque_n_m[0] += ROTOR_Y_M[k] * force_n;
-        torque_n_m[1] -= ROTOR_X_M[k] * force_n;
+        torque_n_m[0] += (ROTOR_Y_M[k] - flight->centre_m[1]) * force_n;
+        torque_n_m[1] -= (ROTOR_X_M[k] - flight->centre_m[0]) * force_n;
         torque_n_m[2] += ROTOR_TORQUE_M[k] * force_n;
     }
 
@@ -138,7 +142,9 @@ static void step(airframe_t *airframe, const desk_flight_t *flight, const double
     for (int k = 0; k < 3; k++) {
         const double airspeed_m_s = airframe->velocity_m_s[k] - ((k < 2) ? flight->wind_m_s[k] : 0.0);
 
-        force_m_s2[k] = (r[k][2] * thrust_n / flight->mass_kg) - (flight->drag_1_s * airspeed_m_s);
+        const double push_n = (airframe->push_s > 0.0) ? airframe->push_n[k] : 0.0;
+
+        force_m_s2[k] = (((r[k][2] * thrust_n) + push_n) / flight->mass_kg) - (flight->drag_1_s * airspeed_m_s);
     }
     if ((airframe->position_m[2] <= ground_m) && ((force_m_s2[2] < GRAVITY_M_S2) || (airframe->velocity_m_s[2] < 0.0))) {
         rest(airframe, ground_m);

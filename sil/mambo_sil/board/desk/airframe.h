@@ -18,6 +18,9 @@ typedef struct {
     double specific_force_m_s2[3]; /* what an accelerometer in the body's frame reads */
     double speeds[MOTORS];         /* of the rotors, as shares of the most */
     double touch_m_s;
+    double time_s;
+    double push_n[3];              /* a force from outside, and for how long it lasts */
+    double push_s;
 } airframe_t;
 
 /* Write the columns of the body's axes in the world. */

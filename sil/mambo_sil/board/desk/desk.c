@@ -230,6 +230,14 @@ static void look_by_camera(void)
     for (int k = 0; k < 3; k++) {
         measured_m[k] = seen_m[k] + (flight.camera_noise_m * normal()) + ((jumping_frames > 0) ? jump_m[k] : 0.0);
     }
+    if ((flight.camera_outliers > 0.0) && (uniform() < flight.camera_outliers)) {
+        const double away[3] = { normal(), normal(), normal() };
+        const double size = sqrt((away[0] * away[0]) + (away[1] * away[1]) + (away[2] * away[2]));
+
+        for (int k = 0; k < 3; k++) {
+            measured_m[k] += flight.camera_outlier_m * away[k] / size;
+        }
+    }
     jumping_frames -= (jumping_frames > 0) ? 1 : 0;
     estimator_see_position(&filter, measured_m);
 }
@@ -464,6 +472,19 @@ void desk_kick(const double velocity_m_s[3])
     for (int k = 0; k < 3; k++) {
         airframe.velocity_m_s[k] += velocity_m_s[k];
     }
+}
+
+void desk_hit(const double rates_rad_s[3])
+{
+    for (int k = 0; k < 3; k++) {
+        airframe.rates_rad_s[k] += rates_rad_s[k];
+    }
+}
+
+void desk_push(const double force_n[3], int milliseconds)
+{
+    memcpy(airframe.push_n, force_n, sizeof airframe.push_n);
+    airframe.push_s = 0.001 * (double)milliseconds;
 }
 
 void desk_state(desk_state_t *state)

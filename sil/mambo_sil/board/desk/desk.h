@@ -18,6 +18,9 @@ typedef struct {
     double drag_1_s;                    /* acceleration by airspeed */
     double wind_m_s[2];
     double thrust_gain;                 /* thrust over what the firmware asks for */
+    double motor_gains[4];              /* of each motor, over that: front right, back right, back left, front left */
+    double sag_1_s;                     /* share of the thrust that the cell loses in a second, until a quarter is lost */
+    double centre_m[2];                 /* centre of mass, ahead and to the left of the rotors' centre */
     double heading_rad;                 /* of the drone on the floor */
     double table_m;                     /* height of a table under the start; 0: it stands on the floor */
     double table_radius_m;
@@ -28,6 +31,8 @@ typedef struct {
     int camera_delay_ms;                /* at most 200 */
     int camera_offset_ms;               /* of the camera's, or the flow deck's, clock against the estimator's */
     double camera_noise_m;
+    double camera_outliers;             /* share of the frames that are off, in a direction at random */
+    double camera_outlier_m;            /* by so much */
     double flow_noise_counts;           /* of a frame of the flow deck, tenths of pixels */
     double initial_yaw_rad;             /* what the estimator believes of the heading */
     double lost_ticks;                  /* share of the milliseconds in which the stabilizer does not run */
@@ -71,7 +76,9 @@ void desk_switch(int to);
 /* Let the camera's next frames be off by a jump; one that is not a number is a frame that is not. */
 void desk_jump(const double jump_m[3], int frames);
 
-void desk_kick(const double velocity_m_s[3]);
+void desk_kick(const double velocity_m_s[3]);                 /* change the velocity at once */
+void desk_hit(const double rates_rad_s[3]);                   /* change the rates about the body's axes at once */
+void desk_push(const double force_n[3], int milliseconds);
 
 void desk_state(desk_state_t *state);
 

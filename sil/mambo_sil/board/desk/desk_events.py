@@ -1,6 +1,7 @@
 """Fly an events file: set-points, what happens, and the measures of the flight."""
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -64,7 +65,9 @@ class _Course:
 
     def __init__(self, file: EventsFile, seed: int) -> None:
         curve, left, begins_m = _curve(file)
-        times_s = 0.001 * SAMPLE_MS * np.arange(round(1000.0 * file.duration_s) // SAMPLE_MS + 2)
+        chases = (one.duration_s for one in file.event if one.do == "chase")
+        lasts_s = file.duration_s + max(chases, default=0.0)
+        times_s = 0.001 * SAMPLE_MS * np.arange(round(1000.0 * lasts_s) // SAMPLE_MS + 2)
         level = curve.target(times_s).reshape(-1, 2, 2)
         level = np.concatenate([level, curve.acceleration(times_s)[:, np.newaxis]], axis=1) * (1.0, left)
         self._motions = np.concatenate([level, vertical_of(curve, times_s)[:, :, np.newaxis]], axis=2)
@@ -103,11 +106,13 @@ class _Flight:
         self._course, self._period_ms = _Course(file, seed), file.set_points.period_ms
         self._sends, self._due_ms = self._period_ms > 0, 0
         self._group = self.desk.group
+        self._time_s = 0.0
         self.rows: list[tuple[float, ...]] = []
 
     def run(self, time_s: float) -> None:
         """Let time pass until `time_s`, and record."""
         desk = self.desk
+        self._time_s = time_s
         desk.run(SAMPLE_MS)
         planned = tuple(desk.log(f"ctrltarget.{axis}") for axis in "xyz")
         target = self._course.motion(time_s)[0] if self._period_ms > 0 else planned
@@ -122,28 +127,37 @@ class _Flight:
 
     def happen(self, event: EventSection) -> None:
         """Let an event happen."""
-        desk, vector = self.desk, event.vector
-        if event.do in ("sensors-on", "sensors-off"):
-            desk.measure(on=event.do == "sensors-on")
-        elif event.do == "switch":
-            desk.switch(SENSORS[event.sensors])
+        desk, vector, lasts_s = self.desk, event.vector, event.duration_s
+        direct: dict[str, Callable[[], None]] = {
+            "sensors-on": lambda: desk.measure(on=True),
+            "sensors-off": lambda: desk.measure(on=False),
+            "switch": lambda: desk.switch(SENSORS[event.sensors]),
+            "jump": lambda: desk.jump(vector, event.frames),
+            "nan": lambda: desk.jump((math.nan, math.nan, math.nan), event.frames),
+            "kick": lambda: desk.kick(vector),
+            "hit": lambda: desk.hit(vector),
+            "push": lambda: desk.push(vector, lasts_s),
+            "controller": lambda: desk.set("stabilizer.controller", float(event.value)),
+            "set": lambda: desk.set(f"{self._group}.{event.name}", float(event.value)),
+        }
+        if event.do in direct:
+            direct[event.do]()
         elif event.do in ("radio-on", "radio-off"):
             self._sends = event.do == "radio-on" and self._period_ms > 0
-        elif event.do == "jump":
-            desk.jump(vector, event.frames)
-        elif event.do == "nan":
-            desk.jump((math.nan, math.nan, math.nan), event.frames)
-        elif event.do == "kick":
-            desk.kick(vector)
-        elif event.do == "set":
-            desk.set(f"{self._group}.{event.name}", float(event.value))
         else:
-            self._sends = False
-            desk.yield_()
-            if event.do == "land":
-                desk.land(event.duration_s)
-            else:
-                desk.go_to(vector, event.duration_s)
+            self._plan(event)
+
+    def _plan(self, event: EventSection) -> None:
+        """Let the high-level commander fly: to a place, to where the course will be, or down."""
+        self._sends = False
+        self.desk.yield_()
+        if event.do == "land":
+            self.desk.land(event.duration_s)
+        elif event.do == "chase":
+            x, y, z = (float(value) for value in self._course.motion(self._time_s + event.duration_s)[0])
+            self.desk.go_to((x, y, z), event.duration_s)
+        else:
+            self.desk.go_to(event.vector, event.duration_s)
 
 
 def fly_events(library: Path, file: EventsFile, seed: int = 0, offset_ms: int = 3) -> DeskTrace:
@@ -159,7 +173,7 @@ def fly_events(library: Path, file: EventsFile, seed: int = 0, offset_ms: int = 
     flight.desk.take_off(file.drone.table_m + file.height_m, climb_s, yaw_rad)
     for left_ms in range(round(1000.0 * climb_s) + SETTLING_MS, 0, -SAMPLE_MS):
         flight.run(0.001 * (SAMPLE_MS - left_ms))
-    coming = sorted(file.event, key=lambda one: one.at_s)
+    coming = sorted(_repeated(file), key=lambda one: one.at_s)
     for now_ms in range(0, round(1000.0 * file.duration_s), SAMPLE_MS):
         while coming and 1000.0 * coming[0].at_s <= now_ms:
             flight.happen(coming.pop(0))
@@ -170,11 +184,21 @@ def fly_events(library: Path, file: EventsFile, seed: int = 0, offset_ms: int = 
     return DeskTrace(*parts, flight.desk.state.touch_m_s, flight.desk.console)
 
 
+def _repeated(file: EventsFile) -> Iterator[EventSection]:
+    """Yield the events of a file, each as often as it happens."""
+    for event in file.event:
+        yield event
+XX
+            yield event.model_copy(update={"at_s": event.at_s + again * event.every_s})
+
+
 def measure(trace: DeskTrace, file: EventsFile) -> dict[MeasureName, float]:
     """Return the measures of a flight by name, from `measured_from_s` of the course on.
 
     lowest_m, highest_m: of the height
     off_m:               largest horizontal distance to the target
+    mean_m:              mean horizontal distance to the target
+    drift_m:             length of the mean of the distances as vectors: what stays to one side
     height_off_m:        largest difference to the target's height
     iae_60_s_m_s:        integral of the horizontal distance, scaled to 60 s
     command_rms_rad:     of roll and pitch
@@ -193,6 +217,8 @@ def measure(trace: DeskTrace, file: EventsFile) -> dict[MeasureName, float]:
         "lowest_m": float(position[:, 2].min()),
         "highest_m": float(position[:, 2].max()),
         "off_m": float(distance.max()),
+        "mean_m": float(distance.mean()),
+        "drift_m": float(np.hypot(*off[:, :2].mean(axis=0))),
         "height_off_m": float(np.abs(off[:, 2]).max()),
         "iae_60_s_m_s": float(60.0 * distance.mean()),
         "command_rms_rad": float(np.sqrt(np.mean(np.square(trace.command_rad[late])))),

@@ -39,6 +39,9 @@ class DeskConditions:
     drag_1_s: float = 0.244
     wind_m_s: tuple[float, float] = (0.0, 0.0)
     thrust_gain: float = 1.0
+    motor_gains: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    sag_1_s: float = 0.0
+    centre_m: tuple[float, float] = (0.0, 0.0)
     heading_rad: float = 0.0
     table_m: float = 0.0
     table_radius_m: float = 0.0
@@ -49,6 +52,8 @@ class DeskConditions:
     camera_delay_ms: int = 10
     camera_offset_ms: int = 0
     camera_noise_m: float = 0.001
+    camera_outliers: float = 0.0
+    camera_outlier_m: float = 0.0
     flow_noise_counts: float = 2.0
     initial_yaw_rad: float = 0.0
     lost_ticks: float = 0.0
@@ -165,6 +170,14 @@ class Desk:
     def kick(self, velocity_m_s: Three) -> None:
         """Change the velocity at once."""
         self._c.desk_kick(self._vector(velocity_m_s))
+
+    def hit(self, rates_rad_s: Three) -> None:
+        """Change the rates about the body's axes at once."""
+        self._c.desk_hit(self._vector(rates_rad_s))
+
+    def push(self, force_n: Three, duration_s: float) -> None:
+        """Push the drone for a time."""
+        self._c.desk_push(self._vector(force_n), round(1000.0 * duration_s))
 
     def _vector(self, values: Any) -> Any:
         return self._ffi.new("double[3]", [float(value) for value in values])

@@ -1,6 +1,7 @@
 """The results of a flight of an app on the desk: summary, result and picture."""
 
 import csv
+import math
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +29,8 @@ WORDS: Final[dict[MeasureName, tuple[str, str]]] = {
     "lowest_m": ("lowest height", "m"),
     "highest_m": ("largest height", "m"),
     "off_m": ("largest distance to the target", "m"),
+    "mean_m": ("mean distance to the target", "m"),
+    "drift_m": ("of it drift, the mean distance to one side", "m"),
     "height_off_m": ("largest difference to its height", "m"),
     "iae_60_s_m_s": ("IAE of 60 s", "m s"),
     "command_rms_rad": ("command, root mean square", "rad"),
@@ -83,10 +86,16 @@ class DeskSummary(ReportedSummary):
 
 
 def _verdict(summary: DeskSummary) -> str:
-    count = len(summary.flight.bounds)
-    if not count:
-        return "flown"
-    return f"{len(summary.broken)} of {count} bounds BROKEN" if summary.broken else f"{count} bounds kept"
+    """Return in words whether bounds were kept, whether the drone stayed in the air, and how near it was."""
+    count, measures = len(summary.flight.bounds), summary.measures
+    kept = f"{len(summary.broken)} of {count} bounds BROKEN" if summary.broken else f"{count} bounds kept"
+    mean_m, drift_m, touch_m_s = (measures[name] for name in ("mean_m", "drift_m", "touch_m_s"))
+    held = "held" if touch_m_s == 0.0 else f"on the floor, at {touch_m_s:.1f} m/s"
+    if not math.isfinite(mean_m):
+        held, near = "LOST", ""
+    else:
+        near = f", {100.0 * mean_m:.1f} cm off in the mean, of it {100.0 * drift_m:.1f} cm drift"
+    return f"{f'{kept}; ' if count else ''}{held}{near}"
 
 
 def _rows(summary: DeskSummary) -> list[tuple[str, ...]]:

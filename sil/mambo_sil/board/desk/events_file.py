@@ -25,6 +25,8 @@ MeasureName = Literal[
     "lowest_m",
     "highest_m",
     "off_m",
+    "mean_m",
+    "drift_m",
     "height_off_m",
     "iae_60_s_m_s",
     "command_rms_rad",
@@ -40,6 +42,7 @@ CourseFile = Annotated[str, Field(pattern=r"(?i)\.csv$")]
 """Name of a file of waypoints or polynomial pieces."""
 
 _Metres = Annotated[float, Field(ge=-100.0, le=100.0)]
+_Gain = Annotated[float, Field(gt=0.0, le=2.0)]
 _Vector = Annotated[tuple[_Metres, _Metres, _Metres], Strict(False)]
 
 
@@ -48,6 +51,9 @@ class DroneSection(FileSection):
 
     mass_kg: float = Field(0.03, gt=0.0, le=1.0)
     thrust_gain: float = Field(1.0, gt=0.0, le=10.0)
+    motor_gains: Annotated[tuple[_Gain, _Gain, _Gain, _Gain], Strict(False)] = (1.0, 1.0, 1.0, 1.0)
+    sag_1_s: float = Field(0.0, ge=0.0, le=1.0)
+    centre_m: Annotated[tuple[_Metres, _Metres], Strict(False)] = (0.0, 0.0)
     rotor_lag_s: float = Field(0.072, ge=0.001, le=1.0)
     heading_deg: float = Field(0.0, ge=-180.0, le=180.0)
     table_m: float = Field(0.0, ge=0.0, le=2.0)
@@ -64,6 +70,8 @@ class SensorsSection(FileSection):
     camera_period_ms: int = Field(10, ge=1, le=1000)
     camera_delay_ms: int = Field(10, ge=0, le=200)
     camera_noise_m: float = Field(0.001, ge=0.0, le=1.0)
+    camera_outliers: float = Field(0.0, ge=0.0, le=1.0)
+    camera_outlier_m: float = Field(0.5, ge=0.0, le=10.0)
     flow_noise_counts: float = Field(2.0, ge=0.0, le=100.0)
     initial_yaw_deg: float = Field(0.0, ge=-180.0, le=180.0)
 
@@ -96,19 +104,25 @@ class EventSection(FileSection):
         "jump",
         "nan",
         "kick",
+        "hit",
+        "push",
+        "controller",
         "set",
         "radio-off",
         "radio-on",
         "go-to",
+        "chase",
         "land",
     ]
     name: str = ""
     """Parameter of the app to set, such as "tilt"."""
+    every_s: float = Field(0.0, ge=0.0, le=LONGEST_S)
+    """It happens again and again, so far apart; 0: once."""
     value: float | Literal["nan"] = 0.0
     sensors: SensorsKind = "mocap"
     """What measures from now on."""
     vector: _Vector = (0.0, 0.0, 0.0)
-    """Jump or place in m, kick in m/s."""
+    """Jump or place in m, kick in m/s, hit in rad/s, push in N."""
     frames: int = Field(1, ge=1, le=1000)
     duration_s: float = Field(2.0, gt=0.0, le=60.0)
 
@@ -153,6 +167,9 @@ class EventsFile(FileSection):
             rotor_lag_s=drone.rotor_lag_s,
             wind_m_s=drone.wind_m_s,
             thrust_gain=drone.thrust_gain,
+            motor_gains=drone.motor_gains,
+            sag_1_s=drone.sag_1_s,
+            centre_m=drone.centre_m,
             heading_rad=math.radians(drone.heading_deg),
             table_m=drone.table_m,
             table_radius_m=drone.table_radius_m,
@@ -163,6 +180,8 @@ class EventsFile(FileSection):
             camera_delay_ms=sensors.camera_delay_ms,
             camera_offset_ms=offset_ms,
             camera_noise_m=sensors.camera_noise_m,
+            camera_outliers=sensors.camera_outliers,
+            camera_outlier_m=sensors.camera_outlier_m,
             flow_noise_counts=sensors.flow_noise_counts,
             initial_yaw_rad=math.radians(sensors.initial_yaw_deg),
         )
