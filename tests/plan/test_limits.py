@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_codegen.methods.quadratic import thrust_vector_constants
+from mambo_codegen.numbers import reach
 from mambo_codegen.settings import controller_toml, presets
 from mambo_sil.api.campaigns import draw_vehicles
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -96,8 +96,8 @@ def test_shares_of_limits_by_hand(
 
 def test_reserves_are_those_of_the_generated_c() -> None:
     """The shares of thrust that a plan leaves are those that a controller with the exact tilt keeps."""
-    assert thrust_vector_constants.THRUST_LEFT == limits.THRUST_LEFT
-    assert thrust_vector_constants.SPARE_SHARE == limits.SPARE_SHARE
+    assert reach.THRUST_LEFT == limits.THRUST_LEFT
+    assert reach.SPARE_SHARE == limits.SPARE_SHARE
 
 
 def test_the_weakest_drawn_drone_limits_the_thrust() -> None:

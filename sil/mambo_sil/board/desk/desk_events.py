@@ -187,8 +187,8 @@ def fly_events(library: Path, file: EventsFile, seed: int = 0, offset_ms: int = 
 def _repeated(file: EventsFile) -> Iterator[EventSection]:
     """Yield the events of a file, each as often as it happens."""
     for event in file.event:
-        yield event
-XX
+        count = 1 + int((file.duration_s - event.at_s) / event.every_s) if event.every_s else 1
+        for again in range(count):
             yield event.model_copy(update={"at_s": event.at_s + again * event.every_s})
 
 
