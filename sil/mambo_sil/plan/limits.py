@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.reach import largest_acceleration_m_s2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.model.derive.reach import largest_acceleration_m_s2
 from mambo_sil.plan.hermite import ORDERS
 
 THRUST_LEFT, SPARE_SHARE = 0.92, 0.85
