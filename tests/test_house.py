@@ -2,6 +2,7 @@
 
 import ast
 import gc
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from functools import cache
@@ -94,6 +95,22 @@ def test_flights_use_only_exact_functions() -> None:
                     node.left, ast.Constant
                 )
                 assert not isinstance(node.op, ast.Pow) or whole, f"{place}: a power of a variable"
+
+
+def test_a_module_with_an_equal_in_c_names_it() -> None:
+    """Whoever reads the NumPy simulation learns in its first lines which C the commands run instead."""
+    engine = ROOT / "sil" / "mambo_sil" / "flight" / "engine"
+    named = 0
+    for source in engine.glob("*.[ch]"):
+        head = source.read_text("utf-8").partition("*/")[0]
+        for folder, names in re.findall(r"(sil/mambo_sil/[\w/]+)/(\w+|\{[\w,]+\})\.py", head):
+            for name in names.strip("{}").split(","):
+                module = ROOT / folder / f"{name}.py"
+                if module.parent != engine:
+                    named += 1
+                    words = ast.get_docstring(ast.parse(module.read_text("utf-8"))) or ""
+                    assert f"`flight/engine/{source.name}`" in words, module
+    assert named > 15
 
 
 def test_one_class_name_is_one_class() -> None:

@@ -1,5 +1,7 @@
 """Altitude loops: the vehicle's own, and two with feed-forward.
 
+The commands run its equal in C, `flight/engine/vehicle.h`, which has the same bits.
+
     stock        thrust = weight + P height error - D climb
     feedforward  the same with D (climb of the target - climb) and mass x acceleration of the target, all over
                  cos roll cos pitch, at least `LEAST_LEVEL`; the vehicle's gains

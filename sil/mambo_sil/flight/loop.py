@@ -1,5 +1,7 @@
 """The closed loop: trajectory, position controller and drone, for n flights at once.
 
+The commands run its equal in C, `flight/engine/loop.c`, which has the same bits.
+
     target -> position controller --roll, pitch--> link -> inner loops -> rotors -> rigid body <- disturbances
               every update period                          every tick                    |
                       ^------------------------------------------^-- sensors (optional) -'
@@ -240,7 +242,7 @@ class Flight:
 def fly(
     flight: Flight, controller: PositionController, progress: Callable[[float], None] | None = None
 ) -> Trace:
-    """Simulate the flights and return their trace; call `progress` with the share done after every update.
+    """Simulate the flights in NumPy; return their trace, and call `progress` after every update.
 
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """

@@ -1,5 +1,7 @@
 """The cascade: a PID of each angle around a PID of each body rate, as in the Crazyflie's firmware.
 
+The commands run its equal in C, `flight/engine/cascade.h`, which has the same bits.
+
 The angle error and its integral, less the body rate, demand a body rate; the rate error and its integral,
 less the change of the rate, demand an addition to the motor commands. Every integral is limited, and so are
 the demanded rate and the addition.

@@ -1,4 +1,7 @@
-"""Disturbances of a flight: push, wind, gusts, battery sag, payload, impulse, ground effect."""
+"""Disturbances of a flight: push, wind, gusts, battery sag, payload, impulse, ground effect.
+
+The commands run its equal in C, `flight/engine/world.h`, which has the same bits.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -64,7 +67,7 @@ class Disturbances:
 
 
 class World:
-    """Evaluates the disturbances of n flights, one tick after the other."""
+    """Evaluates the disturbances of n flights, one tick after the other, in NumPy."""
 
     def __init__(
         self, disturbances: Disturbances, vehicle: Vehicle, seeds: Sequence[int], height_m: float

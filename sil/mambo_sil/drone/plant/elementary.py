@@ -1,5 +1,7 @@
 """Elementary functions that have the same bits on every processor.
 
+The commands run its equal in C, `flight/engine/elementary.h`, which has the same bits.
+
 NumPy and the C libraries choose their sine, exponential and so on by the processor, and the choices differ
 in the last bit. The functions here consist of +, -, *, /, square root, rounding to an integer, comparison,
 and integer arithmetic on the bits of a number. IEEE 754 defines each of these exactly, so C with the same

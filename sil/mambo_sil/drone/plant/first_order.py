@@ -1,5 +1,7 @@
 """A drone of whose code nothing is known: gain, lag and dead time of each angle, as a log shows them.
 
+The commands run its equal in C, `flight/engine/first_order.h`, which has the same bits.
+
     angle(t) follows gain x command(t - dead time) with a first-order lag, yaw its reference
     horizontal acceleration = k x that of the thrust at these angles less their trims - drag (v - air) + push
     vertical acceleration = g - that of the thrust

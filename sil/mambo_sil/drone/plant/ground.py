@@ -1,4 +1,7 @@
-"""The ground at height 0: it carries a drone that stands on it, and raises the thrust of rotors near it."""
+"""The ground at height 0: it carries a drone that stands on it, and raises the thrust of rotors near it.
+
+The commands run its equal in C, `flight/engine/ground.h`, which has the same bits.
+"""
 
 from dataclasses import replace
 from typing import Final

@@ -1,5 +1,7 @@
 """Horizontal gusts: the Dryden model of MIL-F-8785C (1980, section 3.7) and MIL-HDBK-1797, at low altitude.
 
+The commands run its equal in C, `flight/engine/world.h`, which has the same bits.
+
 Below 1000 ft, with the height h in ft, the mean wind W20 at 20 ft and the mean wind V at height h:
 
     sigma_w = 0.1 W20    sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4

@@ -1,4 +1,7 @@
-"""The Bogacki-Shampine method with fixed step: third order, three stages (Bogacki and Shampine 1989)."""
+"""The Bogacki-Shampine method with fixed step: third order, three stages (Bogacki and Shampine 1989).
+
+The commands run its equal in C, `flight/engine/vehicle.h`, which has the same bits.
+"""
 
 from collections.abc import Callable
 from typing import TypeVar

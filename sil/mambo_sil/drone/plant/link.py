@@ -1,4 +1,7 @@
-"""The link between position controller and inner loops: dropped updates and delayed commands."""
+"""The link between position controller and inner loops: dropped updates and delayed commands.
+
+The commands run its equal in C, `flight/engine/world.h`, which has the same bits.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """The inner loops of a drone: the altitude loop, and the attitude loops that command motors.
 
+The commands run its equal in C, `flight/engine/vehicle.h`, which has the same bits.
+
 Pairs are in the order roll, pitch; triples end with yaw.
 """
 

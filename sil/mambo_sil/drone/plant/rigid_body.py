@@ -1,5 +1,7 @@
 """The rigid body of the paper: equations 2 to 7 with r_C = 0, and Euler's rotational dynamics.
 
+The commands run its equal in C, `flight/engine/rigid_body.h`, which has the same bits.
+
 World frame NED, body frame forward-right-down, Euler angles 3-2-1. The rows of a state (12, n) are
 
     0:3   position in the world frame, m                      r_A

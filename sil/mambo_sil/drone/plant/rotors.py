@@ -1,5 +1,7 @@
 """Four rotors: mixer, motor command limits, motor lag and wrench.
 
+The commands run its equal in C, `flight/engine/vehicle.h`, which has the same bits.
+
 Rotors seen from above: 1 front left, 2 front right, 3 rear right, 4 rear left. Rotors 1 and 3 spin clockwise
 (positive about body z), 2 and 4 counter-clockwise. Thrust is positive upwards, along -z of the body; in the
 stock code it is negative upwards.

@@ -1,4 +1,7 @@
-"""The drone: inner loops, rotors and rigid body, advanced by one tick at a time."""
+"""The drone: inner loops, rotors and rigid body, advanced by one tick at a time.
+
+The commands run its equal in C, `flight/engine/vehicle.h`, which has the same bits.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

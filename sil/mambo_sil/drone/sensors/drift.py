@@ -1,5 +1,7 @@
 """The estimates of n filters of inertial measurements: the velocity errs slowly, the position goes astray.
 
+The commands run its equal in C, `flight/engine/drift.h`, which has the same bits.
+
     e' = -e / T + noise, with standard deviation S        error of the velocity, each axis
     p' = e - p / C                                        error of the position
 

@@ -1,5 +1,7 @@
 """The stock estimators: attitude, altitude, velocity and position from readings, at 200 Hz for n flights.
 
+The commands run its equal in C, `flight/engine/sensors.h`, which has the same bits.
+
 Source: `estimatorVars` and the state estimator of the MathWorks asbQuadcopter example, R2018b to R2020a.
 These releases leave the camera's rotation in the optical flow; later ones subtract it with the gyro, as
 `derotated` does.

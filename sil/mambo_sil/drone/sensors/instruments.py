@@ -1,5 +1,7 @@
 """The instruments of the Mambo: IMU, sonar, barometer and optical flow, sampled at 200 Hz for n flights.
 
+The commands run its equal in C, `flight/engine/sensors.h`, which has the same bits.
+
 Sources: `sensorsVars` of the MathWorks asbQuadcopter example, R2018b to R2020a; noise variances of the MIT
 RollingSpiderEdu toolbox. IMU readings are in the body frame: at rest the accelerometer reads -g in z.
 """

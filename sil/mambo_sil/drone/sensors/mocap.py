@@ -1,5 +1,7 @@
 """Motion capture of n flights: late, noisy positions at a fixed rate, and the drone's own attitude.
 
+The commands run its equal in C, `flight/engine/mocap.h`, which has the same bits.
+
 The velocity is the difference quotient of successive positions behind a first-order low-pass. Position and
 velocity are held between positions; attitude, with noise, and body rates are new at every tick. What is
 measured lies `lever_m` from the centre of mass: the attitude of now moves a position that arrives back to it.

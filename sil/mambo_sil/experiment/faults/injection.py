@@ -1,5 +1,7 @@
 """Fault injection between drone and controller.
 
+The commands run its equal in C, `flight/engine/faults.c`, which has the same bits.
+
 The wrappers below inject faults into n controllers, one per flight, and have the interface of a position
 controller themselves. Each has a twin in C, sil/mambo_sil/flight/engine/faults.c, with the same bits.
 """

@@ -1,5 +1,7 @@
 """The laws without a model with which the NMPC is compared: the paper's PD, and two with feed-forward.
 
+The commands run its equal in C, `flight/engine/pd.c`, which has the same bits.
+
 `PdController` is the stock PD position controller of the Mambo, the paper's baseline. Source: block "XY to
 angles" of the MathWorks asbQuadcopter example; Kp = 0.24, Kd = 0.1 as in the paper (section III), after
 Pounds et al. It neither knows that the target moves nor that it turns.

@@ -148,7 +148,7 @@ typedef struct {
     real_t torque_per_thrust_m;
     real_t rotor_decay[4];    /* at the nodes and at the end of a tick */
     real_t drag_1_s;
-    real_t push_m_s2[2]; /* added by `derivative`, or `advance` of first_order.h */
+    real_t push_m_s2[2]; /* added by `derivative` of rigid_body.h, or `advance` of first_order.h */
 
     real_t gust_mean_m_s;
     real_t gust_sigma_m_s;

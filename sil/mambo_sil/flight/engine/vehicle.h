@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Altitude and stock loop, mixer, rotors and integration step: sil/mambo_sil/drone/plant/{loops,rotors,integrator,vehicle}.py.
+ * Altitude and stock loop, mixer, rotors and integration step: sil/mambo_sil/drone/plant/{loops,rotors,integrator,vehicle}.py,
+ * sil/mambo_sil/flight/altitude_loops.py.
  */
 #ifndef ENGINE_VEHICLE_H
 #define ENGINE_VEHICLE_H
