@@ -109,6 +109,7 @@ tools:
 
 generated: $(SETUP)
 	$(BIN)/python -m benchmarks.generated
+	$(BIN)/python -m docs.pages.written
 	$(BIN)/mambo-nmpc generate mambo -o generated/mambo
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o build/generated/mambo-fixed
 	$(BIN)/mambo-nmpc generate table1 -o build/generated/table1

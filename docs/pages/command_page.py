@@ -17,7 +17,7 @@ def command_part() -> str:
     root = get_command(app())
     assert isinstance(root, TyperGroup)
     context = typer.Context(root, info_name="mambo-nmpc")
-    parts = [table(["option", ""], _records(root, context, "option"))]
+    parts = [table(["option", "what it is for"], _records(root, context, "option"))]
     parts += [f"\n{line}" for line in _paragraphs(root.epilog) if line.startswith("Exit codes")]
     for name, command in root.commands.items():
         inside = typer.Context(command, info_name=f"mambo-nmpc {name}")
@@ -26,7 +26,7 @@ def command_part() -> str:
         parts += [f"```text\n{usage}\n```\n"]
         for kind in ("argument", "option"):
             if rows := _records(command, inside, kind):
-                parts += [table([kind, ""], rows) + "\n"]
+                parts += [table([kind, "what it is for"], rows) + "\n"]
         lines = _paragraphs(command.epilog)
         if shown := [line for line in lines if line.startswith("mambo-nmpc ")]:
             parts += ["```text\n" + "\n".join(shown) + "\n```\n"]

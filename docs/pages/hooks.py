@@ -18,19 +18,14 @@ from mkdocs.structure.pages import Page
 sys.path.insert(0, str(Path(__file__).parents[2]))  # where plain `mkdocs` has the folder of this file only
 
 from docs.pages.c_page import c_part
-from docs.pages.command_page import command_part
 from docs.pages.python_page import python_part
-from docs.pages.settings_page import controller_part, vehicle_part
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 
 ROOT: Final = Path(__file__).parents[2]
 
 PARTS: Final = {
-    "reference/settings.md": controller_part,
-    "reference/vehicle-toml.md": vehicle_part,
     "reference/c-api.md": c_part,
-    "reference/command-line.md": command_part,
     "reference/python-api.md": python_part,
 }
 """What the manual has in place of the part of a page that serves where Markdown is read without MkDocs."""
@@ -42,6 +37,16 @@ _PLAYGROUND: Final = "playground.md"
 _NOT_SEARCHED: Final = "explanation/decisions.md"
 """The page for developers."""
 
+_BOOSTS: Final = {"tutorials/": 2, "how-to/": 2, "evidence/": 0.5, "reference/python-api": 0.5}
+"""Weight in the search of pages whose names begin so; who searches wants to do something."""
+
+_TAGS: Final = {
+    "how-to/troubleshooting.md": ["drone oscillates", "vibrates", "drifts", "compile error"],
+    "how-to/footprint.md": ["Raspberry Pi Pico", "STM32", "flash and RAM"],
+    "how-to/crazyflie.md": ["flow deck", "Lighthouse"],
+}
+"""What readers ask for, and a page answers without a title that says it; the search lists these first."""
+
 _WIDE: Final = "evidence/"
 """The folder whose tables need the width of the table of contents."""
 _WIDEST: Final = ("evidence/margins.md", "evidence/simulators.md", _PLAYGROUND)
@@ -52,6 +57,9 @@ _DRAWING: Final = re.compile(r"^!\[[^\]]+\]\(([^)]*drawings/[^)]+\.svg)\)$", re.
 
 _FORMULA: Final = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 """A formula in LaTeX as `pymdownx.arithmatex` leaves it: `span` in a line, `div` on lines of its own."""
+
+_EMPTY_HEAD: Final = re.compile(r"<th([^>]*)></th>")
+_SEARCH: Final = 'data-md-component="search" role="dialog"'
 
 _LATEX: Final = LatexToMathML(fancy_error=False)
 
@@ -72,6 +80,10 @@ def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
     name = page.file.src_uri
     if name == _NOT_SEARCHED:
         page.meta["search"] = {"exclude": True}
+    page.meta["tags"] = _TAGS.get(name, [])
+    for begin, boost in _BOOSTS.items():
+        if name.startswith(begin):
+            page.meta["search"] = {"boost": boost}
     if name in _WIDEST:
         page.meta["hide"] = ["toc", "navigation"]
     elif name.startswith(_WIDE):
@@ -87,15 +99,23 @@ def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
 
 
 def on_page_content(html: str, /, **_: object) -> str:
-    """Typeset the formulas as MathML, which browsers draw; raises LatexError for one that is wrong."""
-    return _FORMULA.sub(_typeset, html)
+    """Typeset the formulas as MathML, which browsers draw; raises LatexError for one that is wrong.
+
+    A head of a table without a word becomes a cell.
+    """
+    return _EMPTY_HEAD.sub(r"<td\1></td>", _FORMULA.sub(_typeset, html))
+
+
+def on_post_page(html: str, /, **_: object) -> str:
+    """Name the dialog of the search for those who hear the page."""
+    return html.replace(_SEARCH, f'{_SEARCH} aria-label="Search"')
 
 
 def _typeset(formula: re.Match[str]) -> str:
     """Return a formula as MathML; one on lines of its own scrolls where it is too wide."""
     tag, latex = formula.groups()
     mathml = _LATEX.convert_with_local_state(unescape(latex).strip(), displaystyle=tag == "div")
-    return f'<div class="formula">{mathml}</div>' if tag == "div" else mathml
+    return f'<div class="formula" tabindex="0">{mathml}</div>' if tag == "div" else mathml
 
 
 def on_post_build(config: MkDocsConfig) -> None:

@@ -116,6 +116,26 @@ def test_the_search_answers_what_a_pilot_asks_first(site: Path) -> None:
 
 
 @pytest.mark.long
+def test_the_search_weighs_pages_and_knows_the_words_of_readers(site: Path) -> None:
+    """A how-to weighs more than evidence; a page has its tags, and words are cut at hyphens."""
+    index = json.loads((site / "search" / "search_index.json").read_text("utf-8"))
+    pages = {one["location"]: one for one in index["docs"] if "#" not in one["location"]}
+    assert (pages["how-to/footprint.html"]["boost"], pages["evidence/px4.html"]["boost"]) == (2, 0.5)
+    assert "drone oscillates" in pages["how-to/troubleshooting.html"]["tags"]
+    assert re.split(index["config"]["separator"], "docker/px4.ros-2") == ["docker", "px4", "ros", "2"]
+
+
+@pytest.mark.parametrize("page", ["settings", "vehicle-toml", "command-line", "python-api"])
+def test_what_the_code_writes_stands_in_the_page_and_is_fresh(page: str) -> None:
+    """So that a source host shows it too; `make generated` writes it."""
+    from docs.pages.written import with_part  # noqa: PLC0415 - loads the whole command line
+
+    text = (ROOT / "docs" / "reference" / f"{page}.md").read_text("utf-8")
+    assert with_part(f"reference/{page}.md", text) == text
+    assert len(text) > 5000
+
+
+@pytest.mark.long
 def test_drawings_have_the_colour_of_the_page(site: Path) -> None:
     """They are part of it, on one page of each kind, in light and dark."""
     for page, count in (("index.html", 2), ("reference/axes.html", 1)):
