@@ -51,7 +51,7 @@ NOT_RUN = {
     "how-to/release.md": (
         "takes hours where evidence is old",
         "it changes the version",
-        "needs the packages build and twine",
+        "needs the keys of a person, and the packages build and twine",
         "it changes the version",
     ),
     "how-to/simulators.md": ("it installs",) * 5,

@@ -4,11 +4,14 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from mambo_codegen.settings import presets
+from tests.support.browser import PHONE_PX, Browser, browser
 from tests.support.tools import require, require_module
 
 ROOT = Path(__file__).parents[2]
@@ -123,6 +126,41 @@ def test_the_search_weighs_pages_and_knows_the_words_of_readers(site: Path) -> N
     assert (pages["how-to/footprint.html"]["boost"], pages["evidence/px4.html"]["boost"]) == (2, 0.5)
     assert "drone oscillates" in pages["how-to/troubleshooting.html"]["tags"]
     assert re.split(index["config"]["separator"], "docker/px4.ros-2") == ["docker", "px4", "ros", "2"]
+
+
+READ = (
+    *(
+        "index",
+        "playground",
+        "tutorials/first-flight",
+        "how-to/px4",
+        "how-to/footprint",
+        "reference/settings",
+    ),
+    *("reference/command-line", "reference/python-api", "explanation/kernel", "evidence/margins"),
+)
+"""Pages with everything that a page may have: tables, code, formulas, pictures, folded parts, signatures."""
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Return a tab of one browser for all pages."""
+    with browser(tmp_path_factory.mktemp("browser")) as opened:
+        yield opened
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("page", READ)
+def test_axe_finds_no_violation(site: Path, tab: Browser, page: str, scheme: str) -> None:
+    """On a phone, where code and tables scroll; the playground's own page has a test of its own."""
+    require_module("axe_core_python")
+    tab.open(site / f"{page}.html", PHONE_PX, prefers_color_scheme=scheme)
+    tab.find(resources.files("axe_core_python").joinpath("axe.min.js").read_text("utf-8") + "; null")
+    shown = "document.body.dataset.mdColorScheme"
+    assert tab.find(shown) == {"light": "default", "dark": "slate"}[scheme]
+    found = tab.find("axe.run(document, {iframes: false}).then((all) => JSON.stringify(all.violations))")
+    assert [(one["id"], [node["html"] for node in one["nodes"]][:3]) for one in json.loads(found)] == []
 
 
 @pytest.mark.parametrize("page", ["settings", "vehicle-toml", "command-line", "python-api"])
