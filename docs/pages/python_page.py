@@ -57,12 +57,17 @@ def _described(name: str, one: Any, level: str) -> Iterator[str]:
             yield from _described(f"{name}.{key}", function, f"{level}#")
 
 
+def _plain_default(parameter: inspect.Parameter) -> inspect.Parameter:
+    """Return a parameter whose default is not a function, which has another address in each run."""
+    return parameter.replace(default=...) if inspect.isfunction(parameter.default) else parameter
+
+
 def _signature(one: Any) -> str:
     """Return the parameters of a function or class, one on a line where they are many, without types."""
     try:
         parameters = inspect.signature(one).parameters.values()
     except ValueError:
         return "(...)"
-    shown = [str(each.replace(annotation=inspect.Parameter.empty)) for each in parameters]
-    shown = [word for word in shown if word not in {"self", "cls"}]
+    shown = [str(_plain_default(each).replace(annotation=inspect.Parameter.empty)) for each in parameters]
+    shown = [word.replace("Ellipsis", "...") for word in shown if word not in {"self", "cls"}]
     return f"({', '.join(shown)})"
