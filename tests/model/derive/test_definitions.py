@@ -14,6 +14,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
 from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.derived import settings_for
@@ -300,3 +301,23 @@ def test_the_estimator_of_an_autopilot_is_believed_slowly() -> None:
     assert observer.velocity_noise > 5.0 * captured.velocity_noise
     assert observer.disturbance_noise < 0.2 * captured.disturbance_noise
     assert observer.position_noise > 10.0 * captured.position_noise
+
+
+@pytest.mark.parametrize(
+    ("error_m_s", "position_m", "velocity_m_s", "disturbance_m_s3"),
+    [
+        (0.24, 0.03, 1.0, 0.5),
+        (0.12, 0.03, 1.0, 0.5),
+        (0.06, 0.00945, 0.397, 1.26),
+        (0.03, 0.00298, 0.157, 3.17),
+        (0.0, 0.00298, 0.157, 3.17),
+    ],
+)
+def test_an_estimator_that_errs_less_is_believed_sooner(
+    error_m_s: float, position_m: float, velocity_m_s: float, disturbance_m_s3: float
+) -> None:
+    """Down to a quarter of EKF2's error, where the noise is about that for motion capture."""
+    sensors = AutopilotSensors(velocity_error_m_s=error_m_s)
+    observer = settings_for(GENERIC.model_copy(update={"sensors": sensors})).observer
+    found = observer.position_noise, observer.velocity_noise, observer.disturbance_noise
+    assert found == (position_m, velocity_m_s, disturbance_m_s3)

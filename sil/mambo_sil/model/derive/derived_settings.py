@@ -55,6 +55,8 @@ LEAST_POSITION_M: Final = 0.001
 FLOW_POSITION_M: Final = 0.04
 ESTIMATED_POSITION_M, ESTIMATED_VELOCITY_M_S, SLOW_DISTURBANCE_M_S3 = 0.03, 1.0, 0.5
 """Noise densities of the observer."""
+ESTIMATED_ERROR_M_S, LEAST_ERROR_SHARE = 0.12, 0.25
+"""Error of the estimated velocity that these are for, as EKF2's; the least share of it that they follow."""
 LONGEST_AGE_S: Final = 0.2
 LONGEST_GYROSCOPE_AGE_S: Final = 0.02
 """With a firmware's filter, whose velocity and attitude are those of now: an older state shakes the drone."""
@@ -225,12 +227,7 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
         yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
     elif isinstance(sensors, AutopilotSensors):
-        words = "The estimate goes astray by centimetres, and back: not at once into a command"
-        yield Derived("observer", "position_noise", ESTIMATED_POSITION_M, words)
-        words = "Learns wind within a second: what is quicker is the error of the estimate"
-        yield Derived("observer", "disturbance_noise", SLOW_DISTURBANCE_M_S3, words)
-        words = "Large, because the estimated velocity errs by decimetres a second"
-        yield Derived("observer", "velocity_noise", ESTIMATED_VELOCITY_M_S, words)
+        yield from _estimated(sensors)
     elif drone.knows_sensors and isinstance(sensors, TrueState):
         yield Derived("observer", "position_noise", LEAST_POSITION_M, "The true state has no noise")
         words = "Learns wind within tenths of a second"
@@ -242,6 +239,24 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         )
         yield Derived("observer", "disturbance_noise", CALM_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
+
+
+def _estimated(sensors: AutopilotSensors) -> Iterator[Derived]:
+    """Yield the noise densities behind an autopilot's estimator, smaller where its velocity errs less.
+
+    With the least share they are about those for motion capture.
+    """
+    share = min(max(sensors.velocity_error_m_s / ESTIMATED_ERROR_M_S, LEAST_ERROR_SHARE), 1.0)
+    position_m = _round(ESTIMATED_POSITION_M * share ** (5.0 / 3.0))
+    velocity_m_s = _round(ESTIMATED_VELOCITY_M_S * share ** (4.0 / 3.0))
+    disturbance_m_s3 = _round(SLOW_DISTURBANCE_M_S3 / share ** (4.0 / 3.0))
+    by = "" if share == 1.0 else "; by sensors.velocity_error_m_s"
+    words = f"The estimate goes astray by centimetres, and back: not at once into a command{by}"
+    yield Derived("observer", "position_noise", position_m, words)
+    words = f"Learns wind within a second: what is quicker is the error of the estimate{by}"
+    yield Derived("observer", "disturbance_noise", disturbance_m_s3, words)
+    words = f"Large, because the estimated velocity errs by decimetres a second{by}"
+    yield Derived("observer", "velocity_noise", velocity_m_s, words)
 
 
 def _firmly(observer: Iterable[Derived]) -> Iterator[Derived]:
