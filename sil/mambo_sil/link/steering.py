@@ -119,7 +119,6 @@ class Steering:
         self._clock_s += steps * period_s
         self._follow_frame(estimate)
         self._steps += steps
-        self.lean.fade(steps * period_s)
         estimate = self.lean.upright(estimate)
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
@@ -127,7 +126,9 @@ class Steering:
             self.controller.set_command(self._sent_rad, self._sent_m_s2)
         target = self._goal(targets(0.0))
         outcome = self._step(estimate, target)
-        return self._send(estimate, target, outcome, steps * period_s)
+        set_point = self._send(estimate, target, outcome, steps * period_s)
+        self.lean.fade(steps * period_s)
+        return set_point
 
     def _follow_frame(self, estimate: EstimatedState) -> None:
         """Tell the controller of a jump of the estimator."""
