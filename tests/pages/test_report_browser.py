@@ -21,13 +21,15 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a report of a folder of every command."""
+    """Return a report of a folder of every command, each part open."""
     base = tmp_path_factory.mktemp("results")
     for name, make in FOLDERS.items():
         (base / name).mkdir()
         make(base / name)
     page, _ = report_page([base / name for name in FOLDERS], lambda _: None)
-    (base / "report.html").write_text(page, "utf-8")
+    opened = page.replace('<details class="part">', '<details class="part" open>')
+    assert opened != page
+    (base / "report.html").write_text(opened, "utf-8")
     return base / "report.html"
 
 

@@ -388,7 +388,7 @@ def app_folder(folder: Path) -> None:
         events="camera-lost",
         flight=events,
         seed=0,
-        measures={"lowest_m": 0.75, "off_m": 1.05},
+        measures={"lowest_m": 0.75, "off_m": 1.05, "mean_m": 0.21, "drift_m": 0.02, "touch_m_s": 0.3},
         broken=["off_m"],
         console=flown.console,
     ).write(folder)
