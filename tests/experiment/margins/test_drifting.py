@@ -4,6 +4,7 @@ import pytest
 
 from mambo_codegen.settings import presets
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.experiment.margins.axis_margins import AxisMargins
 from mambo_sil.experiment.margins.many_drones import measure_drone
 from mambo_sil.flight.names import SensorsName
 
@@ -13,6 +14,7 @@ def test_margins_are_those_of_the_true_state(sensors: SensorsName) -> None:
     """Also where an error of the position never fades; the commands change by the noise."""
     settings, drone = presets.preset("crazyflie"), vehicle_toml.preset("crazyflie")
     true, seen = (measure_drone(settings, drone, name)[0] for name in ("true", sensors))
+    assert isinstance(seen, AxisMargins)
     assert seen.stable
     assert seen.command is not None
     assert true.command is not None

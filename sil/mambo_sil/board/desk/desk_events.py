@@ -12,7 +12,7 @@ from mambo_sil.board.desk.desk_flight import Desk
 from mambo_sil.board.desk.events_file import SENSORS, EventSection, EventsFile, MeasureName
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
-from mambo_sil.flight.polynomials import read_course
+from mambo_sil.flight.own_curve import load_curve
 from mambo_sil.flight.trajectories import CURVES, Trajectory, vertical_of
 
 SAMPLE_MS: Final = 10
@@ -56,8 +56,8 @@ def _curve(file: EventsFile) -> tuple[Trajectory, float, float]:
     for name, curve in CURVES.items():
         if name == file.trajectory:
             return curve(file.size_m, file.rate_rad_s), 1.0, HOVER_HEIGHT_M
-    course = read_course(Path(file.trajectory))
-    return course, -1.0, float(vertical_of(course, 0.0)[0])
+    course, _ = load_curve(file.trajectory)
+    return course, -1.0, float(vertical_of(course, np.zeros(1))[0, 0])
 
 
 class _Course:

@@ -38,8 +38,8 @@ MeasureName = Literal[
 """Measures of a flight; `desk_report` says what they are."""
 SENSORS: Final = {"mocap": DeskSensors.MOCAP, "flow-deck": DeskSensors.FLOW_DECK}
 
-CourseFile = Annotated[str, Field(pattern=r"(?i)\.csv$")]
-"""Name of a file of waypoints or polynomial pieces."""
+CourseFile = Annotated[str, Field(pattern=r"(?i)\.csv$|\.py:\w+$")]
+"""A file of waypoints or polynomial pieces, or a class of a file, FILE.py:CLASS."""
 
 _Metres = Annotated[float, Field(ge=-100.0, le=100.0)]
 _Gain = Annotated[float, Field(gt=0.0, le=2.0)]

@@ -1,8 +1,8 @@
 """`fly --app`: fly a generated app on the desk, with what surrounds it in its firmware."""
 
-from pathlib import Path
 from typing import Any, Final, get_args
 
+import numpy as np
 import typer
 from pydantic import ValidationError
 
@@ -16,7 +16,7 @@ from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course
 from mambo_sil.cli.options import load, show_result
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CurveName
-from mambo_sil.flight.polynomials import read_course
+from mambo_sil.flight.own_curve import FORMS, check_curve, is_curve_file, load_curve
 from mambo_sil.flight.trajectories import known_of, vertical_of
 from mambo_sil.results.folders import new_results
 
@@ -82,15 +82,13 @@ def _course(course: Course) -> EventsFile:
                 rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
                 duration_s=course.duration_s,
             )
-    if not course.trajectory.lower().endswith(".csv"):
-        raise FlightError(
-            f"--trajectory {echo(course.trajectory)} must be {', '.join(names)}, or a file ending in .csv, "
-            "with --app"
-        )
-    flown = read_course(Path(course.trajectory))
+    if not is_curve_file(course.trajectory):
+        raise FlightError(f"--trajectory {echo(course.trajectory)} must be {FORMS}")
+    flown, _ = load_curve(course.trajectory)
+    check_curve(echo(course.trajectory), flown, course.duration_s)
     return _without_events(
         trajectory=course.trajectory,
-        height_m=float(vertical_of(flown, 0.0)[0]),
+        height_m=float(vertical_of(flown, np.zeros(1))[0, 0]),
         duration_s=course.duration_s,
         set_points={"acceleration": bool(known_of(flown))},
     )
