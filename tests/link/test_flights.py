@@ -362,7 +362,7 @@ def test_a_counted_jump_may_be_small_and_have_a_velocity() -> None:
     command_rad = np.array([one.command_rad for one in flight.updates])
     assert flight.pilot.steering.frame.jumps == 1
     assert np.degrees(np.abs(command_rad[jumped] - command_rad[~jumped][-1]).max()) < 4.0
-    np.testing.assert_allclose(flight.autopilot.true.position_m[:2, 0], START[:2], atol=0.02)
+    np.testing.assert_allclose(flight.autopilot.true.position_m[:2, 0], START[:2], atol=0.03)
 
 
 @pytest.mark.long
