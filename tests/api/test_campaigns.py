@@ -19,6 +19,7 @@ from mambo_nmpc import (
     draw_vehicles,
     fly,
 )
+from mambo_nmpc.curves import Circle
 from mambo_sil.experiment.campaign.campaign_file import CampaignFile, completed, distributions, scenario
 from mambo_sil.experiment.campaign.campaign_flights import fly_scenarios
 from mambo_sil.experiment.campaign.parameters import draw
@@ -164,3 +165,26 @@ def test_wind_blows_where_it_is_told() -> None:
     assert np.abs(calm.trace.position_m[300:, 0, :2]).max() < 1e-6
     with pytest.raises(ArgumentError, match=r"wind_speed_m_s = -1\.0 must"):
         fly(Pd(), CRAZYFLIE, "hover", wind_speed_m_s=-1.0)
+
+
+class Backwards(Circle):
+    """A circle whose velocity has the wrong sign."""
+
+    def target(self, time_s: Any) -> Any:
+        """Return [x, y, vx, vy]."""
+        return super().target(time_s) * np.array([1.0, 1.0, -1.0, -1.0])
+
+
+def test_a_curve_of_one_s_own_is_flown_by_all() -> None:
+    """As the same curve by its name, bit for bit; one whose velocity is wrong is refused."""
+    laws: dict[str, Any] = {"mpc": Controller.from_preset("crazyflie"), "pd": Pd()}
+    settings: dict[str, Any] = {"flights": 2, "duration_s": 4.0, "draws": STRAIGHT}
+    own = campaign(laws, CRAZYFLIE, trajectory=Circle(1.0, 0.7), **settings)
+    named = campaign(laws, CRAZYFLIE, trajectory="circle", size_m=1.0, rate_rad_s=0.7, **settings)
+    for name in laws:
+        assert own.table[f"{name}_trace_sha256"] == named.table[f"{name}_trace_sha256"]
+    assert own.table["trajectory"] == ["Circle", "Circle"]
+    for call in (campaign, fly):
+        law: Any = laws if call is campaign else laws["mpc"]
+        with pytest.raises(ArgumentError, match=r"trajectory: at .* its velocity along [xy] is"):
+            call(law, CRAZYFLIE, trajectory=Backwards(1.0, 0.7))
