@@ -1,9 +1,9 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
 Not in the list are figures that take longer, and those that need another machine or package. `simulators` and
-`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants NumPy 1, `peers`
-the solvers of `make bench-peers`. Any value of the environment variables SIMULATORS, PYFLYT and PEERS says
-that they are installed.
+`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants NumPy 1, `motors`
+Drake and MuJoCo, `peers` the solvers of `make bench-peers`. Any value of the environment variables
+SIMULATORS, PYFLYT, MOTORS and PEERS says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,10 +38,18 @@ from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause,
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
-from benchmarks.evidence.simulator_pictures import DRAWN, FLOWN, draw_adapters, draw_simulators, read_adapters
+from benchmarks.evidence.simulator_pictures import (
+    DRAWN,
+    FLOWN,
+    draw_adapters,
+    draw_motors,
+    draw_simulators,
+    read_adapters,
+)
 from benchmarks.evidence.simulator_tables import (
     SIMULATORS,
     every_controller,
+    one_flight,
     quick,
     summary,
 )
@@ -400,6 +408,20 @@ ITEMS: Final = (
         read=read_printed,
         tables={"speed": printed},
         variable="SIMULATORS",
+    ),
+    Item(
+        name="motors",
+        commands=(f"python -m benchmarks.simulators motors {RESULTS}/motors/motors",),
+        controllers=tuple(f"design examples/{name}.toml --sensors true" for name in ("drake", "quad")),
+        paths=(
+            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
+            *("examples/drake.toml", "examples/quad.toml", f"{_HERE}/simulator_pictures.py", _STYLE),
+        ),
+        read=read_figures("motors"),
+        tables={"motors-all": one_flight},
+        pictures={"simulators-drake.png": "simulators-drake.png"},
+        draw=draw_motors,
+        variable="MOTORS",
     ),
     Item(
         name="pyflyt",

@@ -1,5 +1,6 @@
 """Pictures of flights in simulators of others: the eight through noise, and one flight by each adapter."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,8 +14,10 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.results.pictures import PlainLogFormatter, save
 from mambo_sil.results.style import BLUE, BROAD, GREEN, PAGE_INCHES, PURPLE, TARGET, VERMILION, style
 
+DRAKE: Final = "Drake's QuadrotorPlant"
 DRAWN: Final = {"crazyflow": "hb_x500, fitted", "pybullet": "gym-pybullet-drones, cf2x"}
 """The drone of each picture, by simulator."""
+OTHERS: Final = ("LQR, tuned", "Lee, tuned")
 STYLES: Final = ((VERMILION, "dotted"), (PURPLE, "dashed"))
 """Colour and dashes of their controller as shipped, and tuned."""
 FLOWN: Final = {"crazyflow": "crazyflow", "rotorpy": "RotorPy", "gymnasium": "Gymnasium"}
@@ -23,27 +26,36 @@ FLOWN: Final = {"crazyflow": "crazyflow", "rotorpy": "RotorPy", "gymnasium": "Gy
 
 def draw_simulators(results: Path) -> None:
     """Draw path and distance in space on the eight, with the first seed: their controller twice, and ours."""
-    mission = MISSIONS["eight"]
-    times_s, target = mission.times_s(), mission.targets()
     for simulator, drone in DRAWN.items():
         paths = np.load(results / simulator / f"{drone}.npz")
-        shown = [*zip(list(paths)[:2], STYLES, strict=True), (PAGE, (BLUE, "solid"))]
-        with style():
-            figure = Figure(figsize=(PAGE_INCHES, 2.5), layout="constrained")
-            plan, distance = figure.subplots(1, 2, width_ratios=(1, 1.5))
-            plan.plot(*target[:, :2].T, color=TARGET, linewidth=BROAD, label="target")
-            for title, (colour, dashes) in shown:
-                path = paths[title]
-                plan.plot(*path[:, :2].T, color=colour, linestyle=dashes)
-                error_mm = 1000.0 * np.linalg.norm(path - target[:, :3], axis=1)
-                distance.plot(times_s, error_mm, color=colour, linestyle=dashes, label=title)
-            plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{drone}: the target (grey)")
-            distance.set(
-                xlabel="time, s", ylabel="distance to the target, mm", yscale="log", ylim=(0.2, 1000.0)
-            )
-            distance.yaxis.set_major_formatter(PlainLogFormatter())
-            distance.legend(loc="upper right", ncols=2)
-            save(figure, results / f"simulators-{simulator}")
+        _draw_eight(paths, drone, list(paths)[:2], results / f"simulators-{simulator}")
+
+
+def draw_motors(results: Path) -> None:
+    """Draw the same in Drake: the two laws of others, tuned, and ours."""
+    paths = np.load(results / "motors" / f"{DRAKE}.npz")
+    _draw_eight(paths, DRAKE, OTHERS, results / "simulators-drake")
+
+
+def _draw_eight(paths: Any, drone: str, others: Sequence[str], place: Path) -> None:
+    """Draw paths by controller (k, 3) of the eight: those of two others, and ours."""
+    mission = MISSIONS["eight"]
+    times_s, target = mission.times_s(), mission.targets()
+    shown = [*zip(others, STYLES, strict=True), (PAGE, (BLUE, "solid"))]
+    with style():
+        figure = Figure(figsize=(PAGE_INCHES, 2.5), layout="constrained")
+        plan, distance = figure.subplots(1, 2, width_ratios=(1, 1.5))
+        plan.plot(*target[:, :2].T, color=TARGET, linewidth=BROAD, label="target")
+        for title, (colour, dashes) in shown:
+            path = paths[title]
+            plan.plot(*path[:, :2].T, color=colour, linestyle=dashes)
+            error_mm = 1000.0 * np.linalg.norm(path - target[:, :3], axis=1)
+            distance.plot(times_s, error_mm, color=colour, linestyle=dashes, label=title)
+        plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{drone}: the target (grey)")
+        distance.set(xlabel="time, s", ylabel="distance to the target, mm", yscale="log", ylim=(0.2, 1000.0))
+        distance.yaxis.set_major_formatter(PlainLogFormatter())
+        distance.legend(loc="upper right", ncols=2)
+        save(figure, place)
 
 
 def read_adapters(results: Path) -> Figures:

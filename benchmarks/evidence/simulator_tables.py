@@ -67,6 +67,18 @@ def every_controller(figures: Figures) -> str:
     return table(rows)
 
 
+def one_flight(figures: Figures) -> str:
+    """Return a row for each controller on each drone, of one flight without noise."""
+    return table(
+        [
+            {"": f"{drone}: {who}"}
+            | {TITLES[name]: _number(median(scores)) for name, scores in missions.items()}
+            for drone, controllers in figures.items()
+            for who, missions in controllers.items()
+        ]
+    )
+
+
 def _number(score: Score) -> str:
     return "lost" if score is None else three_digits(score)
 

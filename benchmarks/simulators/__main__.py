@@ -1,8 +1,8 @@
 """Fly in a simulator of others; write figures and paths to a folder. Takes 5 to 20 minutes.
 
-    python -m benchmarks.simulators crazyflow|rotorpy|pybullet|pyflyt|quick|truth FOLDER
+    python -m benchmarks.simulators crazyflow|rotorpy|pybullet|pyflyt|motors|quick|truth FOLDER
 
-wants that simulator; quick wants crazyflow and rotorpy, truth crazyflow.
+wants that simulator; quick wants crazyflow and rotorpy, truth crazyflow, motors drake and mujoco.
 """
 
 import importlib

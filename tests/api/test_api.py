@@ -202,7 +202,7 @@ def test_a_wrong_argument_of_fly_is_refused_by_name(wrong: dict[str, Any], messa
         *((Vehicle, (MAMBO, lag), r"must lie in 0\.\.1") for lag in (-1.0, np.nan, 1e300)),
         (Vehicle, (MAMBO, 0.0, np.array([0.1, np.nan])), r"drag_1_s = .* must lie in 0\.\.100"),
         (Vehicle, ("mambo",), 'airframe = "mambo" must be an Airframe; Vehicle.from_preset'),
-        (Vehicle.from_preset, (3,), "name = 3 must be one of cf2x-pyflyt, crazyflie"),
+        (Vehicle.from_preset, (3,), "name = 3 must be one of cf2x-pybullet, cf2x-pyflyt"),
         (Vehicle.from_file, (None,), "path = None must be the path of a vehicle.toml"),
         (Vehicle.from_file, ("a\0b",), r"path = \"a.*b\" must be the path of a vehicle.toml"),
         (Vehicle.of, ("mambo",), 'drone = "mambo" must be a VehicleFile; from_preset'),
