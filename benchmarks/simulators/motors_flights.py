@@ -34,7 +34,7 @@ MUJOCO_ARM_M: Final = 0.106
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RotorcraftState:
     """The state of a drone: position and velocity in NWU, quaternion x, y, z, w, rates in the body."""
 
     position_m: FloatArray
@@ -43,7 +43,7 @@ class Motion:
     rates_rad_s: FloatArray
 
 
-class World(Protocol):
+class MotorWorld(Protocol):
     """A simulated drone with four rotors."""
 
     vehicle: Vehicle
@@ -55,7 +55,7 @@ class World(Protocol):
         """Place the drone at rest."""
         ...
 
-    def motion(self) -> Motion:
+    def motion(self) -> RotorcraftState:
         """Return its state."""
         ...
 
@@ -80,7 +80,7 @@ class Drake:
         """Place the drone at rest."""
         self._state = np.concatenate([position_m, np.zeros(9)])
 
-    def motion(self) -> Motion:
+    def motion(self) -> RotorcraftState:
         """Return its state; Drake's has the derivatives of the angles."""
         (roll, pitch, _), (d_roll, d_pitch, d_yaw) = self._state[3:6], self._state[9:]
         rates = np.array(
@@ -91,7 +91,7 @@ class Drake:
             ]
         )
         quaternion = Rotation.from_euler("xyz", self._state[3:6]).as_quat()
-        return Motion(self._state[:3], self._state[6:9], quaternion, rates)
+        return RotorcraftState(self._state[:3], self._state[6:9], quaternion, rates)
 
     def tick(self, thrusts_n: FloatArray, force_n: FloatArray) -> None:
         """Simulate a tick of 5 ms."""
@@ -131,10 +131,10 @@ class Mujoco:
         mujoco.mj_resetData(self._model, self._data)
         self._data.qpos[:3] = position_m
 
-    def motion(self) -> Motion:
+    def motion(self) -> RotorcraftState:
         """Return its state; MuJoCo's w comes first."""
         place, speed = self._data.qpos.copy(), self._data.qvel.copy()
-        return Motion(place[:3], speed[:3], np.roll(place[3:7], -1), speed[3:6])
+        return RotorcraftState(place[:3], speed[:3], np.roll(place[3:7], -1), speed[3:6])
 
     def tick(self, thrusts_n: FloatArray, force_n: FloatArray) -> None:
         """Simulate a tick of 2 ms."""
@@ -143,34 +143,34 @@ class Mujoco:
         mujoco.mj_step(self._model, self._data)
 
 
-class Law(Protocol):
+class RotorLaw(Protocol):
     """What commands the rotors of a world."""
 
-    def aim(self, now: Motion, target: FloatArray) -> None:
+    def aim(self, now: RotorcraftState, target: FloatArray) -> None:
         """Take a target (9,), once in a step."""
         ...
 
-    def thrusts_n(self, now: Motion) -> FloatArray:
+    def thrusts_n(self, now: RotorcraftState) -> FloatArray:
         """Return the thrusts of the rotors (4,), once in a tick."""
         ...
 
 
-class Ours:
+class GeneratedLaw:
     """The generated C, by the page, above the attitude loop of the vehicle's file."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: MotorWorld) -> None:
         self._mass_kg = float(world.vehicle.drone.body.mass_kg)
         self._controller = Controller.from_vehicle(world.vehicle, sensors="true")
         self._motors = Motors(world.vehicle, rotors_m=world.rotors_m, reaction=world.reaction)
 
-    def aim(self, now: Motion, target: FloatArray) -> None:
+    def aim(self, now: RotorcraftState, target: FloatArray) -> None:
         """Make a step of the controller."""
         angles_rad = Rotation.from_quat(now.quaternion).as_euler("xyz")
         state = DroneState.in_frame("NWU", now.position_m, now.velocity_m_s, angles_rad)
         wanted = TargetState.in_frame("NWU", target[:3], target[3:6], target[6:], yaw_rad=0.0)
         self._command = self._controller.step(state, wanted).attitude_thrust("NWU", mass_kg=self._mass_kg)
 
-    def thrusts_n(self, now: Motion) -> FloatArray:
+    def thrusts_n(self, now: RotorcraftState) -> FloatArray:
         """Follow the attitude."""
         return self._motors.thrusts_n(self._command, now.quaternion, now.rates_rad_s)
 
@@ -178,12 +178,12 @@ class Ours:
 class Lee:
     """Lee's position law (2010) with the target's acceleration, above the same attitude loop."""
 
-    def __init__(self, world: World, factors: FloatArray) -> None:
+    def __init__(self, world: MotorWorld, factors: FloatArray) -> None:
         self._gains = LEE_GAINS * factors
         self._mass_kg = float(world.vehicle.drone.body.mass_kg)
         self._motors = Motors(world.vehicle, rotors_m=world.rotors_m, reaction=world.reaction)
 
-    def aim(self, now: Motion, target: FloatArray) -> None:
+    def aim(self, now: RotorcraftState, target: FloatArray) -> None:
         """Point the thrust along the wanted acceleration, and take as much of it as points there now."""
         level, up, level_speed, up_speed = self._gains
         wanted = np.array([level, level, up]) * (target[:3] - now.position_m)
@@ -196,7 +196,7 @@ class Lee:
         thrust_n = self._mass_kg * float(wanted @ Rotation.from_quat(now.quaternion).as_matrix()[:, 2])
         self._command = np.append(turned, thrust_n)
 
-    def thrusts_n(self, now: Motion) -> FloatArray:
+    def thrusts_n(self, now: RotorcraftState) -> FloatArray:
         """Follow the attitude."""
         return self._motors.thrusts_n(self._command, now.quaternion, now.rates_rad_s)
 
@@ -204,7 +204,7 @@ class Lee:
 class Lqr:
     """LQR of the whole state about hover, with the weights of Drake's example, along a moving target."""
 
-    def __init__(self, world: World, factors: FloatArray) -> None:
+    def __init__(self, world: MotorWorld, factors: FloatArray) -> None:
         drone = world.vehicle.drone
         mass_kg, inertia = drone.body.mass_kg, np.array(drone.inertia_kg_m2)
         x, y = world.rotors_m.T
@@ -220,12 +220,12 @@ class Lqr:
         self._hover_n = mass_kg * GRAVITY_M_S2 / 4.0
         self._most_n = drone.largest_thrust_n / 4.0
 
-    def aim(self, now: Motion, target: FloatArray) -> None:
+    def aim(self, now: RotorcraftState, target: FloatArray) -> None:
         """Take position and velocity."""
         del now
         self._target = target
 
-    def thrusts_n(self, now: Motion) -> FloatArray:
+    def thrusts_n(self, now: RotorcraftState) -> FloatArray:
         """Return hover less the gain times the error, within the rotors' limits."""
         angles_rad = Rotation.from_quat(now.quaternion).as_euler("xyz")
         off = (now.position_m - self._target[:3], angles_rad, now.velocity_m_s - self._target[3:6])
@@ -238,7 +238,7 @@ class MotorDrone:
 
     period_s = STEP_S
 
-    def __init__(self, world: World, law: Callable[[World], Law]) -> None:
+    def __init__(self, world: MotorWorld, law: Callable[[MotorWorld], RotorLaw]) -> None:
         self._world, self._made = world, law
         self._ticks = round(STEP_S / world.vehicle.drone.step_s)
 
@@ -265,17 +265,17 @@ class MotorDrone:
 
 def measure_all(folder: Path) -> Iterator[tuple[str, dict[str, Any], Mapping[str, Any]]]:
     """Yield title, scores and paths of both worlds; one flight each, without noise."""
-    worlds: dict[str, World] = {"Drake's QuadrotorPlant": Drake(), "MuJoCo, X of 0.5 kg": Mujoco()}
+    worlds: dict[str, MotorWorld] = {"Drake's QuadrotorPlant": Drake(), "MuJoCo, X of 0.5 kg": Mujoco()}
     for title, world in worlds.items():
         contestants: dict[str, Callable[[], MotorDrone]] = {}
         for name, law, count in (("LQR", Lqr, 5), ("Lee", Lee, 4)):
 
-            def made(factors: FloatArray, law: Any = law, world: World = world) -> MotorDrone:
+            def made(factors: FloatArray, law: Any = law, world: MotorWorld = world) -> MotorDrone:
                 return MotorDrone(world, lambda here: law(here, factors))
 
             best, found = search(made, count, None)
             (folder / f"{title}-{name}-found.txt").write_text(f"{found}\n", "utf-8")
             contestants[name] = lambda made=made, count=count: made(np.ones(count))  # type: ignore[misc]
             contestants[f"{name}, tuned"] = lambda best=best: best  # type: ignore[misc]
-        contestants["ours, by the page"] = lambda world=world: MotorDrone(world, Ours)  # type: ignore[misc]
+        contestants["ours, by the page"] = lambda world=world: MotorDrone(world, GeneratedLaw)  # type: ignore[misc]
         yield from measure(title, contestants, None, seeds=(0,))

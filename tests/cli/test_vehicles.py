@@ -87,7 +87,7 @@ def test_fly_states_the_whole_drone() -> None:
     """Its summary has every value; the motor lag is the drone's unless one is given."""
     flags = ["--duration-s", "1", "--controller", "pd", "--no-pictures"]
     run("fly", "--vehicle", "mine.toml", "--sensors", "mocap", *flags, "-o", "mine")
-    assert summary("mine")["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
+    assert summary("mine")["vehicle"] == vehicle_toml.load("mine.toml").model_dump(mode="json")
     run("fly", "--vehicle", "crazyflie", *flags, "-o", "crazyflie")
     assert summary("crazyflie")["motor_lag_s"] == 0.072
     run("fly", "--vehicle", "crazyflie", "--motor-lag-s", "0.01", *flags, "-o", "quick")
@@ -118,7 +118,7 @@ def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     Path("campaign.toml").write_text('controllers = ["pd"]\n[flight]\nduration_s = 1.0\n', "utf-8")
     run("campaign", "campaign.toml", "--vehicle", "mine.toml", "--flights", "2", "-o", "out")
     campaign = summary("out")["campaign"]
-    assert campaign["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
+    assert campaign["vehicle"] == vehicle_toml.load("mine.toml").model_dump(mode="json")
     assert (campaign["flight"]["vehicle"], campaign["flight"]["sensors"]) == ("mine", "mocap")
     path = Path("out") / "flights" / "000001-pd.json"
     scenario = read_record(path).scenario
@@ -139,7 +139,7 @@ def test_a_study_states_its_drone() -> None:
     text = 'flights = 1\nbase = "mambo-1norm"\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
     Path("tune.toml").write_text(text + "[search]\noptimizer.iterations = { choice = [4, 5] }\n", "utf-8")
     run("tune", "tune.toml", "--trials", "1", "--workers", "1", "-o", "out")
-    assert summary("out")["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
+    assert summary("out")["vehicle"] == vehicle_toml.load("mine.toml").model_dump(mode="json")
     assert json.loads(Path("out/study.json").read_text("utf-8"))["vehicle"]["name"] == "mine"
 
 
