@@ -28,17 +28,17 @@ def draw_simulators(results: Path) -> None:
     """Draw path and distance in space on the eight, with the first seed: their controller twice, and ours."""
     for simulator, drone in DRAWN.items():
         paths = np.load(results / simulator / f"{drone}.npz")
-        _draw_eight(paths, drone, list(paths)[:2], results / f"simulators-{simulator}")
+        _draw_eight(paths, drone, list(paths)[:2], results / f"simulators-{simulator}", 0.2)
 
 
 def draw_motors(results: Path) -> None:
     """Draw the same in Drake: the two laws of others, tuned, and ours."""
     paths = np.load(results / "motors" / f"{DRAKE}.npz")
-    _draw_eight(paths, DRAKE, OTHERS, results / "simulators-drake")
+    _draw_eight(paths, DRAKE, OTHERS, results / "simulators-drake", 0.02)
 
 
-def _draw_eight(paths: Any, drone: str, others: Sequence[str], place: Path) -> None:
-    """Draw paths by controller (k, 3) of the eight: those of two others, and ours."""
+def _draw_eight(paths: Any, drone: str, others: Sequence[str], place: Path, least_mm: float) -> None:
+    """Draw paths by controller (k, 3) of the eight: those of two others, and ours, from a distance on."""
     mission = MISSIONS["eight"]
     times_s, target = mission.times_s(), mission.targets()
     shown = [*zip(others, STYLES, strict=True), (PAGE, (BLUE, "solid"))]
@@ -52,7 +52,9 @@ def _draw_eight(paths: Any, drone: str, others: Sequence[str], place: Path) -> N
             error_mm = 1000.0 * np.linalg.norm(path - target[:, :3], axis=1)
             distance.plot(times_s, error_mm, color=colour, linestyle=dashes, label=title)
         plan.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{drone}: the target (grey)")
-        distance.set(xlabel="time, s", ylabel="distance to the target, mm", yscale="log", ylim=(0.2, 1000.0))
+        distance.set(
+            xlabel="time, s", ylabel="distance to the target, mm", yscale="log", ylim=(least_mm, 1000.0)
+        )
         distance.yaxis.set_major_formatter(PlainLogFormatter())
         distance.legend(loc="upper right", ncols=2)
         save(figure, place)
