@@ -28,7 +28,12 @@ def test_a_simulated_flight_writes_a_log_that_replay_and_identify_read(settings:
     said, talk = run("pilot", settings, *line, "-o", "piloted")
     assert said.startswith("landed: as planned\n")
     assert "; MPC_THR_HOVER says 0.500" in said
-    assert "piloted: flight.csv" in talk
+    assert "piloted: flight.csv, trace.npz, flight.png, flight.svg" in talk
+    drawn = Path("piloted/flight.svg").read_text("utf-8")
+    assert "landed: as planned; " in drawn
+    assert "height, m" in drawn
+    run("report", "piloted")
+    assert "Play" in Path("report.html").read_text("utf-8")
     summary = json.loads(Path("piloted/summary.json").read_text("utf-8"))
     assert (summary["good"], summary["simulated"], summary["autopilot"]) == (True, True, "PX4")
     assert summary["horizontal_rms_m"] < 0.08
