@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_codegen.numbers import reach
+from mambo_codegen.numbers.reach import THRUST_LEFT
 from mambo_codegen.settings import controller_toml, presets
 from mambo_sil.api.campaigns import draw_vehicles
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import Uncertainty
-from mambo_sil.plan import limits
 from mambo_sil.plan.limits import Figures, figures_of, limits_of
 
 FIGURES = Figures(
@@ -73,7 +72,7 @@ def test_gradients_are_those_of_differences() -> None:
     ("name", "order", "vector", "share"),
     [
         ("tilt", 2, (0.7 * 9.81, 0.0, 0.0), 1.0),
-        ("thrust", 2, (0.0, 0.0, limits.THRUST_LEFT * 16.0 - 9.81), 1.0),
+        ("thrust", 2, (0.0, 0.0, THRUST_LEFT * 16.0 - 9.81), 1.0),
         ("thrust", 2, (0.0, 0.0, 0.0), 0.0),
         ("least thrust", 2, (0.0, 0.0, 3.0 - 9.81), 1.0),
         ("speed", 1, (1.8, 2.4, 9.0), 1.0),
@@ -92,12 +91,6 @@ def test_shares_of_limits_by_hand(
     still = replace(FIGURES, drag_1_s=0.0)
     found = [1.0 + float(limit.of(motion)[0]) for limit in limits_of(still) if limit.name == name]
     assert max(found) == pytest.approx(share, abs=1e-6)
-
-
-def test_reserves_are_those_of_the_generated_c() -> None:
-    """The shares of thrust that a plan leaves are those that a controller with the exact tilt keeps."""
-    assert reach.THRUST_LEFT == limits.THRUST_LEFT
-    assert reach.SPARE_SHARE == limits.SPARE_SHARE
 
 
 def test_the_weakest_drawn_drone_limits_the_thrust() -> None:

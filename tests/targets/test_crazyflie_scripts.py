@@ -53,6 +53,46 @@ def evaluate(pieces: Any, time_s: float, order: int = 0) -> Any:
     return np.array([each.deriv(order)(time_s) if order else each(time_s) for each in polynomials])
 
 
+def lap(tmp_path: Path, count: int) -> str:
+    """Write a lap of pieces as `plan` does, from (2, 3, 0.8) with heading 0.2; return its name."""
+    columns = ("duration", *(f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(8)))
+    start = {"x^0": 2.0, "y^0": 3.0, "z^0": 0.8, "yaw^0": 0.2, "duration": 1.0}
+    rows = [
+        ",".join(str(start.get(name, 0.0) + (k == 0) * (name == "y^4") * 0.1) for name in columns)
+        for k in range(count)
+    ]
+    (tmp_path / "lap.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", "utf-8")
+    return str(tmp_path / "lap.csv")
+
+
+def test_a_lap_of_plan_is_uploaded_from_where_the_drone_stands(
+    scripts: dict[str, ModuleType], drone: Drone, tmp_path: Path
+) -> None:
+    """Its first point is above the drone, as high above the floor as in the file; a descent comes last."""
+    assert run(scripts, lap(tmp_path, 2)) == 0
+    pieces = uploaded(drone)
+    assert len(pieces) == 3
+    x, y, z, yaw = evaluate(pieces, 0.0)
+    assert (x, y, z, yaw) == pytest.approx((1.0, -0.5, 0.9, math.radians(30.0)), abs=1e-6)
+    assert evaluate(pieces[:1], 1.0)[1] == pytest.approx(-0.4, abs=1e-6)
+    assert evaluate(pieces, pieces[:, 32].sum())[2] == pytest.approx(PLACE[2], abs=1e-5)
+
+
+def test_a_lap_that_cannot_be_flown_is_refused(
+    scripts: dict[str, ModuleType], drone: Drone, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """More pieces than the memory holds, and a file that is no lap."""
+    assert run(scripts, lap(tmp_path, 31)) == 1
+    assert (
+        "the lap has 32 pieces with its descent, and the drone's memory holds 31" in capsys.readouterr().err
+    )
+    (tmp_path / "lap.csv").write_text("x,y,z\n0,0,1\n", "utf-8")
+    with pytest.raises(SystemExit):
+        run(scripts, str(tmp_path / "lap.csv"))
+    assert "a lap has rows of a duration and 8 coefficients" in capsys.readouterr().err
+    assert drone.names() == []
+
+
 @pytest.mark.parametrize("laps", [1, 4])
 def test_the_uploaded_eight_is_an_eight(laps: int, scripts: dict[str, ModuleType], drone: Drone) -> None:
     """At full size within 0.2 mm; smooth up to the third derivative; it ends at rest on the floor."""
@@ -280,7 +320,7 @@ def test_the_clock_of_the_logs_may_begin_again(scripts: dict[str, ModuleType], d
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("loop",), "invalid choice: 'loop'"),
+        (("loop",), "loop must be hover, goto, eight, circle, or a file"),
         (("eight", "--size", "9"), "9 must lie in 0.05..5"),
         (("eight", "--height", "nan"), "nan must lie in 0.2..5"),
         (("eight", "--rate", "quick"), "invalid number value: 'quick'"),

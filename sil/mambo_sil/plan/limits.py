@@ -14,16 +14,13 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.reach import largest_acceleration_m_s2
+from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT, largest_acceleration_m_s2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.plan.hermite import ORDERS
 
-THRUST_LEFT, SPARE_SHARE = 0.92, 0.85
-"""Of the largest thrust, what a controller with the exact tilt leaves to height and tilt; and of what the
-height leaves, the part for the tilt. With small angles a reserve for the attitude."""
 LEAST_THRUST_M_S2: Final = 0.3 * GRAVITY_M_S2
 """Least vertical thrust over mass where the settings have no height: roll and pitch need some."""
 
