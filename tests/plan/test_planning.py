@@ -122,3 +122,16 @@ def test_distances_of_a_path_by_hand() -> None:
     normal = np.array([1.0, 0.0, 0.0])
     assert _crossed_m(past + np.array([0.5, 0.0, 0.0]), normal) == pytest.approx([0.3])
     assert _crossed_m(past[::-1], normal) == [np.inf]
+
+
+def test_a_plan_that_begins_and_ends_in_flight_is_flown() -> None:
+    """The drone comes at the speed of the first point, and passes the last one at the speed given there."""
+    points = [
+        PlanPoint(0.0, 0.0, 1.0, speed_m_s=1.0, direction=(1.0, 0.0, 0.0)),
+        PlanPoint(1.0, 0.8, 1.1),
+        PlanPoint(0.0, 1.6, 1.0, speed_m_s=0.8, direction=(-1.0, 0.0, 0.0)),
+    ]
+    made = plan(points, Vehicle.from_preset("crazyflie"), drones=2)
+    ends = made.curve.target(np.array([0.0, made.curve.duration_s - 1e-9]))
+    np.testing.assert_allclose(ends[:, 2:], [[1.0, 0.0], [-0.8, 0.0]], rtol=0.1, atol=1e-6)
+    assert made.summary.passed == 3

@@ -8,7 +8,6 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.port.taken import MOST_KNOWN
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -27,8 +26,8 @@ from mambo_sil.plan.course import PlannedCourse
 from mambo_sil.plan.hermite import pieces_of
 from mambo_sil.plan.points import PlanPoint
 
-REST_S: Final = 1.0
-"""At the first point before the plan begins, and at the last one behind its end."""
+RUN_IN_S, REST_S = 2.0, 1.0
+"""Before the plan begins, in which controllers learn the weight; and at the last point behind its end."""
 LAPS: Final = 100
 """Of a closed lap, of which the second is judged."""
 LATE_S: Final = 0.4
@@ -37,7 +36,7 @@ LATE_S: Final = 0.4
 
 @dataclass(frozen=True)
 class Waiting:
-    """Pieces that begin after `wait_s`, flown `laps` times; an acceleration is known throughout."""
+    """Pieces that begin after `wait_s`, flown `laps` times; before, the target comes at their first speed."""
 
     pieces: PiecesInSpace
     wait_s: float
@@ -51,15 +50,28 @@ class Waiting:
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
-        return self.pieces.target(self._clock(time_s))
+        x, y, vx, vy = self.pieces.target(0.0)
+        before_s = np.minimum(np.asarray(time_s) - self.wait_s, 0.0)
+        comes = np.stack(
+            [x + vx * before_s, y + vy * before_s, *np.broadcast_arrays(vx, vy, before_s)[:2]], -1
+        )
+        return self._chosen(time_s, comes, self.pieces.target(self._clock(time_s)))
 
     def acceleration(self, time_s: ArrayLike) -> FloatArray:
         """Return [ax, ay] (..., 2)."""
-        return self.pieces.acceleration(self._clock(time_s))
+        flown = self.pieces.acceleration(self._clock(time_s))
+        return self._chosen(time_s, np.zeros_like(flown), flown)
 
     def vertical(self, time_s: ArrayLike) -> FloatArray:
         """Return [height, climb, vertical acceleration] (..., 3)."""
-        return self.pieces.vertical(self._clock(time_s))
+        height, climb, _ = self.pieces.vertical(0.0)
+        before_s = np.minimum(np.asarray(time_s) - self.wait_s, 0.0)
+        comes = np.stack(np.broadcast_arrays(height + climb * before_s, climb, 0.0), -1)
+        return self._chosen(time_s, comes, self.pieces.vertical(self._clock(time_s)))
+
+    def _chosen(self, time_s: ArrayLike, before: FloatArray, after: FloatArray) -> FloatArray:
+        begun = np.asarray(time_s) >= self.wait_s
+        return np.where(begun[..., np.newaxis], after, before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,20 +128,19 @@ class Drones:
         self, vehicle: Vehicle, course: PlannedCourse, points: Sequence[PlanPoint], yaw_rad: float
     ) -> FlownPlan:
         flights = int(np.size(vehicle.airframe.mass_kg))
-        closed, moving = course.choice.closed, bool(np.any(course.knots[0, 1]))
-        wait_s = 0.0 if moving else REST_S
-        judged_s = wait_s + (course.time_s if closed else 0.0)
+        closed, (x_m_s, y_m_s, z_m_s) = course.choice.closed, course.knots[0, 1].tolist()
+        judged_s = RUN_IN_S + (course.time_s if closed else 0.0)
         period_s = self.settings.horizon.update_period_s
         lasts_s = judged_s + course.time_s + REST_S
         flight = Flight(
-            Waiting(pieces_of(course.knots, course.duration_s), wait_s, LAPS if closed else 1),
+            Waiting(pieces_of(course.knots, course.duration_s), RUN_IN_S, LAPS if closed else 1),
             duration_s=period_s * math.floor(lasts_s / period_s),
             flights=flights,
             vehicle=vehicle,
             yaw_rad=-yaw_rad,
             update_period_s=period_s,
             seeds=tuple(range(flights)),
-            offset=_in_flight(course, yaw_rad) if moving else None,
+            offset=Offset(velocity_m_s=(x_m_s, -y_m_s, -z_m_s)),
             sensors=choose_sensors(DEFAULT_SENSORS[vehicle.drone.sensors.kind], vehicle.drone),
         )
         trace = fly(flight, CompiledController(self.settings, flights))
@@ -140,17 +151,6 @@ class Drones:
             np.arccos(np.cos(trace.euler_rad[..., 0]) * np.cos(trace.euler_rad[..., 1])).max(axis=0),
             trace.thrust_acceleration_m_s2.max(axis=0),
         )
-
-
-def _in_flight(course: PlannedCourse, yaw_rad: float) -> Offset:
-    """Return a start with velocity and tilt of a course."""
-    x_m_s, y_m_s, z_m_s = course.knots[0, 1].tolist()
-    x_m_s2, y_m_s2, z_m_s2 = course.knots[0, 2].tolist()
-    ahead_m_s2 = math.cos(yaw_rad) * x_m_s2 + math.sin(yaw_rad) * y_m_s2
-    left_m_s2 = math.cos(yaw_rad) * y_m_s2 - math.sin(yaw_rad) * x_m_s2
-    upwards_m_s2 = GRAVITY_M_S2 + z_m_s2
-    tilt_rad = math.atan(-left_m_s2 / upwards_m_s2), -math.atan(ahead_m_s2 / upwards_m_s2)
-    return Offset(velocity_m_s=(x_m_s, -y_m_s, -z_m_s), tilt_rad=tilt_rad)
 
 
 def _error_m(trace: Trace, begins_s: float, axes: int) -> FloatArray:
