@@ -300,7 +300,8 @@ def test_a_limit_that_the_settings_admit_may_be_set(key: str, base: str) -> None
         except InvalidSettingsError:
             continue
         assert limiting is not None
-        set_to = method_of(settings).reference_controller(1).set_limits([limiting.limits])
+        reference: Any = method_of(settings).reference_controller(1)
+        set_to = reference.set_limits([limiting.limits])
         assert set_to.tolist() == [Status.OK], value
         admitted.append(value)
     assert 0 < len(admitted) < len(values)

@@ -61,7 +61,6 @@ mambo-nmpc fly controller.toml --trajectory circle --yaw-rad 0.8 -o circle
 mambo-nmpc fly --controller pd --push 0.5,0 -o pd-pushed
 mambo-nmpc fly --on crazyflie -o on-crazyflie
 mambo-nmpc fly controller.toml --port /dev/ttyACM0 -o on-the-board
-mambo-nmpc fly controller.toml --port /dev/ttyACM0 --real-time --duration-s 20
 mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30
 mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie

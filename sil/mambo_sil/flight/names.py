@@ -36,6 +36,8 @@ SENSORS_KINDS: Final[tuple[SensorsKind, ...]] = get_args(SensorsKind)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
+CURVE_FORMS: Final = f"{', '.join(CURVE_NAMES)}, FILE.csv or FILE.py:CLASS"
+"""How an option names a curve."""
 ALTITUDE_NAMES: Final[tuple[AltitudeName, ...]] = get_args(AltitudeName)
 IN_SPACE: Final[tuple[SpaceCurveName, ...]] = get_args(SpaceCurveName)
 """Curves with a height."""

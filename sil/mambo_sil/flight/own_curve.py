@@ -10,12 +10,9 @@ from mambo_codegen.errors import echo
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError, TrajectoryError
-from mambo_sil.flight.names import CURVE_NAMES
 from mambo_sil.flight.own_file import load_object
 from mambo_sil.flight.polynomials import read_course
 from mambo_sil.flight.trajectories import CURVES, Trajectory, is_trajectory, vertical_of
-
-FORMS: Final = f"{', '.join(CURVE_NAMES)}, FILE.csv or FILE.py:CLASS"
 
 _SAMPLES: Final = 400
 _NEXT_S: Final = 0.01

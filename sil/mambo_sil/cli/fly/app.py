@@ -15,8 +15,8 @@ from mambo_sil.board.desk.events_file import EventsFile, SensorsSection
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, OtherFlight, Output, Runner
 from mambo_sil.cli.options import load, show_result
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.names import CurveName
-from mambo_sil.flight.own_curve import FORMS, check_curve, is_curve_file, load_curve
+from mambo_sil.flight.names import CURVE_FORMS, CurveName
+from mambo_sil.flight.own_curve import check_curve, is_curve_file, load_curve
 from mambo_sil.flight.trajectories import known_of, vertical_of
 from mambo_sil.results.folders import new_results
 
@@ -83,7 +83,7 @@ def _course(course: Course) -> EventsFile:
                 duration_s=course.duration_s,
             )
     if not is_curve_file(course.trajectory):
-        raise FlightError(f"--trajectory {echo(course.trajectory)} must be {FORMS}")
+        raise FlightError(f"--trajectory {echo(course.trajectory)} must be {CURVE_FORMS}")
     flown, _ = load_curve(course.trajectory)
     check_curve(echo(course.trajectory), flown, course.duration_s)
     return _without_events(

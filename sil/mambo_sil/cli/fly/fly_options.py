@@ -23,12 +23,12 @@ from mambo_sil.cli.options import (
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import (
     CONTROLLER_NAMES,
+    CURVE_FORMS,
     SENSORS_NAMES,
     AltitudeName,
     SensorsName,
     Start,
 )
-from mambo_sil.flight.own_curve import FORMS
 
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
@@ -36,7 +36,7 @@ RATE_RAD_S: Final = 0.5
 CurveChoice = Annotated[
     str,
     typer.Option(
-        help=f"{FORMS}: a file has columns time_s, x_m, y_m, or duration, x^0, x^1 ..., or your own class.",
+        help=f"{CURVE_FORMS}.",
         metavar="CURVE",
     ),
 ]
@@ -88,7 +88,7 @@ class Conditions:
         SensorsName,
         sensors_option(
             SENSORS_NAMES,
-            "What state all loops get, true or as these measure it",
+            "What measures the state",
         ),
     ] = "true"
     altitude_loop: Annotated[
@@ -101,7 +101,7 @@ class Conditions:
     ] = "stock"
     push: Annotated[
         str,
-        typer.Option(help="Steady acceleration north, east, in m/s^2.", metavar="X,Y"),
+        typer.Option(help="Push north, east, in m/s^2.", metavar="X,Y"),
     ] = "0,0"
     wind: Annotated[
         str,
@@ -109,9 +109,9 @@ class Conditions:
     ] = "none"
     wind_direction_rad: Annotated[
         float,
-        typer.Option(help="Heading towards which it blows: 0 north, 1.57 east.", metavar="RAD"),
+        typer.Option(help="Where it blows; 1.57 is east.", metavar="RAD"),
     ] = 0.0
-    seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.", metavar="N")] = 0
+    seed: Annotated[int, typer.Option(help="Seed of gusts and noise.", metavar="N")] = 0
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Output:
     output: Results = Path("flight")
     no_pictures: Annotated[
         bool,
-        typer.Option("--no-pictures", help="Draw nothing, which saves most of the time.", metavar=""),
+        typer.Option("--no-pictures", help="Draw nothing, which is quicker.", metavar=""),
     ] = False
     as_json: AsJson = False
 

@@ -32,8 +32,8 @@ from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.names import CONTROLLER_NAMES, SIZED, TIMED, PdName, flies_settings
-from mambo_sil.flight.own_curve import FORMS, check_curve, curve_named, is_curve_file, load_curve
+from mambo_sil.flight.names import CONTROLLER_NAMES, CURVE_FORMS, SIZED, TIMED, PdName, flies_settings
+from mambo_sil.flight.own_curve import check_curve, curve_named, is_curve_file, load_curve
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -266,7 +266,7 @@ def curve_of(course: Course) -> Trajectory:
     """Return the curve by name, or that of a file; raises FlightError and TrajectoryError."""
     size_m, rate_rad_s = _size_and_rate(course)
     if course.trajectory not in CURVES and not is_curve_file(course.trajectory):
-        raise TrajectoryError(f"--trajectory {echo(course.trajectory)} must be {FORMS}")
+        raise TrajectoryError(f"--trajectory {echo(course.trajectory)} must be {CURVE_FORMS}")
     curve = curve_named(course.trajectory, size_m or 0.0, rate_rad_s or 0.0)
     if is_curve_file(course.trajectory):
         check_curve(echo(course.trajectory), curve, course.duration_s)
