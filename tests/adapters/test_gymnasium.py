@@ -1,6 +1,7 @@
 """The plant as an environment of Gymnasium, as its checker demands it."""
 
 import importlib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from mambo_sil.flight.scenario import choose_sensors
 from tests.support.tools import require_module
 
 NAME = "mambo_nmpc.adapters.gymnasium:MamboNmpc-v0"
+CRAZYFLIE = Vehicle.from_preset("crazyflie")
 
 
 def make(**options: Any) -> Any:
@@ -67,9 +69,36 @@ def test_the_height_of_a_curve_in_space_is_held(vehicle: str) -> None:
         assert np.ptp(heights) > 0.2
 
 
+@pytest.mark.parametrize("kind", ["mocap", "true"])
+def test_a_drone_that_is_measured_beside_its_centre_flies(kind: Any) -> None:
+    """The environment's states are those of the centre: its controller does not move them once more."""
+    drone = CRAZYFLIE.drone.with_sensors(kind)
+    placed = drone.sensors.model_copy(update={"lever_m": (0.0, 0.0, -0.05)})
+    environment = make(
+        vehicle=Vehicle.of(drone.model_copy(update={"sensors": placed})), trajectory="hover", sensors=kind
+    )
+    seen, _ = environment.reset(seed=2)
+    for _ in range(30):
+        seen, _, crashed, *_ = environment.step(np.zeros(2))
+        assert not crashed
+    assert abs(seen[2] - 1.0) < 0.01
+
+
+@pytest.mark.parametrize("sensors", [None, choose_sensors("mocap", CRAZYFLIE.drone)])
+def test_drones_are_seen_where_their_sensors_really_lie(sensors: Any) -> None:
+    """By `lever_error_m` away, after a placement and in flight; the true state stays that of the centre."""
+    beside = replace(CRAZYFLIE, lever_error_m=(0.0, 0.0, 0.1))
+    drones = SimulatedDrones(beside, 0.01, (0, 1), sensors=sensors)
+    drones.place(np.array([[0.0, 0.0, -2.0], [0.0, 0.0, -1.0]]), np.array([True, False]))
+    for _ in range(10):
+        off_m = drones.state.position_m - drones.true_state.position_m
+        assert np.allclose(off_m, [0.0, 0.0, 0.1], atol=0.005)
+        drones.advance(np.zeros((2, 2)), np.array([9.81, 9.81]))
+
+
 def test_a_thrust_that_the_mixer_caps_is_reported() -> None:
     """Beside a large tilt the Crazyflie's motors do not give all that is commanded; at rest they do."""
-    drones = SimulatedDrones(Vehicle.from_preset("crazyflie"), 0.01, (0, 1))
+    drones = SimulatedDrones(CRAZYFLIE, 0.01, (0, 1))
     drones.advance(np.zeros((2, 2)), np.array([9.81, 9.81]))
     assert np.isnan(drones.report_thrust()).all()
     drones.advance(np.full((2, 2), 0.5), np.array([15.9, 15.9]))
@@ -145,8 +174,7 @@ def make_many(n: int, **options: Any) -> Any:
 @pytest.mark.parametrize("sensors", ["true", "mocap"])
 def test_drones_that_fly_together_fly_as_each_alone(sensors: str) -> None:
     """Bit for bit, in gusts and through cameras with noise, after one of them was placed anew."""
-    crazyflie = Vehicle.from_preset("crazyflie")
-    chosen = choose_sensors("mocap", crazyflie.drone) if sensors == "mocap" else None
+    chosen = choose_sensors("mocap", CRAZYFLIE.drone) if sensors == "mocap" else None
     assert not isinstance(chosen, Sensors)
     wind = Disturbances(wind_speed_m_s=3.0)
     rng, seeds = np.random.default_rng(1), (5, 6, 7)
@@ -154,7 +182,7 @@ def test_drones_that_fly_together_fly_as_each_alone(sensors: str) -> None:
     found = []
     for group in (seeds, *((seed,) for seed in seeds)):
         rows = [seeds.index(seed) for seed in group]
-        drones = SimulatedDrones(crazyflie, 0.01, group, sensors=chosen, disturbances=wind)
+        drones = SimulatedDrones(CRAZYFLIE, 0.01, group, sensors=chosen, disturbances=wind)
         drones.place(starts[0, rows])
         for step, command in enumerate(commands[:, rows]):
             if step == 20:

@@ -4,6 +4,7 @@
 """
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal, Unpack, get_args
 
@@ -21,9 +22,10 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_sections import PlacedSensors
 from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.frames import command_in_frame, vectors_to_ned
-from mambo_sil.flight.names import SENSORS_KINDS, SENSORS_NAMES, CurveName, SensorsName
+from mambo_sil.flight.names import SENSORS_NAMES, CurveName, SensorsName, kind_of
 from mambo_sil.flight.scenario import LARGEST_WIND_M_S, choose_sensors
 from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Trajectory
@@ -94,8 +96,8 @@ class _Flights:
         vehicle.require_flights(n)
         self._vehicle = vehicle
         self.n, self._action = n, action
-        measures = next(kind for kind in SENSORS_KINDS if sensors.startswith(kind))
-        self._controller = Controller.from_vehicle(self._vehicle, n, sensors=measures, **options)
+        centred = _seen_at_centre(vehicle)
+        self._controller = Controller.from_vehicle(centred, n, sensors=kind_of(sensors), **options)
         longest_s = MOST_STEPS * self._controller.update_period_s
         self._curve = as_curve(trajectory, size_m, rate_rad_s, longest_s)
         self._sensors = choose_sensors(sensors, self._vehicle.drone)
@@ -184,6 +186,15 @@ class _Flights:
             sensors=self._sensors,
             disturbances=self._disturbances,
         )
+
+
+def _seen_at_centre(vehicle: Vehicle) -> Vehicle:
+    """Return a drone without `sensors.lever_m`: the states of `SimulatedDrones` are those of its centre."""
+    sensors = vehicle.drone.sensors
+    if not isinstance(sensors, PlacedSensors) or not any(sensors.lever_m):
+        return vehicle
+    centred = sensors.model_copy(update={"lever_m": (0.0, 0.0, 0.0)})
+    return replace(vehicle, drone=vehicle.drone.model_copy(update={"sensors": centred}))
 
 
 class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package that need not be installed

@@ -52,9 +52,8 @@ class SimulatedDrones:
         self._delivery = ThrustDelivery(self.drone, self.n)
         self._thrust_n = np.full(self.n, self.drone.hover_demand_n)
         self._world = World(disturbances or Disturbances(), vehicle, seeds, _HEIGHT_M)
-        true = truth(self._state)
-        self._suite = suite_of(sensors, seeds, true, self.drone.step_s)
-        self._seen = true
+        self._seen = self._measured()
+        self._suite = suite_of(sensors, seeds, self._seen, self.drone.step_s)
 
     def place(self, position_m: FloatArray, chosen: NDArray[np.bool_] | None = None) -> None:
         """Let the drones, or those that are `chosen` (n,), hover at positions (n, 3) in NED, north."""
@@ -67,10 +66,10 @@ class SimulatedDrones:
         )
         self._delivery.forget(put)
         self._thrust_n = np.where(put, self.drone.hover_demand_n, self._thrust_n)
-        true = truth(self._state)
+        measured = self._measured()
         if self._suite is not None:
-            self._suite.place(true, put)
-        self._seen = _chosen(put, true, self._seen)
+            self._suite.place(measured, put)
+        self._seen = _chosen(put, measured, self._seen)
 
     def advance(self, command_rad: FloatArray, lift: Vertical | FloatArray) -> None:
         """Hold roll and pitch (n, 2) for one update period, with heading 0.
@@ -81,8 +80,8 @@ class SimulatedDrones:
         with np.errstate(all="ignore"):
             for _ in range(self._ticks):
                 self._state, moment = self._world.tick(self._state, 0.0)
-                true = truth(self._state)
-                self._seen = seen = true if self._suite is None else self._suite.estimate(true)
+                measured = self._measured()
+                self._seen = seen = measured if self._suite is None else self._suite.estimate(measured)
                 if isinstance(lift, Vertical):
                     wanted_n = self._thrust_n = self._altitude.thrust_n(lift, seen)
                 else:
@@ -93,7 +92,7 @@ class SimulatedDrones:
                 )
                 self._delivery.note(wanted_n, given_n)
         if self._suite is None:
-            self._seen = truth(self._state)
+            self._seen = self._measured()
 
     def report_thrust(self) -> FloatArray:
         """Return the thrusts over mass (n,) of the last periods that the mixer capped, else NaN."""
@@ -123,6 +122,10 @@ class SimulatedDrones:
             inside = (np.abs(position_m) < LOST_M).all(axis=0)  # not of NaN
             level = cos_roll * cos_pitch > least_level(self.drone)
             return np.asarray(~(inside & (position_m[2] < 0.0) & level))
+
+    def _measured(self) -> Seen:
+        """Return the true state where it is measured: off by `lever_error_m` of the vehicle."""
+        return self._vehicle.measured(truth(self._state))
 
     def _resting(self, position_m: FloatArray) -> VehicleState:
         hover_command = airframe_of(self.drone).hover_command / self.drone.thrust_gain

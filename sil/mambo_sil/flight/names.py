@@ -59,6 +59,11 @@ PD_TITLES: Final[dict[str, str]] = {
 """What tables and pictures call the laws without a model, by name."""
 
 
+def kind_of(name: SensorsName) -> SensorsKind:
+    """Return the kind of the sensors called `name`, as a vehicle.toml has it."""
+    return "mambo" if name == "mambo-derotated" else name
+
+
 def flies_settings(controller: str) -> bool:
     """Return whether a controller by name has settings: the C, or the reference in Python."""
     return controller in ("nmpc", "reference")

@@ -10,6 +10,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.vehicle import LEVER_ERRORS_M
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import PlacedSensors
 from mambo_sil.experiment.margins.axis_margins import Margins, measure_loops
 from mambo_sil.experiment.margins.controller_jacobian import has_linear_law
 from mambo_sil.experiment.margins.hover_loop import hover_loops
@@ -28,7 +29,7 @@ from mambo_sil.experiment.margins.margins_record import (
     MarginsSummary,
 )
 from mambo_sil.experiment.margins.response_file import responses, write_responses
-from mambo_sil.flight.names import SensorsName
+from mambo_sil.flight.names import SensorsName, kind_of
 from mambo_sil.results.folders import new_results
 
 NOT_SMOOTH: Final = (
@@ -37,10 +38,6 @@ NOT_SMOOTH: Final = (
     "motion only, so none is given"
 )
 """Why a controller without a linear law has no margins."""
-
-
-_PLACED: Final = ("true", "mocap")
-"""Sensors that measure a position at one place of the drone."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +89,7 @@ def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> M
     Raises as `axes_on`, and the errors of writing.
     """
     period_s = subject.settings.horizon.update_period_s
+    measures = subject.drone.with_sensors(kind_of(subject.sensors)).sensors
     summary = MarginsSummary(
         source=subject.source,
         settings=subject.settings.digest,
@@ -112,7 +110,7 @@ def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> M
                 update={
                     "axes": list(measure_loops(loops, flight)),
                     "reason": None,
-                    "levers": beside(subject) if subject.sensors in _PLACED else [],
+                    "levers": beside(subject) if isinstance(measures, PlacedSensors) else [],
                     "many": summarise_drones(found, many.origin) if many else None,
                 }
             )
