@@ -17,6 +17,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.own_curve import load_curve
 from mambo_sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
 from mambo_sil.flight.traces import SEEN_COLUMNS
 from mambo_sil.flight.trajectories import Bernoulli
@@ -256,6 +257,23 @@ def test_every_key_of_a_scenario_changes_its_flight() -> None:
     flown = [base, *(base.model_copy(update={key: getattr(other, key)}) for key in keys)]
     trace = fly(flight_of(flown, 0.01), PdController())
     assert len({trace.digest(flight) for flight in range(trace.flights)}) == len(flown)
+
+
+def test_curves_of_ones_own_are_taken_as_they_are(tmp_path: Path) -> None:
+    """One whose length is 0, in a file or of a program; a file is executed once, whatever sizes are drawn."""
+    own = tmp_path / "own.py"
+    own.write_text(
+        "from pathlib import Path\nfrom mambo_nmpc.curves import Circle\n\n\nclass Empty(Circle):\n"
+        "    def __init__(self):\n        super().__init__(3.0, 1.0)\n\n"
+        "    def __len__(self):\n        return 0\n\n\n"
+        "with Path(__file__).with_suffix('.txt').open('a') as runs:\n    runs.write('.')\n",
+        "utf-8",
+    )
+    drawn = [Scenario(trajectory=f"{own}:Empty", size_m=size_m) for size_m in (1.0, 2.0)]
+    assert flight_of(drawn, 0.005).trajectory.target(np.zeros(1))[0, :, 0].tolist() == [3.0, 3.0]
+    assert own.with_suffix(".txt").read_text("utf-8") == "."
+    curve = load_curve(f"{own}:Empty")[0]
+    assert flight_of([Scenario()], 0.005, curve).trajectory is curve
 
 
 def test_scenarios_that_cannot_share_a_simulation_are_refused() -> None:

@@ -45,10 +45,8 @@ def load_curve(named: str) -> tuple[Trajectory, str]:
 
 def curve_named(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
     """Return a curve by name, with its size and angular rate, or that of a file; raises as `load_curve`."""
-    return (
-        next((curve(size_m, rate_rad_s) for known, curve in CURVES.items() if known == name), None)
-        or (load_curve(name)[0])
-    )
+    shipped = next((curve for known, curve in CURVES.items() if known == name), None)
+    return load_curve(name)[0] if shipped is None else shipped(size_m, rate_rad_s)
 
 
 def check_curve(name: str, curve: Trajectory, duration_s: float) -> None:

@@ -49,8 +49,9 @@ from mambo_sil.flight.names import (
     AltitudeName,
     SensorsName,
     Start,
+    kind_of,
 )
-from mambo_sil.flight.own_curve import curve_named
+from mambo_sil.flight.own_curve import curve_named, is_curve_file
 from mambo_sil.flight.trajectories import Trajectories, Trajectory
 
 FORMAT: Final = 2
@@ -210,7 +211,7 @@ def flight_of(
     n, drone = len(scenarios), first.vehicle
     delays = np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64)
     return Flight(
-        curve or _curves(scenarios),
+        _curves(scenarios) if curve is None else curve,
         duration_s=first.duration_s,
         flights=n,
         start=first.start,
@@ -229,11 +230,15 @@ def flight_of(
 
 def _curves(scenarios: Sequence[Scenario]) -> Trajectories:
     """Return the curves that scenarios name, each made once."""
-    curves = {
-        (s.trajectory, repr(s.size_m), repr(s.rate_rad_s)): curve_named(s.trajectory, s.size_m, s.rate_rad_s)
-        for s in scenarios
-    }
-    return Trajectories(tuple(curves[s.trajectory, repr(s.size_m), repr(s.rate_rad_s)] for s in scenarios))
+    named = {_curve_of(s): s for s in scenarios}
+    curves = {key: curve_named(s.trajectory, s.size_m, s.rate_rad_s) for key, s in named.items()}
+    return Trajectories(tuple(curves[_curve_of(s)] for s in scenarios))
+
+
+def _curve_of(scenario: Scenario) -> tuple[str, ...]:
+    """Return what tells the curve of a scenario from others; that of a file has neither size nor rate."""
+    name = scenario.trajectory
+    return (name,) if is_curve_file(name) else (name, repr(scenario.size_m), repr(scenario.rate_rad_s))
 
 
 def choose_sensors(name: SensorsName, drone: VehicleFile, **parameters: Any) -> AnySensors | None:
@@ -242,7 +247,7 @@ def choose_sensors(name: SensorsName, drone: VehicleFile, **parameters: Any) -> 
     Raises FlightError if its file has no figures of them.
     """
     try:
-        figures = drone.with_sensors("mambo" if name == "mambo-derotated" else name).sensors
+        figures = drone.with_sensors(kind_of(name)).sensors
     except InvalidSettingsError as error:
         raise FlightError(str(error)) from None
     noise_scale = parameters.get("noise_scale", 1.0)
