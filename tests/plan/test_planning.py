@@ -1,6 +1,7 @@
 """Whole plans: flown by the drones that judge them, written as pieces, refused in words."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,13 @@ import pytest
 
 from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
 from mambo_sil.errors import ArgumentError, PlanError, TrajectoryError
-from mambo_sil.flight.polynomials import read_course
-from mambo_sil.plan.plan_flight import _crossed_m, _nearest_m
+from mambo_sil.flight.polynomials import Piece, PiecesInSpace, read_course
+from mambo_sil.plan.course import course_of
+from mambo_sil.plan.limits import FlightLimit, figures_of, limits_of
+from mambo_sil.plan.plan_flight import Drones, Waiting, _crossed_m, _nearest_m
+from mambo_sil.plan.planning import _Search
 from mambo_sil.plan.plans import Plan
+from mambo_sil.plan.solver import silent
 from tests.support.command import run
 
 POINTS = [(0.0, 0.0, 1.0), (0.8, 0.4, 1.1), (0.6, -0.6, 1.0)]
@@ -113,6 +118,36 @@ def test_what_is_no_point_is_refused() -> None:
         plan([(0.0, 1.0), (1.0, 1.0)], vehicle)  # type: ignore[list-item]
     with pytest.raises(ArgumentError, match=r"rate = 2\.0 must lie in"):
         plan(POINTS, vehicle, rate=2.0)
+
+
+def test_a_larger_share_without_a_plan_leaves_the_one_that_flew() -> None:
+    """From a share of 1.2 on a wall stands before the last point: the plan of share 1 remains."""
+    vehicle = Vehicle.from_preset("crazyflie")
+    settings = Controller.from_vehicle("crazyflie").settings
+    points = tuple(PlanPoint(*place) for place in POINTS[:2])
+    search = _Search(points, course_of(points, closed=False), Drones([vehicle], settings), 1.0, silent)
+    figures = figures_of(vehicle.drone, settings, vehicle)
+
+    def limits_at(share: float) -> list[FlightLimit]:
+        walled = replace(figures, walls_m=((0, 1.0, 0.5),))
+        return limits_of(walled if share > 1.2 else figures, share)
+
+    course, share, flown = search.quickest(limits_at)
+    assert 1.0 <= share <= 1.2
+    assert not flown.misses(np.array([0.1])).any()
+    assert course.time_s > 0.5
+
+
+@pytest.mark.parametrize(("climb_m_s", "lowest_m"), [(0.5, 0.3), (0.1, 0.4), (-0.5, 0.6), (2.0, 0.3)])
+def test_the_run_in_stays_above_the_ground(climb_m_s: float, lowest_m: float) -> None:
+    """A start in a climb comes from half its height at least, at the speed and climb of the first point."""
+    piece = Piece(1.0, (1.0, 2.0, *[0.0] * 6), (0.0,) * 8, (0.6, climb_m_s, *[0.0] * 6))
+    waiting = Waiting(PiecesInSpace((piece,)), 2.0, laps=False)
+    height, climb, _ = waiting.vertical(np.linspace(0.0, 2.0, 2001)).T
+    assert height.min() == pytest.approx(lowest_m)
+    np.testing.assert_allclose(np.gradient(height, 1e-3)[climb == 0.0][:-1], 0.0, atol=1e-9)
+    assert (height[-1], climb[-1]) == pytest.approx((0.6, climb_m_s))
+    assert waiting.target(0.0)[0] == pytest.approx(1.0 - 2.0 * 2.0)
 
 
 def test_distances_of_a_path_by_hand() -> None:

@@ -64,7 +64,17 @@ def test_points_of_a_program_are_numbered() -> None:
         check_points([PlanPoint(0, 0, 1), PlanPoint(1, 0, 1, direction=(0, 0, 0))])
 
 
-def mission(*places: tuple[float, float, float], frame: int = 3, radius: float | None = 0) -> str:
+def test_a_closed_lap_that_repeats_its_first_point_is_refused(tmp_path: Path) -> None:
+    """An open course may end where it began."""
+    path = written(tmp_path, "x,y,z", "0,0,1", "1,0,1", "0,0,1")
+    assert len(read_points(path)) == 3
+    with pytest.raises(TrajectoryError, match=r"line 4: is the first point again.*leave it out"):
+        read_points(path, closed=True)
+
+
+def mission(
+    *places: tuple[float | None, float | None, float], frame: int = 3, radius: float | None = 0
+) -> str:
     """Return a mission of QGroundControl with a take-off, waypoints and a return."""
     items: list[dict[str, object]] = [
         {"command": 22 if k == 0 else 16, "frame": frame, "params": [0, radius, 0, None, *place]}
@@ -84,6 +94,23 @@ def test_a_mission_is_metres_north_and_west_of_its_first_place(tmp_path: Path) -
     assert north.position_m == pytest.approx((mile_m, 0.0, 6.0), abs=0.1)
     assert east.position_m == pytest.approx((0.0, -mile_m / 2.0, 7.0), abs=0.1)
     assert north.tolerance_m == 2.5
+
+
+@pytest.mark.parametrize("nowhere", [0.0, None])
+def test_a_take_off_without_a_place_is_left_out(tmp_path: Path, nowhere: float | None) -> None:
+    """The first waypoint is then the origin."""
+    text = mission((nowhere, nowhere, 5.0), (60.0, 10.0, 6.0), (60.001, 10.0, 7.0))
+    first, second = read_points(written(tmp_path, text, name="mission.plan"))
+    assert first.position_m == (0.0, 0.0, 6.0)
+    assert second.position_m == pytest.approx((111.2, 0.0, 7.0), abs=0.1)
+
+
+def test_a_fault_of_a_mission_is_named_by_the_item_of_its_file(tmp_path: Path) -> None:
+    """Items without a place count: the second waypoint stands behind a change of speed."""
+    document = json.loads(mission((60.0, 10.0, 5.0), (60.0, 10.0, 5.0)))
+    document["mission"]["items"].insert(1, {"command": 178, "frame": 2, "params": [1, 5, -1, 0, 0, 0, 0]})
+    with pytest.raises(TrajectoryError, match=r"item 3: must be 0\.01 m or more from"):
+        read_points(written(tmp_path, json.dumps(document), name="mission.plan"))
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,15 @@ def test_the_course_passes_points_gates_and_speeds(found: PlannedCourse) -> None
     assert np.linalg.norm(found.knots[3, 1]) == pytest.approx(1.0, rel=0.1)
 
 
+def test_a_gate_at_rest_is_reached() -> None:
+    """The last point of an open course stands in a gate, without a speed along its normal."""
+    gate = PlanPoint(1.0, 0.0, 1.1, normal=(1.0, 0.0, 0.0), width_m=0.4)
+    course = course_of([gate, PlanPoint(0.0, 1.0, 1.0), gate], closed=False)
+    rests = solve(first_course(course, LIMITS), LIMITS)
+    assert solver.passed_at_knots(rests).max() <= solver.HELD
+    np.testing.assert_array_equal(rests.knots[[0, -1], 0], [gate.position_m] * 2)
+
+
 def test_a_plan_that_knows_no_lag_passes_the_limits_of_one_that_does() -> None:
     """A planner without jerk and snap is quicker, and asks for more thrust than there is."""
     blind = limits_of(replace(FIGURES, tilt_lag_s=0.0, tilt_dead_time_s=0.0, thrust_lag_s=0.0))

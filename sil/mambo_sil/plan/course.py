@@ -157,13 +157,14 @@ def course_of(points: Sequence[PlanPoint], *, closed: bool) -> PlannedCourse:
     normal = np.zeros((count, 3))
     for knot, point in enumerate(through):
         ends = not closed and knot in (0, count - 1)
+        rests = ends and not point.speed_m_s
         if ends:
             free[knot, 0] = False
-        if point.normal is not None:
+        if point.normal is not None and not rests:
             normal[knot] = np.array(point.normal) / np.linalg.norm(point.normal)
             axes[knot, 0] = _beginning_with(normal[knot])
             free[knot, 0, 0] = False
-        if ends and not point.speed_m_s:
+        if rests:
             free[knot, 1:] = False
         elif point.speed_m_s is not None or point.direction is not None:
             axes[knot, 1] = _beginning_with(_direction(through, knot, closed=closed))

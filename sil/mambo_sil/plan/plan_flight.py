@@ -28,25 +28,25 @@ from mambo_sil.plan.points import PlanPoint
 
 RUN_IN_S, REST_S = 2.0, 1.0
 """Before the plan begins, in which controllers learn the weight; and at the last point behind its end."""
-LAPS: Final = 100
-"""Of a closed lap, of which the second is judged."""
 LATE_S: Final = 0.4
 """A drone passes a point within this of its time, and within half a piece."""
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """Pieces that begin after `wait_s`, flown `laps` times; before, the target comes at their first speed."""
+    """Pieces that begin after `wait_s`, flown once or in laps; before, the target comes at their first speed.
+
+    It begins to climb so late that it comes from no lower than half of their first height.
+    """
 
     pieces: PiecesInSpace
     wait_s: float
-    laps: int
+    laps: bool
     known: ClassVar = MOST_KNOWN
 
     def _clock(self, time_s: ArrayLike) -> FloatArray:
         since_s, lap_s = np.asarray(time_s) - self.wait_s, self.pieces.duration_s
-        lap = np.clip(np.floor(since_s / lap_s), 0, self.laps - 1)
-        return np.asarray(since_s - lap * lap_s)
+        return np.asarray(since_s % lap_s if self.laps else since_s)
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -65,8 +65,16 @@ class Waiting:
     def vertical(self, time_s: ArrayLike) -> FloatArray:
         """Return [height, climb, vertical acceleration] (..., 3)."""
         height, climb, _ = self.pieces.vertical(0.0)
+        climbs_s = self.wait_s if climb <= 0.0 else min(self.wait_s, 0.5 * max(height, 0.0) / climb)
         before_s = np.minimum(np.asarray(time_s) - self.wait_s, 0.0)
-        comes = np.stack(np.broadcast_arrays(height + climb * before_s, climb, 0.0), -1)
+        comes = np.stack(
+            np.broadcast_arrays(
+                height + climb * np.maximum(before_s, -climbs_s),
+                np.where(before_s < -climbs_s, 0.0, climb),
+                0.0,
+            ),
+            -1,
+        )
         return self._chosen(time_s, comes, self.pieces.vertical(self._clock(time_s)))
 
     def _chosen(self, time_s: ArrayLike, before: FloatArray, after: FloatArray) -> FloatArray:
@@ -128,19 +136,21 @@ class Drones:
         self, vehicle: Vehicle, course: PlannedCourse, points: Sequence[PlanPoint], yaw_rad: float
     ) -> FlownPlan:
         flights = int(np.size(vehicle.airframe.mass_kg))
-        closed, (x_m_s, y_m_s, z_m_s) = course.choice.closed, course.knots[0, 1].tolist()
+        closed = course.choice.closed
+        target = Waiting(pieces_of(course.knots, course.duration_s), RUN_IN_S, laps=closed)
+        (_, _, x_m_s, y_m_s), (_, climb_m_s, _) = target.target(0.0), target.vertical(0.0)
         judged_s = RUN_IN_S + (course.time_s if closed else 0.0)
         period_s = self.settings.horizon.update_period_s
         lasts_s = judged_s + course.time_s + REST_S
         flight = Flight(
-            Waiting(pieces_of(course.knots, course.duration_s), RUN_IN_S, LAPS if closed else 1),
+            target,
             duration_s=period_s * math.floor(lasts_s / period_s),
             flights=flights,
             vehicle=vehicle,
             yaw_rad=-yaw_rad,
             update_period_s=period_s,
             seeds=tuple(range(flights)),
-            offset=Offset(velocity_m_s=(x_m_s, -y_m_s, -z_m_s)),
+            offset=Offset(velocity_m_s=(float(x_m_s), float(y_m_s), -float(climb_m_s))),
             sensors=choose_sensors(DEFAULT_SENSORS[vehicle.drone.sensors.kind], vehicle.drone),
         )
         trace = fly(flight, CompiledController(self.settings, flights))

@@ -30,7 +30,7 @@ SHARES: Final = (0.35, 4.0)
 """Least and largest share of tilt and spare thrust that a plan takes."""
 STEP: Final = 1.35
 """Factor between shares, until one is found that drones do not fly."""
-SETTLED: Final = 0.997
+NO_QUICKER: Final = 0.997
 """Time of a plan over that of one with a smaller share, above which a larger share is of no use."""
 FINE: Final = 1.03
 """Factor between the largest share that is flown and the next one, which is not, at the end."""
@@ -143,8 +143,8 @@ class _Search:
         least, most = SHARES
         reach_m = reach_of(self.points, self.first)
         found: tuple[PlannedCourse, float, FlownPlan] | None = None
-        missed: tuple[float, PlannedCourse, FlownPlan] | None = None
-        share, course = 1.0, self.first
+        missed: tuple[PlannedCourse, FlownPlan] | None = None
+        share, fails = 1.0, np.inf
         for attempt in range(TRIES):
             begun = attempt / TRIES
 
@@ -152,36 +152,40 @@ class _Search:
                 self.progress("planning", begun + 0.7 * part / TRIES)
 
             limits = limits_at(share)
-            course = solve(first_course(self.first, limits), limits, report)
-            course = slowed(course, limits)
-            self._require(course, limits)
-            self.progress("flying", begun + 0.7 / TRIES)
-            flown = self.fly(course)
-            if flown.misses(SURE * reach_m).any():
-                missed = share, course, flown
-            elif found is None or course.time_s < SETTLED * found[0].time_s:
-                found = course, share, flown
+            course = slowed(solve(first_course(self.first, limits), limits, report), limits)
+            if fault := _fault_of(course, limits):
+                if found is None:
+                    raise PlanError(fault)
+                fails = share
             else:
-                break  # more thrust makes it no quicker
+                self.progress("flying", begun + 0.7 / TRIES)
+                flown = self.fly(course)
+                if flown.misses(SURE * reach_m).any():
+                    fails, missed = share, (course, flown)
+                elif found is None or course.time_s < NO_QUICKER * found[0].time_s:
+                    found = course, share, flown
+                else:
+                    break  # more thrust makes it no quicker
             flies = 0.0 if found is None else found[1]
-            fails = np.inf if missed is None else missed[0]
             if fails <= least or flies >= most or fails < FINE * flies:
                 break
             share = _next_share(flies, fails)
         if found is None:
             assert missed is not None
-            raise PlanError(_missed_words(self.points, reach_m, missed[1], missed[2]))
+            raise PlanError(_missed_words(self.points, reach_m, *missed))
         return found
 
-    def _require(self, course: PlannedCourse, limits: Sequence[FlightLimit]) -> None:
-        """Raise PlanError for a course that does not keep its limits."""
-        over = shares_of(course, limits) - 1.0
-        if over.max() > 3.0 * HELD:
-            raise PlanError(_passed_words(course, limits, over))
-        off, backwards = passed_at_knots(course)
-        if max(off.max(), backwards.max()) > 3.0 * HELD:
-            knot = int(np.maximum(off, backwards).argmax())
-            raise PlanError(f"point {knot + 1}: is not reached within the limits; a wider tolerance would do")
+
+def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
+    """Return which limit a course does not keep, where and by how much; nothing if it keeps all."""
+    over = shares_of(course, limits) - 1.0
+    if over.max() > 3.0 * HELD:
+        return _passed_words(course, limits, over)
+    passed = passed_at_knots(course).max(axis=0)
+    if passed.max() > 3.0 * HELD:
+        knot = int(passed.argmax())
+        return f"point {knot + 1}: is not reached within the limits; a wider tolerance would do"
+    return ""
 
 
 def _next_share(flies: float, fails: float) -> float:

@@ -75,7 +75,7 @@ def plan(
     require_number("rate", rate, LEAST_RATE, 1.0)
     require(is_whole(drones, 1, MOST_DRONES), "drones", drones, f"be a whole number in 1..{MOST_DRONES}")
     planned = make_plan(
-        _points(points),
+        _points(points, closed=closed),
         vehicle,
         None if controller is None else controller.settings,
         closed=closed,
@@ -88,9 +88,9 @@ def plan(
     return Plan(pieces_of(course.knots, course.duration_s), summary_of(planned, vehicle.drone), planned)
 
 
-def _points(points: object) -> tuple[PlanPoint, ...]:
+def _points(points: object, *, closed: bool) -> tuple[PlanPoint, ...]:
     if isinstance(points, str | Path):
-        return read_points(Path(points))
+        return read_points(Path(points), closed=closed)
     require(isinstance(points, Sequence), "points", points, "be a file, or a sequence of points")
     found = []
     for point in points if isinstance(points, Sequence) else ():
@@ -102,5 +102,5 @@ def _points(points: object) -> tuple[PlanPoint, ...]:
         except (TypeError, ValueError):
             raise ArgumentError(f"points: {point!r} must be a PlanPoint, or x, y and z in m") from None
         found.append(PlanPoint(x_m, y_m, z_m))
-    check_points(found)
+    check_points(found, closed=closed)
     return tuple(found)

@@ -62,24 +62,26 @@ class PlanPoint:
         return self.tolerance_m if self.width_m is None else self.width_m / 2.0
 
 
-def read_points(path: Path) -> tuple[PlanPoint, ...]:
-    """Read points from a CSV file, or the places of a mission of QGroundControl (.plan).
+def read_points(path: Path, *, closed: bool = False) -> tuple[PlanPoint, ...]:
+    """Read points from a CSV file, or the places of a mission of QGroundControl (.plan); of a `closed` lap.
 
     Raises `TrajectoryError`, which names file, line, column and rule.
     """
     with named(path):
         text = read_text(path)
         if path.suffix.lower() == MISSION:
-            points = tuple(PlanPoint(*place) for place in places_of(text))
-            lines = [f"item {number}" for number in range(1, len(points) + 1)]
+            places = places_of(text)
+            points, lines = tuple(PlanPoint(*place) for place in places.values()), list(places)
         else:
             rows = _rows(text)
             points, lines = tuple(_point(line, row) for line, row in rows.items()), list(rows)
-        check_points(points, lines)
+        check_points(points, lines, closed=closed)
     return points
 
 
-def check_points(points: Sequence[PlanPoint], places: Sequence[str] | None = None) -> None:
+def check_points(
+    points: Sequence[PlanPoint], places: Sequence[str] | None = None, *, closed: bool = False
+) -> None:
     """Raise `TrajectoryError` for points that cannot be planned; `places` names each in the message."""
     named_at = places or [f"point {number}" for number in range(1, len(points) + 1)]
     if not 2 <= len(points) <= MOST_POINTS:
@@ -91,6 +93,10 @@ def check_points(points: Sequence[PlanPoint], places: Sequence[str] | None = Non
             raise TrajectoryError(
                 f"{place}: must be {NEAREST_M:g} m or more from the point before it; leave one of them out"
             )
+    if closed and math.dist(points[-1].position_m, points[0].position_m) < NEAREST_M:
+        raise TrajectoryError(
+            f"{named_at[-1]}: is the first point again, to which a closed lap returns; leave it out"
+        )
     timed = [point.time_s is not None for point in points]
     if any(timed) and not all(timed):
         missing = named_at[timed.index(False)]

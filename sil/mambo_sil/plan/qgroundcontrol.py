@@ -19,8 +19,8 @@ REACHED_M: Final = 1.0
 """Tolerance of a place without a radius of acceptance."""
 
 
-def places_of(text: str) -> list[tuple[float, float, float, float]]:
-    """Return x north, y west, z up in m of each place, and its tolerance.
+def places_of(text: str) -> dict[str, tuple[float, float, float, float]]:
+    """Return x north, y west, z up in m of each place, and its tolerance, by the number of its item.
 
     x and y are from the first place, z is above the place of take-off.
 
@@ -34,24 +34,30 @@ def places_of(text: str) -> list[tuple[float, float, float, float]]:
     items = mission.get("items") if isinstance(mission, dict) else None
     if not isinstance(items, list):
         raise TrajectoryError("has no mission.items: it is no mission of QGroundControl")
-    found = [
-        _place(f"item {number}", item)
-        for number, item in enumerate(items, start=1)
-        if isinstance(item, dict) and item.get("command") in (WAYPOINT, SPLINE, TAKE_OFF)
-    ]
+    numbered = {f"item {number}": item for number, item in enumerate(items, start=1)}
+    found = {name: _place(name, item) for name, item in numbered.items() if _is_place(item)}
     if not found:
         raise TrajectoryError("has no waypoint in mission.items")
-    (latitude_deg, longitude_deg, *_), *_ = found
+    (latitude_deg, longitude_deg, *_), *_ = found.values()
     narrower = math.cos(math.radians(latitude_deg))
-    return [
-        (
+    return {
+        name: (
             METRES_PER_DEGREE * (latitude - latitude_deg),
             -METRES_PER_DEGREE * narrower * (longitude - longitude_deg),
             height_m,
             tolerance_m,
         )
-        for latitude, longitude, height_m, tolerance_m in found
-    ]
+        for name, (latitude, longitude, height_m, tolerance_m) in found.items()
+    }
+
+
+def _is_place(item: object) -> bool:
+    """Return whether an item is flown to: a take-off may have no latitude and longitude, or zeros."""
+    if not isinstance(item, dict) or item.get("command") not in (WAYPOINT, SPLINE, TAKE_OFF):
+        return False
+    numbers = item.get("params")
+    nowhere = isinstance(numbers, list) and len(numbers) == 7 and not any(numbers[4:6])
+    return not (item["command"] == TAKE_OFF and nowhere)
 
 
 def _place(name: str, item: dict[str, Any]) -> tuple[float, float, float, float]:

@@ -39,7 +39,8 @@ LONGEST_STEP: Final = 0.5
 UNITS: Final = np.repeat([1.0, 1.0, 2.0, 6.0], 3)
 """Size of the unknowns of a knot over the mean distance of points."""
 
-Progress = Callable[[float], None]
+Report = Callable[[float], None]
+"""Called with the share of the rounds that is done."""
 
 
 def silent(*_: object) -> None:
@@ -85,7 +86,7 @@ def _backwards(course: PlannedCourse) -> FloatArray:
     return np.where(normal.any(axis=1), FORWARD_M_S - forward_m_s, -1.0)
 
 
-def solve(course: PlannedCourse, limits: Sequence[FlightLimit], progress: Progress = silent) -> PlannedCourse:
+def solve(course: PlannedCourse, limits: Sequence[FlightLimit], progress: Report = silent) -> PlannedCourse:
     """Return the course of least time within limits, from a first one; without any, one that passes them."""
     state = _state(course, limits)
     mean_s = float(course.duration_s.mean())
