@@ -19,6 +19,7 @@ from mambo_sil.errors import PilotError
 from mambo_sil.flight.frames import wrapped
 from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Circle, Gerono
+from mambo_sil.link.courses import Place
 from mambo_sil.link.phases import Phase
 from mambo_sil.link.pilot import Pilot
 from mambo_sil.link.pilot_report import write_log
@@ -185,7 +186,8 @@ def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
 def test_a_take_over_in_wind_keeps_the_lean(stack: str, tmp_path: Path) -> None:
     """The autopilot leans by 10 degrees; the tilt moves by less than two, and the drone by less than 0.1 m.
 
-    A controller that began upright would let it be blown 0.4 m away. Its log has the drone without the lean.
+    A controller that began upright would let it be blown 0.4 m away. Half a second later the estimated
+    heading jumps by 34 degrees. The log, which has the drone without the lean, repeats the flight.
     """
     settings = settings_for(drone().with_sensors("autopilot"))
     link, updates, seen = WiredLink(stack, drone()), list[Update](), list[np.ndarray[Any, Any]]()
@@ -199,8 +201,12 @@ def test_a_take_over_in_wind_keeps_the_lean(stack: str, tmp_path: Path) -> None:
         link.autopilot.blow((1.5, -1.0))
         pilot.take_off(4.0)
         place_m = pilot.state.position_m
-        pilot.follow(lambda time_s: TargetState(place_m, np.zeros(3)), 3.0)  # noqa: ARG005 - it stays
+        stay = Place(place_m).target
+        pilot.follow(stay, 0.5)
+        link.autopilot.reset_estimator(np.zeros(3), 0.6)
+        pilot.follow(stay, 2.5)
         pilot.land()
+    assert pilot.steering.frame.jumps == 1
     moved = np.abs(np.array(seen[:300]) - seen[0])
     assert np.hypot(*seen[0][2:]) > 9.0
     assert moved[:, :2].max() < 0.1

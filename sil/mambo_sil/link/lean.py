@@ -60,6 +60,11 @@ class Lean:
         """Lean less."""
         self.against_m_s2 = math.exp(-passed_s / FADES_S) * self.against_m_s2
 
+    def turn(self, heading_rad: float) -> None:
+        """Turn with the frame, whose heading has jumped: the drone leans as before."""
+        (north, east), s, c = self.against_m_s2.tolist(), math.sin(heading_rad), math.cos(heading_rad)
+        self.against_m_s2 = np.array([c * north - s * east, s * north + c * east])
+
     def tilt_rad(self, heading_rad: float) -> FloatArray:
         """Return roll and pitch (2,) of the lean at a heading."""
         north, east = (self.against_m_s2 / GRAVITY_M_S2).tolist()

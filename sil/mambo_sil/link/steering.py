@@ -131,11 +131,12 @@ class Steering:
         return set_point
 
     def _follow_frame(self, estimate: EstimatedState) -> None:
-        """Tell the controller of a jump of the estimator."""
+        """Tell the controller of a jump of the estimator, and turn the lean with it."""
         jump = self.frame.follow(estimate)
         if jump is None:
             return
         self.controller.shift(jump.position_m, jump.velocity_m_s, jump.heading_rad)
+        self.lean.turn(jump.heading_rad)
         self._jump = jump if self._jump is None else _sum(self._jump, jump)
         if self._last is not None:
             self._last = _moved(self._last, jump)
