@@ -10,6 +10,20 @@ from mambo_codegen.settings.controller_toml import to_toml, with_option
 from tests.support.command import run, unwrapped
 
 
+HIGH = """
+import numpy as np
+from mambo_nmpc.curves import Circle
+
+
+class High(Circle):
+    def __init__(self):
+        super().__init__(1.0, 0.5)
+
+    def vertical(self, time_s):
+        return np.stack([np.full(np.shape(time_s), one) for one in (12.0, 0.0, 0.0)], axis=-1)
+"""
+
+
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_an_app_flies_an_events_file() -> None:
     """It prints measures beside bounds, and writes trace, picture and summary."""
@@ -40,6 +54,10 @@ def test_a_broken_bound_fails() -> None:
         (("--sensors", "mambo"), "--sensors mambo must be mocap or flow-deck with --app"),
         (("--trajectory", "points"), "--trajectory points must be bernoulli, gerono"),
         (("--trajectory", "points.csv"), "points.csv: cannot be read"),
+        (
+            ("--trajectory", "high.py:High"),
+            "--trajectory high.py:High: its height at 0 s, 12 m, must lie in 0.1..10 m with --app",
+        ),
         (("--events", "wrong.toml"), "heigt_m is not a key of this file; did you mean height_m?"),
         (("--events", "late.toml"), "nmpc.tild is not a parameter of this app"),
     ],
@@ -48,6 +66,7 @@ def test_a_broken_bound_fails() -> None:
 def test_what_cannot_be_flown_is_named(arguments: tuple[str, ...], message: str) -> None:
     """In one line."""
     Path("wrong.toml").write_text("heigt_m = 1.0\n", "utf-8")
+    Path("high.py").write_text(HIGH, "utf-8")
     Path("late.toml").write_text('[[event]]\nat_s = 0.5\ndo = "set"\nname = "tild"\n', "utf-8")
     _, error = run("fly", "crazyflie", "--app", "crazyflie", *arguments, code=2)
     assert message in unwrapped(error)

@@ -13,6 +13,8 @@ from mambo_sil.experiment.inputs import FileSection, read_as
 from mambo_sil.flight.names import CurveName
 from mambo_sil.flight.scenario import LONGEST_S
 
+LEAST_HEIGHT_M, MOST_HEIGHT_M = 0.1, 10.0
+
 EVENTS: Final = ShippedFiles(
     "events",
     "a shipped events file",
@@ -141,7 +143,7 @@ class EventsFile(FileSection):
     """A curve by name, or a file of waypoints or polynomial pieces, which begins where the drone is."""
     size_m: float = Field(1.0, ge=-100.0, le=100.0)
     rate_rad_s: float = Field(1.0, ge=-10.0, le=10.0)
-    height_m: float = Field(1.0, ge=0.1, le=10.0)
+    height_m: float = Field(1.0, ge=LEAST_HEIGHT_M, le=MOST_HEIGHT_M)
     duration_s: float = Field(20.0, ge=0.1, le=LONGEST_S)
     measured_from_s: float = Field(0.0, ge=0.0, le=LONGEST_S)
     drone: DroneSection = DroneSection()

@@ -86,9 +86,15 @@ def _course(course: Course) -> EventsFile:
         raise FlightError(f"--trajectory {echo(course.trajectory)} must be {CURVE_FORMS}")
     flown, _ = load_curve(course.trajectory)
     check_curve(echo(course.trajectory), flown, course.duration_s)
+    height_m = float(vertical_of(flown, np.zeros(1))[0, 0])
+    if not events_file.LEAST_HEIGHT_M <= height_m <= events_file.MOST_HEIGHT_M:
+        raise FlightError(
+            f"--trajectory {echo(course.trajectory)}: its height at 0 s, {height_m:g} m, must lie in "
+            f"{events_file.LEAST_HEIGHT_M:g}..{events_file.MOST_HEIGHT_M:g} m with --app"
+        )
     return _without_events(
         trajectory=course.trajectory,
-        height_m=float(vertical_of(flown, np.zeros(1))[0, 0]),
+        height_m=height_m,
         duration_s=course.duration_s,
         set_points={"acceleration": bool(known_of(flown))},
     )
