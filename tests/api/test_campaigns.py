@@ -184,6 +184,7 @@ def test_a_curve_of_one_s_own_is_flown_by_all() -> None:
     for name in laws:
         assert own.table[f"{name}_trace_sha256"] == named.table[f"{name}_trace_sha256"]
     assert own.table["trajectory"] == ["Circle", "Circle"]
+    assert not {"size_m", "rate_rad_s"} & own.table.keys()
     for call in (campaign, fly):
         law: Any = laws if call is campaign else laws["mpc"]
         with pytest.raises(ArgumentError, match=r"trajectory: at .* its velocity along [xy] is"):

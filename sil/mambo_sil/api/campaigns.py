@@ -25,7 +25,7 @@ from mambo_sil.experiment.campaign.campaign_flights import (
     fly_scenarios,
 )
 from mambo_sil.experiment.campaign.drawn_curves import spatial_curves
-from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw, draw
+from mambo_sil.experiment.campaign.parameters import OF_THE_CURVE, PARAMETERS, TRAJECTORY, Draw, draw
 from mambo_sil.experiment.inputs import NAME, Entrant, as_sections
 from mambo_sil.flight.controllers.own_law import Law
 from mambo_sil.flight.names import SensorsName
@@ -139,9 +139,11 @@ def campaign(
         flown = fly_scenarios(entrants, [scenario(flight, one) for one in part], curve=own)
         rows += [one | row for one, row in zip(part, flown, strict=True)]
     spatial = spatial_curves(file.flight.trajectory) if own is None else is_spatial(own)
+    parameters = list(PARAMETERS)
     if own is not None:
-        rows = [row | {"trajectory": type(own).__name__} for row in rows]
-    titles = "seed", *PARAMETERS, *columns(tuple(laws), sensed=flight["sensors"] != "true", spatial=spatial)
+        rows = [row | {TRAJECTORY: type(own).__name__} for row in rows]
+        parameters = [name for name in PARAMETERS if name == TRAJECTORY or name not in OF_THE_CURVE]
+    titles = "seed", *parameters, *columns(tuple(laws), sensed=flight["sensors"] != "true", spatial=spatial)
     failed = {name: _failures(rows, name) for name in laws}
     return CampaignFlights(
         names=tuple(laws),

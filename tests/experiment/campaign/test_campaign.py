@@ -12,8 +12,10 @@ from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, Unreadabl
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.experiment.campaign import campaign_file
+from mambo_sil.experiment.campaign.campaign_report import Drawn
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
+from mambo_sil.results.blocks import Facts
 
 ROOT = Path(__file__).parents[3]
 WIDE = Domain(-1e3, 1e3)
@@ -102,6 +104,27 @@ def test_curves_are_drawn(tmp_path: Path) -> None:
     assert max(one["yaw_rad"] for one in drawn) > 3.0 > -3.0 > min(one["yaw_rad"] for one in drawn)
     assert curves.document()["flight"]["trajectory"] == {"choice": ["circle", "step"]}
     assert plain.document()["flight"]["trajectory"] == "bernoulli"
+
+
+def test_curves_of_files_are_the_same_in_every_folder(tmp_path: Path) -> None:
+    """A campaign is known by their names and hashes; a page shows neither size nor rate of them."""
+    chosen = 'trajectory = { choice = ["a/points.csv", "b/points.csv"] }'
+    found = []
+    for folder, *ends in (("one", 1, 2), ("other", 1, 2), ("changed", 3, 2)):
+        for inner, x_m in zip(("a", "b"), ends, strict=True):
+            (tmp_path / folder / inner).mkdir(parents=True)
+            points = f"time_s,x_m,y_m\n0,0,0\n4,{x_m},0\n"
+            (tmp_path / folder / inner / "points.csv").write_text(points, "utf-8")
+        path = written(tmp_path / folder, f"[flight]\nduration_s = 5.0\n{chosen}\n")
+        found.append(campaign_file.read(path).document())
+    one, other, changed = found
+    assert one == other
+    assert one["flight"]["trajectory"] == {"choice": ["points.csv"] * 2}
+    assert one["curves"]["points.csv"][0] != changed["curves"]["points.csv"][0]
+    assert one["curves"]["points.csv"][1] == changed["curves"]["points.csv"][1]
+    (facts, *_) = Drawn.model_validate(one).shown(tmp_path, None, [], []).blocks
+    assert isinstance(facts, Facts)
+    assert facts.values["trajectory"] == "points.csv or points.csv, 5 s"
 
 
 def test_draws_are_those_of_earlier_versions() -> None:

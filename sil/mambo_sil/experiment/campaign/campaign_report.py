@@ -14,6 +14,7 @@ from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection
 from mambo_sil.experiment.campaign.campaign_file import distributions as distributions_of
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED
 from mambo_sil.experiment.campaign.campaign_records import record_name, write_records
+from mambo_sil.experiment.campaign.drawn_curves import chosen_curves
 from mambo_sil.experiment.campaign.statistics import (
     Distributions,
     Improvement,
@@ -26,6 +27,7 @@ from mambo_sil.experiment.campaign.statistics import (
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, FlightStore, convert_os_errors
 from mambo_sil.flight.names import PD_TITLES
+from mambo_sil.flight.own_curve import is_curve_file
 from mambo_sil.results.blocks import (
     Block,
     CommandResult,
@@ -73,8 +75,7 @@ class Drawn(BaseModel, extra="allow", frozen=True):
         """Return a result with what a page shows of every campaign: its parameters and distributions."""
         flight = self.flight
         facts = {
-            "trajectory": f"{flight.trajectory.text()}, {flight.size_m.text()} m, "
-            f"{flight.rate_rad_s.text()} rad/s, {flight.duration_s:g} s",
+            "trajectory": _course(flight),
             "vehicle": str(flight.vehicle),
             "sensors": str(flight.sensors),
             "seed": str(self.seed),
@@ -223,9 +224,15 @@ def _about(campaign: Campaign, flights: int) -> str:
     wind = distributions_of(flight, campaign.file.draws)["wind_speed_m_s"]
     return (
         f"{flights} random flights on drone {campaign.drone.name}, sensors {flight.sensors}: "
-        f"{flight.trajectory.text()}, {flight.size_m.text()} m, {flight.rate_rad_s.text()} rad/s, "
-        f"{flight.duration_s:g} s, wind {wind.text()} m/s"
+        f"{_course(flight)}, wind {wind.text()} m/s"
     )
+
+
+def _course(flight: FlightSection) -> str:
+    """Return what is followed, and how long; curves of files have neither size nor rate."""
+    own = all(map(is_curve_file, chosen_curves(flight.trajectory)))
+    shape = "" if own else f", {flight.size_m.text()} m, {flight.rate_rad_s.text()} rad/s"
+    return f"{flight.trajectory.text()}{shape}, {flight.duration_s:g} s"
 
 
 def _compared(found: Mapping[str, Distributions]) -> Block:

@@ -23,9 +23,17 @@ def spatial_curves(drawn: Distribution) -> bool:
 
 
 def identity_of_files(drawn: Distribution) -> dict[str, Any]:
-    """Return what identifies the files of curves, if there are any."""
-    found = {name: load_curve(name)[1] for name in chosen_curves(drawn) if is_curve_file(name)}
+    """Return what identifies the files of curves, if there are any: a name, and the hashes of its files."""
+    found = dict[str, list[str]]()
+    for name in filter(is_curve_file, chosen_curves(drawn)):
+        found.setdefault(Path(name).name, []).append(load_curve(name)[1])
     return {"curves": found} if found else {}
+
+
+def without_folders(drawn: Distribution) -> Distribution:
+    """Return the distribution with the names of files alone, which are the same wherever these are."""
+    names = tuple(Path(name).name if is_curve_file(name) else name for name in drawn.domain.names)
+    return replace(drawn, domain=replace(drawn.domain, names=names))
 
 
 def located(drawn: Distribution, duration_s: float, folder: Path, place: str) -> Distribution:
