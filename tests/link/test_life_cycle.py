@@ -1,6 +1,7 @@
 """The life of a flight without a socket: every end has its sentence."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -393,6 +394,27 @@ def test_an_estimate_that_jumps_without_a_reset_makes_it_land(
     assert flown
     assert not any(order.attitude_rad.any() for order in flown)
     assert ground.landed == f"landed: {words}; somebody else may send with its system number"
+
+
+def test_a_drone_that_climbs_stays_where_it_was_believed() -> None:
+    """The set-points until LAND have the last place and heading before an estimate that jumps by 10 m."""
+    ground = Ground(life_cycle())
+    ground.connect()
+    ground.wait(1.3)
+    ground.tell(beat(armed=True, mode=PX4.guided))
+    ground.wait(0.1, height_m=0.4)
+    assert ground.life.phase is Phase.CLIMBING
+    ground.orders.clear()
+    for _ in range(20):
+        ground.now_s += PERIOD_S
+        turned = np.array([0.0, 0.0, 1.0])
+        ground.tell(replace(estimate(ground.now_s, 0.4, north_m=10.0), attitude_rad=turned))
+    assert SetMode(PX4.land) in ground.orders
+    sent = [order for order in ground.orders if isinstance(order, SetPosition)]
+    assert len(sent) == 20
+    for order in sent:
+        np.testing.assert_array_equal(order.position_m, [0.0, 0.0, -0.4])
+        assert order.yaw_rad == 0.0
 
 
 @pytest.mark.parametrize(("resets", "jump_m"), [((255, 0), 30.0), ((None, None), 0.4)], ids=["px4", "copter"])

@@ -93,6 +93,8 @@ class LifeCycle:
         self._last_text = ""
         self._believes = True
         """Whether the drone may still be flown by the estimates."""
+        self._believed: EstimatedState | None = None
+        """The newest estimate by which it may be flown."""
         self._arm_s = self._silence_s = -math.inf
         """When the autopilot was last told to arm, and when the last silence ended."""
         self._was_armed = self._obeyed = self._is_failsafe = False
@@ -136,8 +138,8 @@ class LifeCycle:
         if is_idle or self.phase in (Phase.CONNECTING, Phase.CHECKING):
             self._finish(f"no flight: {why}", good=False)
         elif self.phase in _IN_FLIGHT and self.phase is not Phase.LANDING:
-            if self.estimate is not None:
-                height_m = float(self._place_m[2] - self.estimate.position_m[2])
+            if self._believed is not None:
+                height_m = float(self._place_m[2] - self._believed.position_m[2])
                 self._land_s = LAND_S + max(height_m, 0.0) / SLOWEST_M_S
             if self.phase is not Phase.FLYING:
                 self.hold()
@@ -145,9 +147,9 @@ class LifeCycle:
             self._why, self._good = why, good
 
     def hold(self) -> None:
-        """Leave the course, and stay where the drone is."""
-        if self.estimate is not None:
-            self.course = Place(self.estimate.position_m)
+        """Leave the course, and stay where the drone is, or was when its estimates were last believed."""
+        if self._believed is not None:
+            self.course = Place(self._believed.position_m)
 
     def stop(self, why: str) -> None:
         """Stop the motors at once, wherever the drone is."""
@@ -260,6 +262,8 @@ class LifeCycle:
         if doubt is not None and self.phase in (Phase.CLIMBING, Phase.FLYING):
             self._believes = False
             self.land(f"{doubt}; somebody else may send with its system number", good=False)
+        elif self._believes:
+            self._believed = self.estimate
 
     # What is sent.
 
@@ -367,10 +371,10 @@ class LifeCycle:
 
     def _hover_at(self, position_m: FloatArray) -> list[Order]:
         """Return the set-point of a place (3,), of an autopilot that climbs by set-points."""
-        estimate = self.estimates.take()
-        if self.stack is None or estimate is None or not self.stack.climbs_by_set_points:
+        estimate, believed = self.estimates.take(), self._believed
+        if self.stack is None or estimate is None or believed is None or not self.stack.climbs_by_set_points:
             return []
-        return [SetPosition(estimate.time_s, position_m, float(estimate.attitude_rad[2]))]
+        return [SetPosition(estimate.time_s, position_m, float(believed.attitude_rad[2]))]
 
     def _climb(self, now_s: float) -> list[Order]:
         """Let the autopilot climb; take over once it is up and at rest."""
