@@ -4,10 +4,12 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.states import TargetState
+from mambo_sil.link.lean import Lean
 from mambo_sil.link.pilot_report import write_log
 from mambo_sil.link.records import EstimatedState, SetAttitude
 from mambo_sil.link.steering import Steering, Update
@@ -61,3 +63,17 @@ def test_a_reset_of_the_heading_turns_the_lean(tmp_path: Path) -> None:
     replay = replay_log(log, {}, steering.controller.settings)
     assert replay.is_exact
     np.testing.assert_array_equal(replay.replayed_rad, replay.logged_rad)
+
+
+@pytest.mark.parametrize(
+    ("velocity_m_s", "roll_rad"),
+    [(math.nan, ROLL_RAD), (math.inf, ROLL_RAD), (0.0, math.nan), (0.0, math.pi / 2.0), (0.0, 3.0)],
+)
+def test_an_estimate_that_shows_no_push_is_left_out(velocity_m_s: float, roll_rad: float) -> None:
+    """One that is not finite, or of a drone on its side: the push is that of the others."""
+    lean = Lean(drag_1_s=0.5, most_m_s2=5.0)
+    bad = EstimatedState(0.8, np.zeros(3), np.full(3, velocity_m_s), np.array([roll_rad, PITCH_RAD, 0.3]), 0)
+    for count in range(200):
+        lean.watch(bad if count == 80 else leaning(count * PERIOD_S))
+    lean.begin(np.zeros(2))
+    np.testing.assert_allclose(lean.against_m_s2, -push_m_s2(0.3), atol=1e-9)

@@ -20,6 +20,8 @@ from mambo_sil.link.records import EstimatedState
 WATCH_S: Final = 1.0
 """Time over which the push is averaged; without as much it is not known."""
 LONGEST_GAP_S: Final = 0.5
+UPRIGHT: Final = 0.5
+"""Least share of the thrust that points up, a tilt of 60 degrees, for a push to be seen."""
 FADES_S: Final = 10.0
 """Time constant with which the lean fades."""
 
@@ -35,12 +37,16 @@ class Lean:
         self._watched_s, self._push_m_s2 = 0.0, np.zeros(2)
 
     def watch(self, estimate: EstimatedState) -> None:
-        """Take an estimate of a flight that is not the controller's."""
+        """Take an estimate of a flight that is not the controller's; leave out one that shows no push."""
+        if not np.isfinite([estimate.velocity_m_s, estimate.attitude_rad]).all():
+            return
+        down = to_world(*sine_cosine(estimate.attitude_rad), np.array([0.0, 0.0, 1.0]))
+        if down[2] < UPRIGHT:
+            return
         last, self._last = self._last, estimate
         if last is None or last.resets != estimate.resets or estimate.time_s - last.time_s > LONGEST_GAP_S:
             self._watched_s = 0.0
         elif (passed_s := estimate.time_s - last.time_s) > 0.0:
-            down = to_world(*sine_cosine(estimate.attitude_rad), np.array([0.0, 0.0, 1.0]))
             change_m_s2 = (estimate.velocity_m_s - last.velocity_m_s)[:2] / passed_s
             drag_m_s2 = self._drag_1_s * estimate.velocity_m_s[:2]
             push_m_s2 = change_m_s2 + GRAVITY_M_S2 * down[:2] / down[2] + drag_m_s2
