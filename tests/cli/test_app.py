@@ -9,7 +9,6 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from tests.support.command import run, unwrapped
 
-
 HIGH = """
 import numpy as np
 from mambo_nmpc.curves import Circle
