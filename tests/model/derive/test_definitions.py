@@ -15,7 +15,7 @@ from mambo_codegen.settings import controller_toml
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
-from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, wants_exact
+from mambo_sil.model.derive.derived_settings import BRAKING_SHARE, controller_text, derive, wants_exact
 from mambo_sil.model.derive.step_response import _answers, fit_steps
 from tests.support.derived import settings_for
 from tests.support.scenarios import changed
@@ -321,3 +321,16 @@ def test_an_estimator_that_errs_less_is_believed_sooner(
     observer = settings_for(GENERIC.model_copy(update={"sensors": sensors})).observer
     found = observer.position_noise, observer.velocity_noise, observer.disturbance_noise
     assert found == (position_m, velocity_m_s, disturbance_m_s3)
+
+
+@pytest.mark.parametrize(("error_m_s", "as_ekf2"), [(0.12, True), (0.1, False), (0.03, False)])
+def test_the_reasons_behind_an_estimator_fit_its_error(error_m_s: float, as_ekf2: bool) -> None:
+    """Decimetres a second and wind within a second are EKF2's alone; others are compared with it."""
+    sensors = AutopilotSensors(velocity_error_m_s=error_m_s)
+    found = derive(GENERIC.model_copy(update={"sensors": sensors}))
+    words = {one.key: one.reason for one in found if one.section == "observer"}
+    assert ("decimetres a second" in words["velocity_noise"]) == as_ekf2
+    assert ("within a second" in words["disturbance_noise"]) == as_ekf2
+    assert ("by centimetres" in words["position_noise"]) == as_ekf2
+    ends = [words[key].endswith("by sensors.velocity_error_m_s") for key in words if key.endswith("_noise")]
+    assert ends == [not as_ekf2] * 3
