@@ -32,7 +32,12 @@ from mambo_sil.drone.plant.rigid_body import (
 from mambo_sil.drone.plant.rotors import Rotors
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
+from mambo_sil.drone.vehicles.vehicle_sections import (
+    LONGEST_ARM_M,
+    CascadeAttitude,
+    FirstOrderAttitude,
+    MamboAttitude,
+)
 
 STEP_S: Final = NOMINAL.step_s
 """The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
@@ -41,7 +46,6 @@ Lever = tuple[PerFlight, PerFlight, PerFlight]
 
 LARGEST_LAG_S: Final = 1.0
 LARGEST_DRAG_1_S: Final = 100.0
-LARGEST_LEVER_M: Final = 1.0
 LEVER_ERRORS_M: Final = (0.05, -0.05, -0.1)
 """How far below where they are told to be sensors lie when margins and faults try it: above is negative."""
 
@@ -147,7 +151,7 @@ class Vehicle:
         require_per_flight("motor_lag_s", self.motor_lag_s, 0.0, LARGEST_LAG_S, flights)
         require_per_flight("drag_1_s", self.drag_1_s, 0.0, LARGEST_DRAG_1_S, flights)
         for along in self.lever_error_m:
-            require_per_flight("lever_error_m", along, -LARGEST_LEVER_M, LARGEST_LEVER_M, flights)
+            require_per_flight("lever_error_m", along, -LONGEST_ARM_M, LONGEST_ARM_M, flights)
 
     @classmethod
     def of(cls, drone: VehicleFile) -> "Vehicle":

@@ -208,7 +208,8 @@ def _three_arms(value: object) -> object:
     numbers = list(value) if isinstance(value, list | tuple) else []
     good = all(type(one) in (int, float) and abs(one) <= LONGEST_ARM_M for one in numbers)
     if len(numbers) != 3 or not good:
-        raise PydanticCustomError("place", "must be 3 numbers, each in -1..1, in metres")
+        limits = {"most": f"{LONGEST_ARM_M:g}"}
+        raise PydanticCustomError("place", "must be 3 numbers, each in -{most}..{most}, in metres", limits)
     return tuple(map(float, numbers))
 
 
