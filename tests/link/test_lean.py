@@ -43,7 +43,8 @@ def push_m_s2(heading_rad: float) -> FloatArray:
 def test_a_reset_of_the_heading_turns_the_lean(tmp_path: Path) -> None:
     """By 90 degrees, half a second after the take-over in wind: roll and pitch of the set-points stay.
 
-    They would move by 13 degrees if the lean stayed in the old frame. The log repeats the flight.
+    They would move by 13 degrees if the lean stayed in the old frame. The log, which has the
+    drone upright, repeats the flight.
     """
     updates = list[Update]()
     steering = Steering(controller(), updates.append)
@@ -54,6 +55,7 @@ def test_a_reset_of_the_heading_turns_the_lean(tmp_path: Path) -> None:
     for count in range(150, 250):
         jumped = count >= 200
         sent.append(steering.steer(leaning(count * PERIOD_S, 0.3 + TURN_RAD * jumped, int(jumped)), here))
+    np.testing.assert_allclose(updates[0].estimate.attitude_rad, [0.0, 0.0, 0.3], atol=1e-9)
     tilt_rad = np.array([one.attitude_rad[:2] for one in sent])
     np.testing.assert_allclose(np.diff(tilt_rad, axis=0), 0.0, atol=0.004)
     np.testing.assert_allclose(tilt_rad, [[ROLL_RAD, PITCH_RAD]] * 100, atol=0.02)

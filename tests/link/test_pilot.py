@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from mambo_sil.errors import LinkError
+from mambo_sil.link.pilot_report import PilotSummary
 from mambo_sil.link.sockets import Address, MavlinkSocket, parse_link
+from mambo_sil.results.blocks import Picture
 from tests.support.command import run, unwrapped
 from tests.support.links import write_drone
+from tests.support.results import pilot_folder
 
 
 @pytest.fixture
@@ -44,6 +47,14 @@ def test_a_simulated_flight_writes_a_log_that_replay_and_identify_read(settings:
     assert f"all {len(rows)} commands of the log are those of this controller, bit for bit" in unwrapped(said)
     said, _ = run("identify", "piloted/flight.csv", "-o", "identified")
     assert "gain 1.000" in said
+
+
+def test_the_picture_says_which_angles_it_has(tmp_path: Path) -> None:
+    """Not those of a drone in wind: the lean is taken off."""
+    pilot_folder(tmp_path)
+    summary = PilotSummary.model_validate_json((tmp_path / "summary.json").read_text("utf-8"))
+    captions = [block.caption for block in summary.result(tmp_path).blocks if isinstance(block, Picture)]
+    assert "angles, both less the lean" in captions[-1]
 
 
 @pytest.mark.usefixtures("settings")

@@ -43,7 +43,10 @@ COLUMNS: Final = (
     *("roll_command_rad", "pitch_command_rad", THRUST, THRUST_COMMAND, "status"),
     *(TAKE_OVERS, UPDATE, START_THRUST, JUMPS, *JUMP),
 )
-"""The target is the one that the controller got: off by what remains of the jumps of the estimator."""
+"""The target is the one that the controller got: off by what remains of the jumps of the estimator.
+
+Roll and pitch, measured and commanded, are less the lean against the wind at a take-over.
+"""
 SETTLES_S: Final = 5.0
 """Time after the take-over from which on errors count."""
 
@@ -89,7 +92,10 @@ class PilotSummary(ReportedSummary):
 
     def result(self, folder: Path, /) -> CommandResult:
         """Return the result of this flight; drawing raises TraceError."""
-        caption = "Path, horizontal error as estimated, height, commanded and actual angles."
+        caption = (
+            "Path, horizontal error as estimated, height, commanded and actual angles, "
+            "both less the lean against the wind at the take-over."
+        )
         blocks: list[Block] = [
             *flight_pictures(folder, {self.source: TRACE}, caption),
             ResultTable((), _rows(self) if self.set_points else []),
