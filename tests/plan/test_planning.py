@@ -1,5 +1,6 @@
 """Whole plans: flown by the drones that judge them, written as pieces, refused in words."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
 from mambo_sil.errors import ArgumentError, PlanError, TrajectoryError
 from mambo_sil.flight.polynomials import Piece, PiecesInSpace, read_course
 from mambo_sil.plan.course import course_of
+from mambo_sil.plan.heading import headings_of
 from mambo_sil.plan.limits import FlightLimit, figures_of, limits_of
 from mambo_sil.plan.plan_flight import Drones, Waiting, _crossed_m, _nearest_m
 from mambo_sil.plan.planning import _Search
@@ -77,6 +79,14 @@ def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
     run(*flown, "--no-pictures", "-o", str(tmp_path / "flown"))
 
 
+@pytest.mark.parametrize("there", ["lap.csv", "lap.png", "lap.svg"])
+def test_what_is_there_already_is_refused_before_the_search(tmp_path: Path, there: str) -> None:
+    """Pieces and pictures: even points that cannot be planned are not read."""
+    (tmp_path / there).touch()
+    _, refused = run("plan", str(tmp_path / "none.csv"), "-o", str(tmp_path / "lap.csv"), code=2)
+    assert f"{there}: already exists" in refused
+
+
 def test_times_that_are_too_short_name_point_limit_and_rate() -> None:
     """Where, when, which limit, by how much; the rate that is offered does it."""
     points = [PlanPoint(*place, time_s=time_s) for place, time_s in zip(POINTS, (0.0, 0.5, 1.0), strict=True)]
@@ -107,8 +117,49 @@ def test_a_tolerance_below_the_noise_is_refused_with_one_that_would_do() -> None
 def test_a_turn_that_is_too_quick_is_refused() -> None:
     """The heading may turn by 4 rad/s at most."""
     points = [PlanPoint(0, 0, 1, time_s=0.0, yaw_rad=0.0), PlanPoint(0.3, 0, 1, time_s=1.2, yaw_rad=3.0)]
-    with pytest.raises(TrajectoryError, match=r"points 1 to 2: a turn by 3\.00 rad in 1\.20 s"):
-        plan(points, Vehicle.from_preset("crazyflie"), drones=1)
+    vehicle = Vehicle.from_preset("crazyflie")
+    with pytest.raises(TrajectoryError, match=r"points 1 to 2: a turn by 3\.00 rad in 1\.20 s") as raised:
+        plan(points, vehicle, drones=1)
+    offered = re.search(r"--rate (0\.\d+) would do", str(raised.value))
+    assert offered is not None
+    assert "have headings" in repr(plan(points, vehicle, drones=1, rate=float(offered[1])))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ((None, 1.0, None), (1.0, 1.0, 1.0, 1.0)),
+        ((None, 1.0, 2.0), (2.0, 1.0, 2.0, 2.0)),
+        ((0.5, None, 6.5), (0.5, 0.5, 6.5 - math.tau, 0.5)),
+        ((0.0, 2.0, 4.0), (0.0, 2.0, 4.0, math.tau)),
+        ((None, None, None), (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_lap_ends_with_the_heading_it_began_with(
+    given: tuple[float | None, ...], expected: tuple[float, ...]
+) -> None:
+    """A point without a heading keeps the last one, in a closed lap point 1 too; whole turns count."""
+    points = [PlanPoint(*place, yaw_rad=yaw_rad) for place, yaw_rad in zip(POINTS, given, strict=True)]
+    course = course_of(points, closed=True).slower(0.5)
+    found = headings_of(points, course)
+    np.testing.assert_allclose(found[:, 0], expected[:-1])
+    powers = course.duration_s[:, np.newaxis] ** np.arange(8)
+    np.testing.assert_allclose(np.sum(found * powers, axis=1), expected[1:], atol=1e-9)
+
+
+def test_a_heading_of_an_open_course_begins_at_0() -> None:
+    """It turns on the way to the first point that has one."""
+    points = [PlanPoint(0, 0, 1), PlanPoint(3, 0, 1, yaw_rad=1.0)]
+    assert headings_of(points, course_of(points, closed=False))[0, 0] == 0.0
+
+
+def test_a_lap_returns_to_point_1_in_words() -> None:
+    """The last piece of a closed lap ends at point 1, not at one more."""
+    course = course_of([PlanPoint(*place) for place in POINTS], closed=True)
+    assert [course.choice.point_of(knot) for knot in range(4)] == [1, 2, 3, 1]
+    turning = [PlanPoint(*place, yaw_rad=3.0 * (k == 0)) for k, place in enumerate(POINTS)]
+    with pytest.raises(TrajectoryError, match=r"points 3 to 1: a turn by 3\.00 rad.*--rate 0\.\d\d would do"):
+        headings_of(turning, replace(course, duration_s=np.array([2.0, 2.0, 0.5])))
 
 
 def test_what_is_no_point_is_refused() -> None:

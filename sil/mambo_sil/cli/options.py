@@ -132,22 +132,28 @@ def write_file(text: str, output: Path, *, force: bool) -> bool:
 
     Raises FileExistsRefusedError unless `force`, UnwritableError.
     """
+    require_free(output, force=force)
     if str(output) == "-":
         typer.echo(text, nl=False)
         return False
+    try:
+        put(Path(os.path.realpath(output)), text.encode())
+    except OSError as error:
+        raise UnwritableError(f"{echo(str(output))}: cannot be written: {error.strerror}") from error
+    return True
+
+
+def require_free(output: Path, *, force: bool) -> None:
+    """Raise what `write_file` would for what is there already; called before long work."""
+    if str(output) == "-":
+        return
     name = echo(str(output))
-    place = Path(os.path.realpath(output))
     if obstacle := find_obstacle(output):
         raise UnwritableError(f"{name}: is {obstacle}, not a file; name one, or print to stdout with -o -")
-    try:
-        if os.path.lexists(output) and not force:
-            raise FileExistsRefusedError(
-                f"{name}: already exists; name another with -o, or overwrite it with --force"
-            )
-        put(place, text.encode())
-    except OSError as error:
-        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
-    return True
+    if os.path.lexists(output) and not force:
+        raise FileExistsRefusedError(
+            f"{name}: already exists; name another with -o, or overwrite it with --force"
+        )
 
 
 def load(source: str, scalar: str | None) -> "Settings":

@@ -1,1 +1,8 @@
 """Plan laps: from points to polynomial pieces that a drone and its controller can follow."""
+
+from typing import Final
+
+LEAST_RATE: Final = 0.05
+"""Least speed over that of the quickest plan."""
+MOST_DRONES: Final = 1000
+"""Drawn ones that fly a plan."""

@@ -61,6 +61,10 @@ class Choice:
             owner[-1] = 0
         return owner
 
+    def point_of(self, knot: int) -> int:
+        """Return the number of a knot's point, from 1 on."""
+        return int(self.owner[knot]) + 1
+
     @cached_property
     def beside(self) -> FloatArray:
         """Weights (n + 1, n) of the pieces in the time of a knot, a geometric mean."""

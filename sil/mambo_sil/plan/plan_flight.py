@@ -186,7 +186,7 @@ def _off_m(
         near_s = min(LATE_S, *(0.5 * course.duration_s[knot - 1 : knot + 1]))
         first, last = np.searchsorted(trace.time_s, [times_s[knot] - near_s, times_s[knot] + near_s])
         part = path_m[max(first - 1, 0) : last + 1]
-        point = points[knot % len(points)]
+        point = points[course.choice.point_of(knot) - 1]
         place = part - np.array(point.position_m[:axes])
         stops = knot == course.choice.count and not course.choice.closed
         if point.normal is None or stops:

@@ -30,8 +30,9 @@ def draw_plan(planned: Planned, stem: Path) -> tuple[Path, Path]:
         lines = _coloured(plan, -position_m[..., 1], position_m[..., 0], share)
         _coloured(height, time_s, position_m[..., 2], share)
         for knot in range(len(since_s)):
-            point = planned.points[knot % len(planned.points)]
-            _mark(plan, point, knot)
+            number = course.choice.point_of(knot)
+            point = planned.points[number - 1]
+            _mark(plan, point, number)
             height.plot(since_s[knot], point.z_m, "o", color=INK, markersize=2.0)
         plan.set(xlabel="- y (right), m", ylabel="x (ahead), m", aspect="equal", adjustable="datalim")
         height.set(xlabel="time, s", ylabel="height, m")
@@ -52,7 +53,7 @@ def _coloured(axes: Any, x: FloatArray, y: FloatArray, share: FloatArray) -> Lin
     return lines
 
 
-def _mark(axes: Any, point: Any, knot: int) -> None:
+def _mark(axes: Any, point: Any, number: int) -> None:
     """Draw a point from above: its number, and its sphere or gate."""
     if point.normal is None:
         turn = np.linspace(0.0, 2.0 * np.pi, 40)
@@ -68,4 +69,4 @@ def _mark(axes: Any, point: Any, knot: int) -> None:
         half = 0.5 * (point.width_m or 0.0)
         ends = np.array([[point.x_m, point.y_m]] * 2) + np.outer([-half, half], [-along[1], along[0]])
         axes.plot(-ends[:, 1], ends[:, 0], color=QUIET, linewidth=2.0 * THIN)
-    axes.annotate(str(knot + 1), (-point.y_m, point.x_m), xytext=(3, 3), textcoords="offset points")
+    axes.annotate(str(number), (-point.y_m, point.x_m), xytext=(3, 3), textcoords="offset points")

@@ -5,9 +5,11 @@ from typing import Final
 
 import numpy as np
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.polynomials import COLUMNS
 from mambo_sil.plan.hermite import pieces_of
+from mambo_sil.plan.plan_flight import judged_of
 from mambo_sil.plan.planning import Planned, shares_of
 from mambo_sil.results.blocks import Block, CommandResult, ResultTable, Sentence
 from mambo_sil.results.number_format import distance
@@ -48,6 +50,7 @@ class PlanSummary(Summary):
     missed_most: int
     allowed_there_m: Number
     height_judged: bool
+    headings: bool
     largest_error_m: Number
     largest_tilt_rad: Number
     largest_thrust_weights: Number
@@ -65,7 +68,7 @@ class PlanSummary(Summary):
             f"largest tilt {self.largest_tilt_rad:.2f} rad, "
             f"largest thrust {self.largest_thrust_weights:.2f} weights"
         )
-        blocks: list[Block] = [Sentence(used), *self._binding(), *self._memory()]
+        blocks: list[Block] = [Sentence(used), *self._binding(), *self._memory(), *self._headings()]
         if not self.height_judged:
             blocks.insert(1, Sentence("heights are not judged: the settings have no [height]"))
         return CommandResult(
@@ -81,7 +84,7 @@ class PlanSummary(Summary):
         if len(self.pieces) <= MOST_ROWS:
             rows = [
                 (
-                    f"{piece.number} to {piece.number + 1}",
+                    f"{piece.number} to {piece.number % self.points + 1}",
                     f"{piece.duration_s:.2f}",
                     piece.binding,
                     f"{100 * piece.share:.0f} %",
@@ -95,6 +98,16 @@ class PlanSummary(Summary):
                 counted[piece.binding] = counted.get(piece.binding, 0) + 1
         words = ", ".join(f"{name} in {count}" for name, count in counted.items()) or "none"
         return [Sentence(f"limits that bind, of {len(self.pieces)} pieces: {words}")]
+
+    def _headings(self) -> list[Block]:
+        if not self.headings:
+            return []
+        return [
+            Sentence(
+                "the pieces have headings, which a Crazyflie's fly.py flies; `fly` and `pilot` refuse them: "
+                "leave yaw out for these"
+            )
+        ]
 
     def _memory(self) -> list[Block]:
         if len(self.pieces) <= COMMANDER_PIECES:
@@ -115,7 +128,7 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
     worst = int(np.nanargmax(over_m))
     names = [limit.name for limit in planned.limits]
     misses = flown.misses(planned.reach_m)
-    weights = flown.thrust_m_s2 * drone.thrust_gain / 9.81
+    weights = flown.thrust_m_s2 * drone.thrust_gain / GRAVITY_M_S2
     return PlanSummary(
         vehicle=drone.name,
         points=len(planned.points),
@@ -125,9 +138,10 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
         flown=len(misses),
         passed=int((~misses).sum()),
         largest_miss_m=float(flown.off_m[:, worst].max()),
-        missed_most=(worst + 1) % len(planned.points) + 1,
+        missed_most=course.choice.point_of(judged_of(course)[worst]),
         allowed_there_m=float(planned.reach_m[worst]),
         height_judged=planned.height_judged,
+        headings=bool(planned.yaw.any()),
         largest_error_m=float(flown.error_m.max()),
         largest_tilt_rad=float(flown.tilt_rad.max()),
         largest_thrust_weights=float(weights.max()),

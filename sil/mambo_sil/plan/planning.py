@@ -19,7 +19,7 @@ from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import PlanError
 from mambo_sil.model.derive.derived_flight import chosen_text
 from mambo_sil.plan.course import PlannedCourse, course_of
-from mambo_sil.plan.heading import headings_of
+from mambo_sil.plan.heading import first_heading, headings_of
 from mambo_sil.plan.hermite import motion
 from mambo_sil.plan.limits import FlightLimit, figures_of, limits_of
 from mambo_sil.plan.plan_flight import Drones, FlownPlan, judged_of
@@ -73,7 +73,7 @@ class Planned:
 
 def reach_of(points: Sequence[PlanPoint], course: PlannedCourse) -> FloatArray:
     """Return how far from each judged point a drone may pass (p,)."""
-    return np.array([points[knot % len(points)].reach_m for knot in judged_of(course)])
+    return np.array([points[course.choice.point_of(knot) - 1].reach_m for knot in judged_of(course)])
 
 
 def shares_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
@@ -119,7 +119,7 @@ def make_plan(
         if rate < 1.0:
             course = course.slower(rate)
             flown = search.fly(course)
-    yaw = headings_of(points, course.duration_s, closed=closed)
+    yaw = headings_of(points, course, rate)
     return Planned(
         tuple(points), course, limits_of(figures, share), share, flown, yaw, settings.height is not None
     )
@@ -134,7 +134,7 @@ class _Search:
     progress: Progress
 
     def fly(self, course: PlannedCourse) -> FlownPlan:
-        return self.drones.fly(course, self.points, self.points[0].yaw_rad or 0.0)
+        return self.drones.fly(course, self.points, first_heading(self.points, closed=course.choice.closed))
 
     def quickest(
         self, limits_at: Callable[[float], list[FlightLimit]]
@@ -183,8 +183,8 @@ def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
         return _passed_words(course, limits, over)
     passed = passed_at_knots(course).max(axis=0)
     if passed.max() > 3.0 * HELD:
-        knot = int(passed.argmax())
-        return f"point {knot + 1}: is not reached within the limits; a wider tolerance would do"
+        number = course.choice.point_of(int(passed.argmax()))
+        return f"point {number}: is not reached within the limits; a wider tolerance would do"
     return ""
 
 
@@ -239,12 +239,12 @@ def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: Fl
     limit, piece, sample = (int(one) for one in np.unravel_index(over.argmax(), over.shape))
     tau = DENSE[sample]
     time_s = course.duration_s[:piece].sum() + tau * course.duration_s[piece]
-    name = limits[limit].name
+    name, point_of = limits[limit].name, course.choice.point_of
     amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * limits[limit].scale * over.max():.0f} %"
-    where = f"between points {piece + 1} and {(piece + 1) % len(course.choice.place_m) + 1}"
+    where = f"between points {point_of(piece)} and {point_of(piece + 1)}"
     for knot, near in ((piece, tau < 0.1), (piece + 1, tau > 0.9)):
         if near:
-            where = f"at point {knot + 1}"
+            where = f"at point {point_of(knot)}"
     return f"{where}, {time_s:.2f} s after the start: passes the limit of {name} by {amount}"
 
 
@@ -256,14 +256,14 @@ def _missed_words(
     over_m = (off_m - SURE * reach_m).max(axis=0)
     worst = int(over_m.argmax())
     missed = int(flown.misses(SURE * reach_m).sum())
-    point = judged_of(course)[worst] % len(points) + 1
+    point = course.choice.point_of(judged_of(course)[worst])
     if flown.crashed.any():
         crashed = int(flown.crashed.sum())
         return (
             f"{crashed} of {len(flown.crashed)} drones crash on the slowest plan; a point higher up would do"
         )
     far_m = float(off_m[:, worst].max())
-    kind = "width" if points[point - 1].normal else "tolerance"
+    kind = "width" if points[point - 1].normal is not None else "tolerance"
     wanted_m = far_m / SURE * (2.0 if kind == "width" else 1.0)
     return (
         f"point {point}: {missed} of {len(flown.crashed)} drones pass it up to {far_m:.3f} m away on a "

@@ -9,6 +9,7 @@ from mambo_sil.arguments import is_whole, require, require_kind, require_number
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.polynomials import PiecesInSpace
+from mambo_sil.plan import LEAST_RATE, MOST_DRONES
 from mambo_sil.plan.hermite import pieces_of
 from mambo_sil.plan.plan_plots import draw_plan
 from mambo_sil.plan.plan_report import PlanSummary, csv_text, summary_of
@@ -17,14 +18,12 @@ from mambo_sil.plan.points import PlanPoint, check_points, read_points
 from mambo_sil.plan.solver import silent
 from mambo_sil.results.terminal import result_text
 
-LEAST_RATE, MOST_DRONES = 0.05, 1000
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A course through points, and how drones have flown it; `print` shows that.
 
-    curve:   polynomial pieces; `fly` and adapters fly them.
+    curve:   polynomial pieces, without headings; `fly` and adapters fly them.
     summary: time, distances, limits and flights.
     """
 

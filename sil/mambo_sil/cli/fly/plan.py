@@ -13,10 +13,12 @@ from mambo_sil.cli.options import (
     complete_presets,
     load_drone,
     output_option,
+    require_free,
     show,
     write_file,
 )
 from mambo_sil.cli.progress import progress_bar
+from mambo_sil.plan import LEAST_RATE, MOST_DRONES
 
 
 def plan(
@@ -41,14 +43,17 @@ def plan(
     ] = Path("lap.csv"),
     force: Overwrite = False,
     closed: Annotated[
-        bool, typer.Option("--closed", help="Return to the first point, in a lap that repeats.", metavar="")
+        bool, typer.Option("--closed", help="Return to the first point, in a lap that repeats.")
     ] = False,
     rate: Annotated[
-        float, typer.Option(help="Speed over that of the quickest plan.", min=0.05, max=1.0, metavar="SHARE")
+        float,
+        typer.Option(help="Speed over that of the quickest plan.", min=LEAST_RATE, max=1.0, metavar="SHARE"),
     ] = 1.0,
     drones: Annotated[
         int,
-        typer.Option(help="How many drones are drawn, and fly the plan too.", min=1, max=1000, metavar="N"),
+        typer.Option(
+            help="How many drones are drawn, and fly the plan too.", min=1, max=MOST_DRONES, metavar="N"
+        ),
     ] = 20,
     as_json: AsJson = False,
 ) -> None:
@@ -64,6 +69,9 @@ def plan(
 
     drone = load_drone(vehicle, *([] if controller is None else [controller]))
     chosen = None if controller is None else Controller(presets.load(controller))
+    pictures = () if str(output) == "-" else (output.with_suffix(".png"), output.with_suffix(".svg"))
+    for path in (output, *pictures):
+        require_free(path, force=force)
     with progress_bar("planning") as bar:
 
         def progress(stage: str, share: float) -> None:
@@ -73,9 +81,9 @@ def plan(
         made = make(
             points, Vehicle.of(drone), chosen, closed=closed, rate=rate, drones=drones, progress=progress
         )
-        written = write_file(made.text, output, force=force)
-        pictures = made.draw(output.with_suffix("")) if written else ()
-    if written:
+        if write_file(made.text, output, force=force):
+            made.draw(output)
+    if pictures:
         names = ", ".join(echo(str(path)) for path in (output, *pictures))
         typer.echo(f"wrote {names}", err=True)
     show(made.summary, result_text(made.summary.result()), as_json=as_json)
