@@ -24,12 +24,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import ArgumentError, FlightError
 from mambo_sil.experiment.campaign.distributions import Distribution, parse
-from mambo_sil.experiment.campaign.drawn_curves import (
-    identity_of_files,
-    located,
-    spatial_curves,
-    without_folders,
-)
+from mambo_sil.experiment.campaign.drawn_curves import located, spatial_curves, with_files
 from mambo_sil.experiment.campaign.parameters import (
     OF_THE_CURVE,
     PARAMETERS,
@@ -143,14 +138,12 @@ class Campaign:
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines the result, as plain values."""
-        drawn = self.file.flight.trajectory
-        flight = self.file.flight.model_copy(update={"trajectory": without_folders(drawn)})
-        document: dict[str, Any] = self.file.model_copy(update={"flight": flight}).model_dump(mode="json")
+        document: dict[str, Any] = self.file.model_dump(mode="json")
         controllers = [entrant.document() for entrant in self.entrants]
         for one in controllers:
             one.get("law", {}).pop("named", None)  # the same wherever its file is
         files = {"controllers": controllers, "vehicle": self.drone.model_dump()}
-        return document | files | identity_of_files(drawn)
+        return with_files(document | files, self.file.flight.trajectory)
 
     def places(self) -> dict[str, Any]:
         """Return where the files of laws are, by the names of the controllers."""

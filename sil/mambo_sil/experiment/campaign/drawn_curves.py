@@ -22,18 +22,16 @@ def spatial_curves(drawn: Distribution) -> bool:
     return any(is_spatial(curve_named(name, 1.0, 1.0)) for name in chosen_curves(drawn))
 
 
-def identity_of_files(drawn: Distribution) -> dict[str, Any]:
-    """Return what identifies the files of curves, if there are any: a name, and the hashes of its files."""
+def with_files(document: dict[str, Any], drawn: Distribution) -> dict[str, Any]:
+    """Return what determines flights, the files of curves by name and hashes: the same in every folder."""
     found = dict[str, list[str]]()
     for name in filter(is_curve_file, chosen_curves(drawn)):
         found.setdefault(Path(name).name, []).append(load_curve(name)[1])
-    return {"curves": found} if found else {}
-
-
-def without_folders(drawn: Distribution) -> Distribution:
-    """Return the distribution with the names of files alone, which are the same wherever these are."""
+    if not found:
+        return document
     names = tuple(Path(name).name if is_curve_file(name) else name for name in drawn.domain.names)
-    return replace(drawn, domain=replace(drawn.domain, names=names))
+    written = replace(drawn, domain=replace(drawn.domain, names=names)).document()
+    return document | {"flight": document["flight"] | {"trajectory": written}, "curves": found}
 
 
 def located(drawn: Distribution, duration_s: float, folder: Path, place: str) -> Distribution:

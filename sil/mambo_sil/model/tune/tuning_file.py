@@ -21,7 +21,7 @@ from mambo_sil.experiment.campaign.campaign_file import (
     load_its_drone,
 )
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
-from mambo_sil.experiment.campaign.drawn_curves import identity_of_files
+from mambo_sil.experiment.campaign.drawn_curves import with_files
 from mambo_sil.experiment.campaign.parameters import Draw, draw
 from mambo_sil.experiment.inputs import FileSection, format_value, load_settings, read_as
 
@@ -117,12 +117,8 @@ class Tuning:
         """Return everything that determines the trials, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
         search = {path: distribution.document() for path, distribution in self.search.items()}
-        return document | {
-            "base": self.base.model_dump(),
-            "search": search,
-            "vehicle": self.drone.model_dump(),
-            **identity_of_files(self.file.flight.trajectory),
-        }
+        found = {"base": self.base.model_dump(), "search": search, "vehicle": self.drone.model_dump()}
+        return with_files(document | found, self.file.flight.trajectory)
 
 
 def round_value(value: float) -> float:
