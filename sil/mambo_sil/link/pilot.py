@@ -118,7 +118,10 @@ class Pilot:
         return arrival.is_at(self.life.estimate)
 
     def fly(self, curve: Trajectory, duration_s: float) -> None:
-        """Fly a curve of `mambo_nmpc.curves`, moved to begin where the drone is; begin and end softly."""
+        """Fly a curve of `mambo_nmpc.curves`, moved to begin where the drone is.
+
+        It begins and ends softly; a plan from rest to rest is flown in its own time.
+        """
         require_number("duration_s", duration_s, 0.1, LONGEST_S)
         self._fly(Along(curve, self._target_m, duration_s), lambda: self.life.is_course_over)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from mambo_sil.link.links import UdpLink
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.steering import Update
+
+HEIGHT_M: Final = 1.5
 
 
 def pilot(
@@ -43,8 +45,13 @@ def pilot(
     rate_rad_s: CurveRate = None,
     duration_s: CurveTime = 30.0,
     height_m: Annotated[
-        float, typer.Option(help="Height above the place of take-off, in m.", metavar="M")
-    ] = 1.5,
+        float | None,
+        typer.Option(
+            help="Height above the place of take-off, in m; by default 1.5, or that at which a curve with "
+            "heights begins.",
+            metavar="M",
+        ),
+    ] = None,
     farthest_m: Annotated[
         float,
         typer.Option(help="Land if the target is farther from the drone than this, in m.", metavar="M"),
@@ -61,11 +68,14 @@ def pilot(
     from mambo_sil.api.api_controller import Controller
     from mambo_sil.cli.fly.one_flight import curve_of
     from mambo_sil.flight.traces import write_npz
+    from mambo_sil.flight.trajectories import is_spatial, vertical_of
     from mambo_sil.link.pilot import Pilot
     from mambo_sil.link.pilot_report import LOG, PICTURES, TRACE, PilotSummary, trace_of, write_log
 
     settings = load(source, scalar)
     curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
+    if height_m is None:
+        height_m = float(vertical_of(curve, 0.0)[0]) if is_spatial(curve) else HEIGHT_M
     open_link = _opener(source, link, simulate, vehicle, key)
     updates: list[Update] = []
     files = (LOG, TRACE, *PICTURES)
