@@ -72,6 +72,8 @@ def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
     assert "crazyflie: 5.00 s through 3 points" in printed
     assert "lap.png" in said
     assert (tmp_path / "lap.png").is_file()
+    title = "crazyflie: 5.00 s through 3 points; 3 of 3 drones fly it through all points"
+    assert title in (tmp_path / "lap.svg").read_text("utf-8")
     assert len(lap.read_text("utf-8").splitlines()) == 3
     _, refused = run(*arguments, "-o", str(lap), code=2)
     assert "already exists" in refused

@@ -16,7 +16,7 @@ from mambo_sil.results.style import BROAD, INK, PAGE_INCHES, QUIET, THIN, style
 COLOURS: Final = "viridis"
 
 
-def draw_plan(planned: Planned, stem: Path) -> tuple[Path, Path]:
+def draw_plan(planned: Planned, title: str, stem: Path) -> tuple[Path, Path]:
     """Draw where a plan goes and what it takes of its limits; writes stem.png and stem.svg."""
     course = planned.course
     position_m = motion(course.knots, course.duration_s, DENSE)[0]
@@ -26,18 +26,19 @@ def draw_plan(planned: Planned, stem: Path) -> tuple[Path, Path]:
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 0.5 * PAGE_INCHES), layout="constrained")
         plan, height = figure.subplots(1, 2)
-        # x ahead is up, y to the left is left: as seen by who stands behind the start.
-        lines = _coloured(plan, -position_m[..., 1], position_m[..., 0], share)
+        lines = _coloured(plan, position_m[..., 1], position_m[..., 0], share)
         _coloured(height, time_s, position_m[..., 2], share)
         for knot in range(len(since_s)):
             number = course.choice.point_of(knot)
             point = planned.points[number - 1]
             _mark(plan, point, number)
             height.plot(since_s[knot], point.z_m, "o", color=INK, markersize=2.0)
-        plan.set(xlabel="- y (right), m", ylabel="x (ahead), m", aspect="equal", adjustable="datalim")
+        plan.set(xlabel="y (to the left), m", ylabel="x (ahead), m", aspect="equal", adjustable="datalim")
         height.set(xlabel="time, s", ylabel="height, m")
         for axes in (plan, height):
             axes.autoscale_view()
+        plan.invert_xaxis()  # x ahead is up, y to the left is left: as seen by who stands behind the start
+        figure.suptitle(title, parse_math=False)
         figure.colorbar(lines, ax=height, label="largest share of a limit")
         return save(figure, stem)
 
@@ -58,7 +59,7 @@ def _mark(axes: Any, point: Any, number: int) -> None:
     if point.normal is None:
         turn = np.linspace(0.0, 2.0 * np.pi, 40)
         axes.plot(
-            -point.y_m + point.tolerance_m * np.cos(turn),
+            point.y_m + point.tolerance_m * np.cos(turn),
             point.x_m + point.tolerance_m * np.sin(turn),
             color=QUIET,
             linewidth=THIN,
@@ -68,5 +69,5 @@ def _mark(axes: Any, point: Any, number: int) -> None:
         along = np.array([1.0, 0.0]) if not along.any() else along / np.linalg.norm(along)
         half = 0.5 * (point.width_m or 0.0)
         ends = np.array([[point.x_m, point.y_m]] * 2) + np.outer([-half, half], [-along[1], along[0]])
-        axes.plot(-ends[:, 1], ends[:, 0], color=QUIET, linewidth=2.0 * THIN)
-    axes.annotate(str(number), (-point.y_m, point.x_m), xytext=(3, 3), textcoords="offset points")
+        axes.plot(ends[:, 1], ends[:, 0], color=QUIET, linewidth=2.0 * THIN)
+    axes.annotate(str(number), (point.y_m, point.x_m), xytext=(4, 4), textcoords="offset points")

@@ -56,9 +56,21 @@ class PlanSummary(Summary):
     largest_thrust_weights: Number
     pieces: list[PieceSummary]
 
+    @property
+    def title(self) -> str:
+        """What its picture says."""
+        return f"{self.vehicle}: {self._lap}; {self._verdict}"
+
+    @property
+    def _lap(self) -> str:
+        return f"{self.time_s:.2f} s through {self.points} points"
+
+    @property
+    def _verdict(self) -> str:
+        return f"{self.passed} of {self.flown} drones fly it through all points"
+
     def result(self) -> CommandResult:
         """Return what the console shows."""
-        verdict = f"{self.passed} of {self.flown} drones fly it through all points"
         miss = (
             f"farthest {distance(self.largest_miss_m)} at point {self.missed_most}, where "
             f"{distance(self.allowed_there_m)} are allowed"
@@ -74,7 +86,7 @@ class PlanSummary(Summary):
         return CommandResult(
             "Plan",
             self.good,
-            (f"{self.time_s:.2f} s through {self.points} points", verdict, miss),
+            (self._lap, self._verdict, miss),
             blocks,
             self.vehicle,
         )

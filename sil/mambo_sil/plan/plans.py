@@ -42,7 +42,7 @@ class Plan:
 
     def draw(self, stem: Path) -> tuple[Path, Path]:
         """Draw path, height and shares of the limits; writes stem.png and stem.svg."""
-        return draw_plan(self._planned, stem)
+        return draw_plan(self._planned, self.summary.title, stem)
 
 
 def plan(
