@@ -72,21 +72,27 @@ def playground(
         "play.html"
     ),
     vehicle: Drone = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(help="File of `plan` that the target follows at first.", metavar="FILE"),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Write an HTML page, without network, in which the generated C flies a simulated drone in real time.
 
     To see how controllers fly before you read a figure.
     """
+    from mambo_sil.flight.polynomials import PiecesInSpace
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
     from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.results.html_page import new_page
 
     chosen = sources or DEFAULTS
     found, drone = page_controllers(chosen), load_drone(vehicle, *chosen)
+    course = None if plan is None else PiecesInSpace.read(plan)
     with new_page(output, "page") as write:
         with progress_bar("compiling") as bar:
-            text, flown = playground_page(found, drone, bar)
+            text, flown = playground_page(found, drone, bar, course)
         size = write(text)
     summary = PlaygroundSummary(page=str(output), bytes=size, vehicle=drone, controllers=flown)
     names = ", ".join(one.title for one in found)

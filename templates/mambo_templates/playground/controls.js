@@ -68,7 +68,7 @@ class Controls {
       document.querySelector(`output[for="${dial.key}"]`).textContent = words;
     });
     this.rows.forEach((row, index) => { row.querySelector("input").checked = world.drones[index].shown; });
-    if (world.data.spatial) find("heights").parentElement.hidden = !world.target.swing;
+    if (world.data.spatial) find("heights").parentElement.hidden = !world.target.swing && world.target.kind !== "plan";
     this.fenceButton();
     this.numbers();
   }

@@ -62,7 +62,8 @@ class Field {
 
   /* The target with its trail and the place that it glides to, and the fence. */
   aims(context, palette, rows) {
-    const now = rows.at(-1), { target, fence } = this.world, corners = this.corners ?? (fence && [fence.slice(0, 2), fence.slice(2)]);
+    const now = rows.at(-1), { target, fence, data: { plan } } = this.world, corners = this.corners ?? (fence && [fence.slice(0, 2), fence.slice(2)]);
+    if (target.kind === "plan") this.stroke(context, plan.path, palette.quiet, 1.5, [2, 6]);
     this.stroke(context, rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
     if (corners) {

@@ -1,4 +1,4 @@
-/* The target, with its height: on a curve, or where it was dragged: far away at once, else with a speed and an acceleration that drones have. */
+/* The target, with its height: on a curve, on a plan, or where it was dragged: far away at once, else with a speed and an acceleration that drones have. */
 const SPEED_M_S = 2, ACCELERATION_M_S2 = 2.5, APPROACH_1_S = 1.25, ADJUST_1_S = 5, REACH_M = 30, FAR_M = 4;
 
 /* Shortens a vector to a length; without Math.hypot, which may differ between browsers. */
@@ -10,7 +10,7 @@ function atMost(length, [x, y]) {
 class Target {
   /* The curves are computed in the module of a drone. Its height swings about `height` by `swing`, in m. */
   constructor(drone, data) {
-    Object.assign(this, { drone, data, kind: "eight", goal: [0, 0], height: data.height_m, swing: 0, haste: 1, lead: 0 });
+    Object.assign(this, { drone, data, kind: data.first, goal: [0, 0], height: data.height_m, swing: 0, haste: 1, lead: 0 });
     this.now = new Float64Array(data.columns.target);
   }
 
@@ -24,13 +24,15 @@ class Target {
 
   /* Moves to its place at a time; on a curve it knows the acceleration ahead, where it is dragged that of now. */
   at(time) {
-    const { now, kind, data: { columns, curves, swing_rad_s, ahead_s } } = this;
-    if (kind !== "hand") {
+    const { now, kind, data: { columns, curves, swing_rad_s, ahead_s, spatial } } = this;
+    const flown = kind === "plan" ? [0, ahead_s].map((ahead) => this.planned(time + this.lead + ahead)) : null;
+    if (flown) now.set([...flown[0].slice(0, 6), ...flown[1].slice(4, 6)]);
+    else if (kind !== "hand") {
       const [size, rate] = curves[kind];
       const [place, later] = [0, ahead_s].map((ahead) => this.computed(kind, 6, size, rate * this.haste, time + this.lead + ahead));
       now.set([...place, ...later.slice(4)]);
     }
-    const [height, later] = [0, ahead_s].map((ahead) => this.computed("swing", 3, this.height, this.swing, swing_rad_s, time + ahead));
+    const [height, later] = flown && spatial ? flown.map((motion) => motion.slice(6)) : [0, ahead_s].map((ahead) => this.computed("swing", 3, this.height, this.swing, swing_rad_s, time + ahead));
     now.set([...height, later[2]], columns.level);
     now[columns.known] = kind === "hand" ? 1 : 2;
     return now;
@@ -41,6 +43,22 @@ class Target {
     const { module, curve } = this.drone;
     module.calls[`playground_${name}`](...values, curve);
     return Array.from(module.at(curve, count));
+  }
+
+  /* The plan: x, y, vx, vy, ax, ay, and height, climb and its acceleration; operation by operation Pieces of sil/mambo_sil/flight/polynomials.py. */
+  planned(time) {
+    const { ends, axes, repeats } = this.data.plan, haste = this.haste, last = ends.at(-1);
+    const clock = repeats ? haste * time % last : Math.min(haste * time, last);
+    const moves = clock < last, piece = moves ? ends.findIndex((end) => clock < end) : ends.length - 1;
+    const since = clock - (piece ? ends[piece - 1] : 0);
+    const [x, y, height] = axes.map((pieces) => [0, 1, 2].map((order) => {
+      if (order && !moves) return 0;
+      const value = pieces[piece].reduceRight((sum, coefficient, power) => {
+        return power < order ? sum : sum * since + [1, power, power * (power - 1)][order] * coefficient;
+      }, 0);
+      return haste ** order * value;
+    }));
+    return [...x.flatMap((value, order) => [value, y[order]]), ...height];
   }
 
   /* Rests at a place. */

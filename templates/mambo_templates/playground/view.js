@@ -33,6 +33,7 @@ class View {
     const { world, size } = this, now = world.history.at(-1), { target, fence } = world;
     const points = [[now[1], now[2]], [target.now[0], target.now[1]]];
     if (target.kind === "hand") points.push(target.goal);
+    if (target.kind === "plan") points.push(...world.data.plan.path);
     if (fence) points.push(fence.slice(0, 2), fence.slice(2));
     world.drones.forEach((drone, index) => {
       const first = FIRST + PER_DRONE * index;

@@ -162,11 +162,11 @@ const tiltOf = (row, drone) => {
   return Math.acos(Math.cos(roll) * Math.cos(pitch)) * 180 / Math.PI;
 };
 /* The scenario in the fragment of the address: what differs from the page's start. */
-const CURVES = ["eight", "circle", "hand"];
+const CURVES = ["plan", "eight", "circle"];
 
 function fragmentOf(world) {
   const words = new URLSearchParams(), { target, data } = world;
-  if (target.kind !== "eight") words.set("target", target.kind);
+  if (target.kind !== data.first) words.set("target", target.kind);
   if (target.kind === "hand") words.set("at", target.goal.map((value) => value.toFixed(2)).join(","));
   data.dials.forEach((dial, index) => {
     if (world.dials[index] !== dial.start) words.set(dial.key, dial.values[world.dials[index]]);
@@ -181,10 +181,11 @@ function fragmentOf(world) {
 function restore(world, fragment) {
   const words = new URLSearchParams(fragment), { target, data } = world;
   const at = (words.get("at") || "0,0").split(",").map(Number);
-  target.kind = "eight";
+  const named = words.get("target");
+  target.kind = data.first;
   target.goal = [0, 0];
-  if (words.get("target") === "hand" && at.length === 2 && at.every(Number.isFinite)) target.drag(...at);
-  else if (words.get("target") !== "hand" && CURVES.includes(words.get("target"))) target.kind = words.get("target");
+  if (named === "hand" && at.length === 2 && at.every(Number.isFinite)) target.drag(...at);
+  else if (CURVES.includes(named) && (named !== "plan" || data.plan)) target.kind = named;
   const fence = (words.get("fence") || "").split(",").map(Number), [left, top, right, bottom] = fence;
   const good = fence.length === 4 && fence.every((value) => Math.abs(value) <= MOST_VIEW_M) && left < right && top < bottom;
   world.fence = good ? fence : null;

@@ -16,12 +16,13 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.columns import LEVEL
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.height_profiles import Swing
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M, Swing
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Bernoulli, Circle, InSpace
 from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support import command
 from tests.support.browser import DESK_PX, MAMBO, ONE_NORM, PD, Browser, Page
+from tests.support.laps import write_lap
 from tests.support.tools import require
 
 pytestmark = pytest.mark.long
@@ -192,3 +193,37 @@ def test_the_curves_are_those_of_the_simulation(page: Page) -> None:
     page.find("page.world.target.swing = 0.3")
     heights = page.find(f"{times}.map((time) => [...page.world.target.at(time).slice({LEVEL.target})])")
     assert heights == swing(0.3).tolist()
+
+
+@pytest.mark.parametrize("sources", [("height.toml",), ("mambo", "pd")])
+def test_the_target_flies_a_plan(
+    sources: tuple[str, ...], tab: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the bits of the pieces, and the acceleration ahead; one that ends as it begins starts again.
+
+    In the plane alone where no controller commands the thrust.
+    """
+    require("wasm-ld", "lld")
+    monkeypatch.chdir(tmp_path)
+    if "height.toml" in sources:
+        command.run("design", "crazyflie", "-o", "height.toml")
+    lap, times = write_lap(tmp_path / "lap.csv"), [0.0, 0.01, 1.0, 1.5, 2.2, 2.99, 3.0, 40.0]
+    command.run("playground", *sources, "--vehicle", "crazyflie", "--plan", "lap.csv")
+    page = Page(tab, tmp_path / "play.html")
+    assert tab.find('document.getElementById("target").value') == "plan"
+    assert tab.find("location.hash") == ""
+    later = [time_s + AHEAD_S for time_s in times]
+    level = [lap.target(times), lap.acceleration(times), lap.acceleration(later), np.full((8, 1), 2)]
+    heights = [lap.vertical(times), lap.vertical(later)[:, 2:]]
+    if "height.toml" not in sources:
+        heights = [np.broadcast_to([HOVER_HEIGHT_M, 0.0, 0.0, 0.0], (8, 4))]
+    now = "(time) => [...page.world.target.at(time)]"
+    assert page.find(f"{times}.map({now})") == np.concatenate([*level, *heights], axis=-1).tolist()
+    page.find("page.world.begin()")
+    page.advance(4.0)
+    assert page.error_m(0) < 0.05
+    assert page.target() == pytest.approx(lap.target(4.0)[:2].tolist())
+    assert not page.find("page.world.data.plan.repeats")
+    page.find("page.world.data.plan.repeats = true")
+    assert page.find(f"({now})({lap.duration_s} + 1)") == pytest.approx(page.find(f"({now})(1)"))
+    assert tab.complaints == []

@@ -101,6 +101,13 @@ def test_what_cannot_fly_together_is_refused(sources: list[str], message: str) -
     assert not Path("play.html").exists()
 
 
+def test_what_is_no_plan_is_refused() -> None:
+    """Points that are not planned yet, with what the file must have."""
+    Path("points.csv").write_text("x,y,z\n0,0,1\n", "utf-8")
+    assert "points.csv: line 1: column duration is missing" in run("pd", "--plan", "points.csv", code=2)[1]
+    assert not Path("play.html").exists()
+
+
 @pytest.mark.parametrize(
     ("there", "message"),
     [

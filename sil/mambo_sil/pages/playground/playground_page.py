@@ -19,6 +19,7 @@ from mambo_sil.flight.engine.engine_library import ffi, record_type
 from mambo_sil.flight.engine.native import pd_function
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.polynomials import PiecesInSpace
 from mambo_sil.flight.trajectories import is_spatial
 from mambo_sil.pages.playground import bit_proof
 from mambo_sil.pages.playground.dials import Dial, dials, target_dials, weight_dial
@@ -41,6 +42,10 @@ _TRACED: Final = ("position_m", "velocity_m_s", "height_m", "climb_m_s")
 """What a trace has of a target."""
 _CIRCLE: Final = (1.2, 0.8)
 """Radius in m and rate in rad/s."""
+_DRAWN: Final = 200
+"""Places of a plan that the page draws."""
+_SAME: Final = 1e-3
+"""In m and m/s, by which the ends of a plan that repeats may differ."""
 
 
 class FlownController(BaseModel):
@@ -68,9 +73,14 @@ class PlaygroundSummary(Summary):
 
 
 def playground_page(
-    found: Sequence[PageController], drone: VehicleFile, progress: Callable[[float], None]
+    found: Sequence[PageController],
+    drone: VehicleFile,
+    progress: Callable[[float], None],
+    plan: PiecesInSpace | None = None,
 ) -> tuple[str, list[FlownController]]:
     """Return the HTML page on which the controllers fly a drone, and what it says of each.
+
+    plan: what the target follows at first; None: an eight.
 
     Raises FlightError if the drone and the update period do not fit, BuildError and CacheError.
     """
@@ -88,7 +98,9 @@ def playground_page(
         progress((number + 1) / len(found))
     sliders = _sliders(flight, found)
     context = {
-        "data": _simulation(flight) | {"drones": drones, "dials": [asdict(dial) for dial in sliders]},
+        "data": _simulation(flight)
+        | {"drones": drones, "dials": [asdict(dial) for dial in sliders]}
+        | {"plan": None if plan is None else _plan(plan), "first": "eight" if plan is None else "plan"},
         "flown": list(zip(drones, flown, strict=True)),
         "dials": sliders,
         "spatial": is_spatial(flight.trajectory),
@@ -179,6 +191,24 @@ def _simulation(flight: Flight) -> dict[str, Any]:
             "sensors": _text(read.sensors.tobytes()),
             "gusts": _text(read.gusts.tobytes()),
         },
+    }
+
+
+def _plan(plan: PiecesInSpace) -> dict[str, Any]:
+    """Return what the target reads of a plan: coefficients by axis and piece, and whether it repeats.
+
+    It does if it ends as it begins: in the same place, with the same velocity. `path` has places to draw.
+    """
+    last_s = plan.duration_s
+    first, last = (
+        np.concatenate([plan.target(time_s), plan.vertical(time_s)[:2]])
+        for time_s in (0.0, np.nextafter(last_s, 0.0))
+    )
+    return {
+        "ends": np.cumsum([piece.duration_s for piece in plan.pieces]).tolist(),
+        "axes": [[getattr(piece, axis) for piece in plan.pieces] for axis in ("north", "east", "height")],
+        "repeats": bool(np.allclose(first, last, atol=_SAME)),
+        "path": plan.target(np.linspace(0.0, last_s, _DRAWN))[:, :2].round(3).tolist(),
     }
 
 
