@@ -167,8 +167,19 @@ def test_a_lap_returns_to_point_1_in_words() -> None:
 def test_what_is_no_point_is_refused() -> None:
     """Two numbers are no point, a rate of 2 no rate."""
     vehicle = Vehicle.from_preset("crazyflie")
-    with pytest.raises(ArgumentError, match="must be a PlanPoint, or x, y and z"):
-        plan([(0.0, 1.0), (1.0, 1.0)], vehicle)  # type: ignore[list-item]
+    for points, message in (
+        ([(0.0, 1.0), (1.0, 1.0)], r"point 1 = \(0\.0, 1\.0\) must be a PlanPoint, or x, y and z"),
+        (["123", "456"], "point 1 = .*123.* must be numbers"),
+        (np.zeros(3), "point 1 = .* must be a PlanPoint, or x, y and z"),
+        (np.zeros(()), "points: ndarray must be a file, or a sequence of points"),
+        (7, "points: int must be a file, or a sequence of points"),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            plan(points, vehicle)  # type: ignore[arg-type]
+    with pytest.raises(TrajectoryError, match=r"point 2: must be 0\.01 m or more from the point before it"):
+        plan(np.zeros((2, 3)), vehicle)
+    with pytest.raises(TrajectoryError, match=r"point 3: must be 0\.01 m or more from the point before it"):
+        plan([PlanPoint(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1, 0, 1)], vehicle)
     with pytest.raises(ArgumentError, match=r"rate = 2\.0 must lie in"):
         plan(POINTS, vehicle, rate=2.0)
 

@@ -4,7 +4,9 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from mambo_sil.errors import TrajectoryError
@@ -62,6 +64,31 @@ def test_points_of_a_program_are_numbered() -> None:
     """Without a file the number of the point stands in the message."""
     with pytest.raises(TrajectoryError, match="point 2: direction must not be 0 along all axes"):
         check_points([PlanPoint(0, 0, 1), PlanPoint(1, 0, 1, direction=(0, 0, 0))])
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"x_m": "0"}, "point 1: x = '0' must be a number"),
+        ({"z_m": None}, "point 1: z = None must be a number"),
+        ({"tolerance_m": None}, "point 1: tolerance = None must be a number"),
+        ({"speed_m_s": True}, "point 1: speed = True must be a number"),
+        ({"normal": (1.0, 0.0), "width_m": 0.4}, "point 1: normal must be three numbers"),
+        ({"direction": 1.0}, "point 1: direction must be three numbers"),
+        ({"direction": ("1", 0.0, 0.0)}, "point 1: direction = '1' must be a number"),
+    ],
+)
+def test_fields_of_another_type_are_refused(fields: dict[str, Any], message: str) -> None:
+    """Text, nothing where a number is needed, and vectors of other lengths."""
+    point = PlanPoint(**({"x_m": 0.0, "y_m": 0.0, "z_m": 1.0} | fields))
+    with pytest.raises(TrajectoryError, match=re.escape(message)):
+        check_points([point, PlanPoint(1.0, 0.0, 1.0)])
+
+
+def test_arrays_are_vectors_and_their_numbers_sizes() -> None:
+    """A direction as an array, a speed from one."""
+    way: Any = np.array([1.0, 0.0, 0.0])
+    check_points([PlanPoint(0.0, 0.0, 1.0, speed_m_s=way[0], direction=way), PlanPoint(1.0, 0.0, 1.0)])
 
 
 def test_a_closed_lap_that_repeats_its_first_point_is_refused(tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def sweep(
     ],
     fit: Annotated[
         bool,
-        typer.Option("--fit", help="Print only the closest one within budget and margins.", metavar=""),
+        typer.Option("--fit", help="Print only the closest one within budget and margins."),
     ] = False,
     vehicle: Drone = None,
     output: Results = Path("sweep"),

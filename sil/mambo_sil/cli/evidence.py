@@ -135,7 +135,7 @@ def regress(
     vehicle: Drone = None,
     output: Results = Path("regress"),
     update: Annotated[
-        bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
+        bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -45,11 +45,10 @@ def margins(
         typer.Option(
             "--uncertainty",
             help="Also the drones at the ends of the intervals in the vehicle.toml, section uncertainty.",
-            metavar="",
         ),
     ] = False,
     all_figures: Annotated[
-        bool, typer.Option("--all", help="Print every figure, not the margins only.", metavar="")
+        bool, typer.Option("--all", help="Print every figure, not the margins only.")
     ] = False,
     drones: Annotated[int, typer.Option(help="Number of drones with --campaign.", min=1, max=100_000)] = 100,
     output: OptionalResults = None,

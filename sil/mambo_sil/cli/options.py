@@ -53,7 +53,7 @@ OptionalSource = Annotated[
 Scalar = Annotated[
     str | None, typer.Option(help="Scalar type of the C: float32, float64 or fixed.", metavar="TYPE")
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
 def output_option(about: str) -> Any:

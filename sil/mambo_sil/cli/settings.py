@@ -70,7 +70,7 @@ def vehicles(
     ] = None,
     *,
     schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of vehicle.toml, for editors.", metavar="")
+        bool, typer.Option("--schema", help="Print the JSON schema of vehicle.toml, for editors.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

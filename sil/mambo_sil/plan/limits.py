@@ -7,7 +7,7 @@ thrust.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -260,8 +260,3 @@ def _wall(axis: int, side: float, wall_m: float) -> Rule:
         return position @ outwards - side * wall_m, np.broadcast_to(outwards, position.shape)
 
     return rule
-
-
-def names_of(limits: Sequence[FlightLimit]) -> list[str]:
-    """Return the names of limits, each once."""
-    return list(dict.fromkeys(limit.name for limit in limits))

@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from mambo_sil.api.api_controller import Controller
-from mambo_sil.arguments import is_whole, require, require_kind, require_number
+from mambo_sil.arguments import as_numbers, is_whole, require, require_kind, require_number
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.polynomials import PiecesInSpace
@@ -46,7 +49,7 @@ class Plan:
 
 
 def plan(
-    points: str | Path | Sequence[PlanPoint | tuple[float, float, float]],
+    points: str | Path | Sequence[PlanPoint | tuple[float, float, float]] | FloatArray,
     vehicle: Vehicle,
     controller: Controller | None = None,
     *,
@@ -58,8 +61,8 @@ def plan(
 ) -> Plan:
     """Plan the quickest course through points that a drone and others like it fly, and fly it with them.
 
-    points:     a CSV file or a mission of QGroundControl, or points in m, x ahead, y to the left, z up. If
-                they have times, the course of least snap at these times.
+    points:     a CSV file or a mission of QGroundControl, or points or an array (n, 3) in m, x ahead, y to
+                the left, z up. If they have times, the course of least snap at these times.
     controller: its settings fly; None for those that `design` derives.
     closed:     return to the first point, in a lap that repeats.
     rate:       speed over that of the quickest plan, at most 1.
@@ -90,16 +93,16 @@ def plan(
 def _points(points: object, *, closed: bool) -> tuple[PlanPoint, ...]:
     if isinstance(points, str | Path):
         return read_points(Path(points), closed=closed)
-    require(isinstance(points, Sequence), "points", points, "be a file, or a sequence of points")
+    if not isinstance(points, Sequence) and not (isinstance(points, np.ndarray) and points.ndim):
+        raise ArgumentError(f"points: {type(points).__name__} must be a file, or a sequence of points")
     found = []
-    for point in points if isinstance(points, Sequence) else ():
+    for number, point in enumerate(points, start=1):
         if isinstance(point, PlanPoint):
             found.append(point)
             continue
-        try:
-            x_m, y_m, z_m = (float(one) for one in point)
-        except (TypeError, ValueError):
-            raise ArgumentError(f"points: {point!r} must be a PlanPoint, or x, y and z in m") from None
-        found.append(PlanPoint(x_m, y_m, z_m))
+        name = f"point {number}"
+        place = as_numbers(name, point)
+        require(place.shape == (3,), name, point, "be a PlanPoint, or x, y and z in m")
+        found.append(PlanPoint(*place.tolist()))
     check_points(found, closed=closed)
     return tuple(found)

@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
+from mambo_codegen.errors import echo
 from mambo_sil.errors import TrajectoryError
 from mambo_sil.flight.course_file import header_of, named, read_text
 from mambo_sil.plan.qgroundcontrol import MISSION, places_of
@@ -20,6 +23,8 @@ OPTIONAL: Final = ("yaw", "time", "speed", "tolerance", "width", *DIRECTION, *NO
 
 TOLERANCE_M: Final = 0.1
 """Of a point without tolerance and width."""
+_OPTIONAL_SIZES: Final = ("width", "speed", "time", "yaw")
+"""What a point need not have."""
 LARGEST_M: Final = 1e4
 LEAST_TOLERANCE_M: Final = 0.001
 MOST_POINTS: Final = 1000
@@ -35,7 +40,8 @@ class PlanPoint:
 
     tolerance_m: a sphere around the point that the drone must reach into.
     width_m:     with `normal`: the diameter of a gate, through which it must fly along that direction.
-    speed_m_s, direction: of the drone there; at the first and last point the drone rests without a speed.
+    speed_m_s, direction: of the drone there; at the first and last point the drone rests without a speed. A
+                 `rate` scales the speed, and so do up to 10 % by which a plan is slowed to keep its limits.
     time_s:      since the start; either all points have one, or none.
     yaw_rad:     heading, from x ahead towards y.
     """
@@ -112,18 +118,22 @@ def check_points(
 
 def _check(place: str, point: PlanPoint) -> None:
     """Raise `TrajectoryError` for a point that breaks a rule of its own."""
-    _require_sizes(place, point)
+    vectors = ("direction", point.direction), ("normal", point.normal)
+    for name, vector in vectors:
+        if vector is not None and not (isinstance(vector, Sequence | np.ndarray) and len(vector) == 3):
+            raise TrajectoryError(f"{place}: {name} must be three numbers")
+    _require_sizes(place, point, vectors)
     if (point.normal is None) != (point.width_m is None):
         given, other = (
             ("normal", "width") if point.width_m is None else ("width", "normal_x,normal_y,normal_z")
         )
         raise TrajectoryError(f"{place}: {given} without {other}: a gate has both")
-    for name, vector in (("direction", point.direction), ("normal", point.normal)):
+    for name, vector in vectors:
         if vector is not None and not math.hypot(*vector) > 1e-6:
             raise TrajectoryError(f"{place}: {name} must not be 0 along all axes")
 
 
-def _require_sizes(place: str, point: PlanPoint) -> None:
+def _require_sizes(place: str, point: PlanPoint, vectors: Sequence[tuple[str, Vector | None]]) -> None:
     ranges = (
         *((axis, value, -LARGEST_M, LARGEST_M) for axis, value in zip("xyz", point.position_m, strict=True)),
         ("tolerance", point.tolerance_m, LEAST_TOLERANCE_M, LARGEST_M),
@@ -131,14 +141,14 @@ def _require_sizes(place: str, point: PlanPoint) -> None:
         ("speed", point.speed_m_s, 0.0, 1000.0),
         ("time", point.time_s, 0.0, 1e6),
         ("yaw", point.yaw_rad, -1000.0, 1000.0),
-        *(
-            (name, value, -1e6, 1e6)
-            for name, vector in (("direction", point.direction), ("normal", point.normal))
-            for value in vector or ()
-        ),
+        *((name, value, -1e6, 1e6) for name, vector in vectors if vector is not None for value in vector),
     )
     for name, value, least, most in ranges:
-        if value is not None and not least <= value <= most:
+        if value is None and name in _OPTIONAL_SIZES:
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            raise TrajectoryError(f"{place}: {name} = {echo(repr(value))} must be a number")
+        if not least <= value <= most:
             raise TrajectoryError(f"{place}: {name} = {value:g} must lie in {least:g}..{most:g}")
 
 

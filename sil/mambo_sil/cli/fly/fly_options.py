@@ -151,7 +151,6 @@ class Runner:
             "--real-time",
             help="With --port: the board's own clock calls the step; count late inputs, lost replies and "
             "missed periods.",
-            metavar="",
         ),
     ] = False
 
@@ -163,7 +162,7 @@ class Output:
     output: Results = Path("flight")
     no_pictures: Annotated[
         bool,
-        typer.Option("--no-pictures", help="Draw nothing, which is quicker.", metavar=""),
+        typer.Option("--no-pictures", help="Draw nothing, which is quicker."),
     ] = False
     as_json: AsJson = False
 
