@@ -41,7 +41,7 @@ class PlanPoint:
     tolerance_m: a sphere around the point that the drone must reach into.
     width_m:     with `normal`: the diameter of a gate, through which it must fly along that direction.
     speed_m_s, direction: of the drone there; at the first and last point the drone rests without a speed. A
-                 `rate` scales the speed, and so do up to 10 % by which a plan is slowed to keep its limits.
+                 `rate` scales the speed; a plan slowed to keep its limits, by 10 % at most, has less of it.
     time_s:      since the start; either all points have one, or none.
     yaw_rad:     heading, from x ahead towards y.
     """
