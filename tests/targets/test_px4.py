@@ -273,6 +273,18 @@ def test_a_jump_of_the_estimator_moves_target_and_controller(
         assert np.abs(desk.state.velocity_m_s).max() < 0.05
 
 
+@pytest.mark.parametrize("turn_rad", [0.8, -0.8])
+def test_a_jump_of_the_heading_turns_the_lean_of_a_take_over(turn_rad: float, module: Path) -> None:
+    """20 ms after it, in wind of 6 m/s: what was learnt in the mode before is in the frame of then."""
+    desk = Px4Desk(module, wind_m_s=(6.0, 0.0)).select(MPC, 20)
+    before_deg, changes_deg = desk.angles_deg.copy(), []
+    desk.set("px4.jump_heading", turn_rad)
+    for _ in range(100):
+        desk.run(1)
+        changes_deg.append(np.abs(desk.angles_deg - before_deg).max())
+    assert max(changes_deg) < 4.0
+
+
 def test_a_drone_glides_to_a_trajectory_whose_frame_has_jumped(module: Path) -> None:
     """The set-points are of the new frame: the drone is there after some seconds, without a jump."""
     for seed in SEEDS:
