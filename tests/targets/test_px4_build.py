@@ -69,7 +69,7 @@ WHERE = {
     **{rf"\b{name}_s\b": f"uORB/topics/{name}.h" for name in TOPICS},
 }
 """Names of PX4's and the C library's, and their headers."""
-LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 14336, 13568
+LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 14336, 13696
 
 
 def own_flags(name: str, source: str) -> list[str]:
