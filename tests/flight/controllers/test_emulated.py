@@ -176,6 +176,7 @@ def test_a_guest_that_never_returns_is_named(bad_guest: Machine) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.thorough
 def test_the_longest_step_has_its_time(tmp_path: Path) -> None:
     """The time limit suffices for 50 moves, 50 predicted steps and 100 iterations in soft float64."""
     document = settings_case(4, "float64").model_dump()

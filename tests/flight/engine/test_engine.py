@@ -71,7 +71,7 @@ def assert_same_bits(flight: Flight, kind: str) -> None:
             assert found.tobytes() == expected.tobytes(), (lanes, column.name)
 
 
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(12)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
 @pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)

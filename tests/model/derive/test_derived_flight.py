@@ -298,6 +298,7 @@ def borne_m_s2(settings: Settings, drone: VehicleFile) -> float:
 
 
 @pytest.mark.long
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", VEHICLES.names())
 def test_firm_settings_hold_their_place_better(name: str) -> None:
     """Two keys differ; a push moves the drone by less, it stays, and bears as much, or 1 m/s^2 less."""

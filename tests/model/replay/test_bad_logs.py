@@ -75,6 +75,7 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Fly:
     return log
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("damage", [lossy, without_eights, rounded(lambda value: np.round(value, 5))])
 @pytest.mark.parametrize("name", ["eight", "float64", "preset"])
