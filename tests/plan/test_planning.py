@@ -202,6 +202,14 @@ def test_a_larger_share_without_a_plan_leaves_the_one_that_flew() -> None:
     assert course.time_s > 0.5
 
 
+def test_a_start_in_a_climb_near_the_ground_is_flown() -> None:
+    """One piece, whose thrust between two samples passes the little that is spare, not the thrust itself."""
+    climbing = PlanPoint(0.0, 0.0, 0.6, speed_m_s=0.5, direction=(1.0, 0.0, 1.0))
+    made = plan([climbing, PlanPoint(1.0, 0.0, 1.1)], Vehicle.from_preset("crazyflie"), drones=4)
+    assert (made.summary.passed, made.summary.flown) == (5, 5)
+    assert made.summary.largest_miss_m < 0.1
+
+
 @pytest.mark.parametrize(("climb_m_s", "lowest_m"), [(0.5, 0.3), (0.1, 0.4), (-0.5, 0.6), (2.0, 0.3)])
 def test_the_run_in_stays_above_the_ground(climb_m_s: float, lowest_m: float) -> None:
     """A start in a climb comes from half its height at least, at the speed and climb of the first point."""

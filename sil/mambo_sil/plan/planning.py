@@ -176,9 +176,15 @@ class _Search:
         return found
 
 
+def _over(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
+    """Return by what share of each limit itself a course passes it, at the times DENSE (m, n, 65)."""
+    scale = np.array([limit.scale for limit in limits])
+    return np.asarray(scale[:, np.newaxis, np.newaxis] * (shares_of(course, limits) - 1.0))
+
+
 def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
     """Return which limit a course does not keep, where and by how much; nothing if it keeps all."""
-    over = shares_of(course, limits) - 1.0
+    over = _over(course, limits)
     if over.max() > 3.0 * HELD:
         return _passed_words(course, limits, over)
     passed = passed_at_knots(course).max(axis=0)
@@ -217,7 +223,7 @@ def _timed(search: _Search, limits: list[FlightLimit]) -> PlannedCourse:
         raise PlanError("a closed lap cannot have times: leave out the column time, or --closed")
     search.progress("planning", 0.0)
     course = search.first.smooth(np.diff(times_s)).slower(search.rate)
-    over = shares_of(course, limits) - 1.0
+    over = _over(course, limits)
     if over.max() > 1e-6:
         keeps = [
             rate
@@ -240,7 +246,7 @@ def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: Fl
     tau = DENSE[sample]
     time_s = course.duration_s[:piece].sum() + tau * course.duration_s[piece]
     name, point_of = limits[limit].name, course.choice.point_of
-    amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * limits[limit].scale * over.max():.0f} %"
+    amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * over.max():.0f} %"
     where = f"between points {point_of(piece)} and {point_of(piece + 1)}"
     for knot, near in ((piece, tau < 0.1), (piece + 1, tau > 0.9)):
         if near:
