@@ -15,6 +15,7 @@ from mambo_sil.plan.course import course_of
 from mambo_sil.plan.heading import headings_of
 from mambo_sil.plan.limits import FlightLimit, figures_of, limits_of
 from mambo_sil.plan.plan_flight import Drones, Waiting, _crossed_m, _nearest_m
+from mambo_sil.plan.plan_report import PieceSummary, PlanSummary
 from mambo_sil.plan.planning import _Search
 from mambo_sil.plan.plans import Plan
 from mambo_sil.plan.solver import silent
@@ -242,3 +243,13 @@ def test_a_plan_that_begins_and_ends_in_flight_is_flown() -> None:
     ends = made.curve.target(np.array([0.0, made.curve.duration_s - 1e-9]))
     np.testing.assert_allclose(ends[:, 2:], [[1.0, 0.0], [-0.8, 0.0]], rtol=0.1, atol=1e-6)
     assert made.summary.passed == 3
+
+
+@pytest.mark.parametrize("count", [30, 31])
+def test_more_pieces_than_a_crazyflie_holds_with_a_descent_are_told(count: int) -> None:
+    """Its script adds the descent to the memory's 31."""
+    piece = PieceSummary(number=1, duration_s=1.0, binding="tilt", share=1.0)
+    numbers = dict.fromkeys(set(PlanSummary.model_fields) - {"generator", "vehicle", "pieces"}, 1)
+    summary = PlanSummary.model_validate(numbers | {"vehicle": "one", "pieces": count * [piece]})
+    told = f"{count} pieces: a Crazyflie's commander holds 30 and the descent of fly.py"
+    assert any(told in str(block) for block in summary.result().blocks) is (count == 31)
