@@ -171,6 +171,17 @@ def test_a_lost_drone_descends_by_the_thrust_that_carried_it(lifting: Built) -> 
     assert (app.flown.attitude.roll, app.flown.attitude.pitch) == (0.0, 0.0)
 
 
+def test_a_take_over_does_not_count_the_thrust_that_flew_before(lifting: Built) -> None:
+    """A drone that loses its height in the next millisecond sinks by 3 % less than what should carry it."""
+    app = hovering(lifting)
+    ticks(app, 1)
+    carrying = 9.81 * app.flown.thrust / app.logged("outThrust")
+    app.state.position.z = math.nan
+    ticks(app, 1)
+    assert app.flown.mode.z == app.host.modeDisable
+    assert app.flown.thrust == pytest.approx(carrying * (1.0 - 0.3 / 9.81), rel=0.002)
+
+
 def test_a_mass_in_grams_is_refused(lifting: Built) -> None:
     """So are others that are absurd; a good one flies slowly in the air."""
     app = hovering(lifting)

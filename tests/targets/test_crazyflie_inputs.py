@@ -153,6 +153,10 @@ def test_a_place_that_changes_without_a_new_time_stamp_counts(app: Crazyflie) ->
     for _ in range(10):
         app.tick()
     assert app.logged("targetX") == pytest.approx(0.1)
+    app.setpoint.velocity.x = 0.3
+    for _ in range(10):
+        app.tick()
+    assert app.logged("targetVx") == pytest.approx(0.3)
 
 
 def test_a_jump_of_the_acceleration_is_no_jerk(app: Crazyflie) -> None:
