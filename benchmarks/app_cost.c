@@ -17,6 +17,7 @@
 #define SINE 0.01499943751f
 #define SPEED_1_S 1.5f
 #define ACCELERATION_1_S2 2.25f
+#define JERK_1_S3 3.375f
 
 static setpoint_t setpoint;
 static state_t state;
@@ -140,6 +141,7 @@ void cost_move(void)
         setpoint.position = (vector_t){ now_ms, x, y, 1.0f };
         setpoint.velocity = (vector_t){ now_ms, -SPEED_1_S * y, SPEED_1_S * x, 0.0f };
         setpoint.acceleration = (vector_t){ now_ms, -ACCELERATION_1_S2 * x, -ACCELERATION_1_S2 * y, 0.0f };
+        setpoint.jerk = (vector_t){ now_ms, JERK_1_S3 * y, -JERK_1_S3 * x, 0.0f };
         setpoint.attitudeQuaternion = (quaternion_t){ 0.0f, 0.0f, 0.05f, 0.99875f };
         setpoint.mode.x = setpoint.mode.y = setpoint.mode.z = setpoint.mode.quat = modeAbs;
     }

@@ -8,6 +8,7 @@ from tests.support.derived import settings_for
 from tests.support.tools import require
 
 MOST_INSTRUCTIONS = 730
+MOST_WITH_A_STEP = 4700
 MOST_FRAME_BYTES = 160
 
 
@@ -17,8 +18,7 @@ def test_a_call_is_short() -> None:
     require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
     pytest.importorskip("unicorn")
     cost = call_cost(settings_for(vehicle_toml.preset("crazyflie"), exact=True))
-    assert 500.0 < cost.mean <= MOST_INSTRUCTIONS
-    assert cost.most > 5 * cost.mean
+    assert cost.mean <= MOST_INSTRUCTIONS
+    assert cost.most <= MOST_WITH_A_STEP
     assert sum(cost.by_function.values()) == pytest.approx(cost.mean)
-    assert 10.0 * cost.by_function["advance"] > 500.0
     assert cost.frames_bytes[0] <= MOST_FRAME_BYTES
