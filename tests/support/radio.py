@@ -6,7 +6,7 @@ unknown parameter or log variable, a log block of more than 26 bytes. What is se
 
 import sys
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -30,6 +30,9 @@ SIZES: Final = {
 }
 """Bytes of log variables that are no floats, by their names without group."""
 MEMORY_BYTES: Final = 4096
+PART_BYTES: Final = 25
+"""What cflib writes into a memory by one packet."""
+PART_S: Final = 0.005
 LOG_BYTES: Final = 26
 TRAJECTORY_MEMORY: Final = 0x12
 
@@ -115,7 +118,9 @@ class Drone:
     arms: bool = True
     blocks: list[LogConfig] = field(default_factory=list)
     lost_callbacks: Caller = field(default_factory=Caller)
-    memory: bytes = b""
+    memory: bytearray = field(default_factory=lambda: bytearray(MEMORY_BYTES))
+    lost_after: int | None = None
+    """Parts of a write after which the link is lost."""
 
     def note(self, name: str, *arguments: Any) -> None:
         """Note a call, unless it is lost."""
@@ -130,6 +135,14 @@ class Drone:
     def of(self, name: str) -> list[tuple[float, tuple[Any, ...]]]:
         """Return time and arguments of the calls with a name."""
         return [(time_s, arguments) for time_s, called, arguments in self.calls if called == name]
+
+    def write(self, address: int, data: bytes) -> None:
+        """Take a part of a write."""
+        self.memory[address : address + len(data)] = data
+        if self.lost_after is not None:
+            self.lost_after -= 1
+            if self.lost_after == 0:
+                self.lose()
 
     def set_state(self, bit: int, *, on: bool) -> None:
         """Set or clear a bit of the supervisor's word."""
@@ -189,7 +202,7 @@ class HighLevelCommander:
 
     def define_trajectory(self, trajectory_id: int, offset: int, n_pieces: int) -> None:
         """Define a trajectory in the memory."""
-        assert len(self._drone.memory) == 132 * n_pieces
+        assert offset + 132 * n_pieces <= MEMORY_BYTES
         self._drone.note("define_trajectory", trajectory_id, offset, n_pieces)
 
     def start_trajectory(self, trajectory_id: int) -> None:
@@ -242,20 +255,41 @@ class Memory:
         write_failed_cb: Callable[..., None] | None = None,
         start_addr: int = 0,
     ) -> int:
-        """Write the trajectory, 0.3 s later."""
+        """Write the trajectory in parts, one after the other."""
         data = b"".join(piece.pack() for piece in self.trajectory)
         assert start_addr + len(data) <= MEMORY_BYTES
+        assert write_failed_cb is not None, (
+            "a write that fails must not be taken for one that is not answered"
+        )
+        drone, failed = self._drone, write_failed_cb
 
-        def answer() -> None:
-            if not self._drone.failing_uploads:
-                self._drone.memory = self._drone.memory[:start_addr] + data
-                self._drone.note("upload", len(data))
-            answered = write_failed_cb if self._drone.failing_uploads else write_finished_cb
-            if answered is not None:
-                answered(self, start_addr)
+        def send(begin: int) -> None:
+            if not drone.is_open:
+                return
+            if drone.failing_uploads:
+                failed(self, start_addr)
+                return
+            drone.write(start_addr + begin, data[begin : begin + PART_BYTES])
+            if begin + PART_BYTES < len(data):
+                later(begin + PART_BYTES)
+            elif drone.is_open:
+                drone.note("upload", len(data))
+                write_finished_cb(self, start_addr)
 
-        self._drone.clock.events.append((self._drone.clock.time_s + 0.3, answer))
+        def later(begin: int) -> None:
+            drone.clock.events.append((drone.clock.time_s + PART_S, lambda: send(begin)))
+
+        later(0)
         return len(data)
+
+
+def contents_of(names: Iterable[str]) -> dict[str, dict[str, None]]:
+    """Return names as a table of contents: by group."""
+    groups: dict[str, dict[str, None]] = {}
+    for name in names:
+        group, _, short = name.partition(".")
+        groups.setdefault(group, {})[short] = None
+    return groups
 
 
 class Parameters:
@@ -263,11 +297,7 @@ class Parameters:
 
     def __init__(self, drone: Drone) -> None:
         self._drone = drone
-        groups: dict[str, dict[str, None]] = {}
-        for name in drone.parameters:
-            group, _, short = name.partition(".")
-            groups.setdefault(group, {})[short] = None
-        self.toc = types.SimpleNamespace(toc=groups)
+        self.toc = types.SimpleNamespace(toc=contents_of(drone.parameters))
 
     def get_value(self, complete_name: str) -> str:
         """Return a value; raises KeyError, and Exception after a minute without one."""
@@ -288,6 +318,7 @@ class Log:
 
     def __init__(self, drone: Drone) -> None:
         self._drone = drone
+        self.toc = types.SimpleNamespace(toc=contents_of(drone.logged))
 
     def add_config(self, logconf: LogConfig) -> None:
         """Add a block; raises KeyError and AttributeError."""

@@ -121,6 +121,14 @@ class DeskDrone(Drone):
             target = [self.desk.log("ctrltarget.x"), self.desk.log("ctrltarget.y")]
             self.off_m.append(math.dist(self.desk.state.position_m[:2], target))
 
+    def write(self, address: int, data: bytes) -> None:
+        """Take a part of a write, and pass the pieces that it touches on."""
+        super().write(address, data)
+        assert self.desk is not None
+        for number in {address // PIECE_BYTES, (address + len(data) - 1) // PIECE_BYTES}:
+            piece = self.memory[number * PIECE_BYTES : (number + 1) * PIECE_BYTES]
+            self.desk.write_pieces(np.frombuffer(piece, np.float32).astype(np.float64)[np.newaxis], number)
+
     def note(self, name: str, *arguments: Any) -> None:
         """Note a call, and pass it on."""
         super().note(name, *arguments)
@@ -133,14 +141,12 @@ class DeskDrone(Drone):
             self.desk.land(arguments[1], arguments[0], yaw_rad)
         elif name == "go_to":
             self.desk.go_to(arguments[:3], arguments[4], arguments[3])
-        elif name == "upload":
-            self.desk.write_pieces(np.frombuffer(self.memory, np.float32).astype(np.float64).reshape(-1, 33))
         elif name == "full_state":
             self.desk.full_state(np.array(arguments[:3]), yaw_rad)
         elif name == "notify":
             self.desk.yield_()
         elif name == "start_trajectory":
-            self.desk.start_trajectory(len(self.memory) // PIECE_BYTES)
+            self.desk.start_trajectory(self.of("define_trajectory")[-1][1][2])
         elif name == "stop" and int(self.logged["supervisor.info"]) & FLYING:
             self.desk.stop()
 

@@ -33,7 +33,7 @@ from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.reach import flown_acceleration_m_s2
+from mambo_codegen.numbers.reach import FLOWN_SHARE, flown_acceleration_m_s2
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
     YAW_LIMIT_RAD,
@@ -108,6 +108,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         "pil_payload_bytes": _pil_payload_bytes(method_of(settings)),
         "for_flow": settings.observer is not None and settings.observer.position_noise >= FLOW_NOISE_M,
         "flown_m_s2": flown_acceleration_m_s2(settings),
+        "flown_share": FLOWN_SHARE,
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"

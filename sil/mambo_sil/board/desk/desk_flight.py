@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import FlightError
 
 Three = tuple[float, float, float]
+
+MEMORY_PIECES: Final = 31
+"""Pieces in the memory of the high-level commander."""
 
 
 class DeskSensors(IntEnum):
@@ -147,7 +150,14 @@ class Desk:
         self._c.desk_go_to(self._vector(position_m), yaw_rad, duration_s)
 
     def write_pieces(self, pieces: FloatArray, first: int = 0) -> None:
-        """Write pieces of a trajectory (n, 33), 8 coefficients of x, y, z and yaw and the duration."""
+        """Write pieces of a trajectory (n, 33), 8 coefficients of x, y, z and yaw and the duration.
+
+        Raises FlightError for more than the memory holds.
+        """
+        if not 0 <= first <= first + len(pieces) <= MEMORY_PIECES:
+            raise FlightError(
+                f"pieces {first + 1} to {first + len(pieces)}: the memory holds {MEMORY_PIECES}"
+            )
         written = self._ffi.new("double[]", [float(value) for value in pieces.reshape(-1)])
         self._c.desk_write_pieces(first, written, len(pieces))
 
