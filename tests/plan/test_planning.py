@@ -117,15 +117,20 @@ def test_a_tolerance_below_the_noise_is_refused_with_one_that_would_do() -> None
         plan(points, Vehicle.from_preset("crazyflie"), drones=1)
 
 
-def test_a_turn_that_is_too_quick_is_refused() -> None:
-    """The heading may turn by 4 rad/s at most."""
+def test_a_turn_that_is_too_quick_is_refused(tmp_path: Path) -> None:
+    """The heading turns by 4 rad/s at most, as it does at the rate that is offered; `fly` refuses turns."""
     points = [PlanPoint(0, 0, 1, time_s=0.0, yaw_rad=0.0), PlanPoint(0.3, 0, 1, time_s=1.2, yaw_rad=3.0)]
     vehicle = Vehicle.from_preset("crazyflie")
     with pytest.raises(TrajectoryError, match=r"points 1 to 2: a turn by 3\.00 rad in 1\.20 s") as raised:
         plan(points, vehicle, drones=1)
     offered = re.search(r"--rate (0\.\d+) would do", str(raised.value))
     assert offered is not None
-    assert "have headings" in repr(plan(points, vehicle, drones=1, rate=float(offered[1])))
+    turning = plan(points, vehicle, drones=1, rate=float(offered[1]))
+    assert "have headings" in repr(turning)
+    lap = tmp_path / "lap.csv"
+    lap.write_text(turning.text, "utf-8")
+    with pytest.raises(TrajectoryError, match=r"line 2: yaw\^4 = .* must be 0: .*; plan without yaw"):
+        read_course(lap)
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,9 @@ def _piece(line: str, row: tuple[float, ...]) -> Piece:
     x, y, z, yaw = (tuple(rest[k : k + COEFFICIENTS]) for k in range(0, len(rest), COEFFICIENTS))
     for power, value in enumerate(yaw):
         if value != 0.0:
-            raise TrajectoryError(f"{line}: yaw^{power} = {value} must be 0: a flight keeps its heading")
+            raise TrajectoryError(
+                f"{line}: yaw^{power} = {value} must be 0: a flight keeps its heading; plan without yaw"
+            )
     return Piece(duration_s, x, tuple(0.0 - value for value in y), z)
 
 
