@@ -62,6 +62,7 @@ def test_a_curve_that_is_too_quick_is_slowed_down(
     assert drone.desk is not None
     assert drone.desk.console.count("thrust limits the tilt: too quick a curve") >= 1
     assert drone.desk.state.position_m[2] < 0.02
+    assert np.max(drone.off_m) < 0.5
     assert np.max(drone.off_m[-800:]) < 0.1
     assert (len(drone.of("upload")) > 29) is (not how)
 
