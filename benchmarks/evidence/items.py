@@ -250,6 +250,21 @@ ITEMS: Final = (
         pictures={"fast-eight.png": "pictures/fast-eight.png"},
     ),
     Item(
+        name="laps",
+        commands=(
+            "python -m benchmarks.flights.laps",
+            f"mambo-nmpc plan {_HERE}/points.csv --vehicle crazyflie -o {RESULTS}/laps/lap.csv",
+        ),
+        controllers=("design crazyflie-brushless", "design crazyflie"),
+        paths=(
+            *(*_FLIGHT, "sil/mambo_sil/plan", _STYLE),
+            *("benchmarks/flights/laps.py", f"{_HERE}/points.csv"),
+        ),
+        read=read_printed,
+        tables={"laps": printed},
+        pictures={"lap.png": "lap.png"},
+    ),
+    Item(
         name="footprint",
         commands=(
             f"mambo-nmpc footprint mambo -o {RESULTS}/footprint/float32",

@@ -5,7 +5,6 @@ are others than the 20 by which `plan` decides. Splines and limits are tried fro
 missed. Prints a table in Markdown.
 """
 
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
@@ -103,21 +102,18 @@ def rows() -> Iterator[tuple[str, ...]]:
         judge = Judge(course(number))
         places_m = np.array([point.position_m for point in judge.points])
         whole = judge.within(without_lag(judge.alone))
-        begun_s = time.process_time()
         plan = make_plan(judge.points, VEHICLE)
-        taken_s = time.process_time() - begun_s
         shares = shares_of(plan.course, plan.limits).max(axis=2)
         binding = [plan.limits[index].name for index in shares.argmax(axis=0)]
         yield (
             str(number),
             f"{judge.quickest(spline(places_m, time_s) for time_s in SPLINES_S):.2f}",
-            f"{whole.time_s:.2f} ({judge.passed(whole)})",
+            f"{whole.time_s:.2f}, {judge.passed(whole)}",
             *(
                 f"{judge.quickest(_at_shares(judge, figures)):.2f}"
                 for figures in (without_lag(judge.figures), judge.figures)
             ),
-            f"{plan.course.time_s:.2f} ({judge.passed(plan.course)})",
-            f"{taken_s:.1f}",
+            f"{plan.course.time_s:.2f}, {judge.passed(plan.course)}",
             ", ".join(f"{name} {binding.count(name)}" for name in dict.fromkeys(binding)),
         )
 
@@ -129,13 +125,12 @@ def _at_shares(judge: Judge, figures: Figures) -> Iterator[PlannedCourse]:
 
 HEADS: Final = (
     "course",
-    "spline, s",
-    "all of the file's tilt and thrust, s (drones)",
-    "tilt and thrust, s",
-    "and lag, s",
-    "`plan`, s (drones)",
-    "processor s",
-    "pieces that a limit binds",
+    f"smooth spline, quickest that {OTHERS} fly",
+    f"all tilt and thrust of the file's drone, no lag: lap, drones of {OTHERS}",
+    f"tilt and thrust, the largest share that {OTHERS} fly",
+    "the same with lag and dead time",
+    f"`plan`: lap, drones of {OTHERS}",
+    "what binds it, in how many pieces",
 )
 
 

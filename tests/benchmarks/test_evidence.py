@@ -140,6 +140,12 @@ def test_files_of_settings_are_presets_but_for_what_their_names_say() -> None:
     assert presets.load(str(ROOT / "benchmarks/evidence/mambo-1norm-fixed.toml")) == fixed
 
 
+def test_the_lap_of_the_picture_is_that_of_the_tutorial() -> None:
+    """Its points are those that a reader writes."""
+    points = (ROOT / "benchmarks/evidence/points.csv").read_text("utf-8")
+    assert f'title="points.csv"\n{points}```' in (ROOT / "docs/tutorials/lap.md").read_text("utf-8")
+
+
 C = '/* Words. */\n#define A 1.0f /* more */\n\nconst char *b = "/* no comment */"; // words\n'
 
 

@@ -150,6 +150,17 @@ def frozen() -> str:
     return next(f"{one['largest_error_m']:.0f}" for one in found if one["fault"] == "state frozen, 5 s")
 
 
+def laps(column: str) -> list[float]:
+    """Return the times of the laps in a column of their table, in s."""
+    found = [next(text for name, text in row.items() if column in name) for row in figures("laps")["rows"]]
+    return [float(text.split(",")[0]) for text in found]
+
+
+def quicker(column: str, other: str) -> list[float]:
+    """Return by how many percent the laps of a column are quicker than those of another."""
+    return [100 * (1 - mine_s / its_s) for mine_s, its_s in zip(laps(column), laps(other), strict=True)]
+
+
 FIXED, DERIVED = "mambo --scalar fixed", "design crazyflie"
 CIRCLE, FAST_EIGHT = "slow-motors-circle", "slow-motors-fast-eight"
 APP, SOLVERS = "docs/how-to/crazyflie.md", "docs/evidence/peers.md"
@@ -160,6 +171,18 @@ OPPONENTS, COMPATIBILITY = "docs/evidence/opponents.md", "docs/reference/compati
 HEIGHT, FIXED_POINT = "docs/evidence/height.md", "docs/explanation/fixed-point.md"
 BOARDS, LIBRARIES = "docs/evidence/boards.md", "docs/how-to/libraries.md"
 FIGURES = [
+    Figure(
+        "docs/how-to/plan.md",
+        r"`plan` is (.+?) % quicker than the spline",
+        lambda: "{}, {} and {}".format(*map(shown, quicker("`plan`", "smooth spline"))),
+    ),
+    Figure(
+        "docs/how-to/plan.md",
+        r"without them the quickest lap that all fly is (.+?) % slower",
+        lambda: "{} and {} % quicker, on the third course {}".format(
+            *(shown(abs(one)) for one in quicker("largest share", "with lag and dead time"))
+        ),
+    ),
     Figure(
         "docs/reference/python.md",
         r"A law takes at least (\d+) times",
