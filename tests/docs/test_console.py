@@ -63,6 +63,12 @@ NOT_RUN = {
     ),
     "tutorials/px4-ardupilot.md": ("needs PX4", "asks for a passphrase, and needs an autopilot"),
     "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
+    "tutorials/race.md": (
+        "needs the course",
+        "needs the course",
+        "needs crazyflow; a test of its own runs it",
+        "a test of the examples runs it",
+    ),
     "tutorials/first-flight.md": ("it makes the environment in which they run",),
 }
 """The console blocks that are not run, by page: the reason, which is in the title of the block."""
