@@ -2,7 +2,6 @@
 
 $ python race.py
 crazyflie-brushless: ... s through 6 points
-21 of 21 drones fly it through all points
 ...
 """
 
@@ -32,15 +31,16 @@ nmpc = partial(Nmpc.from_vehicle, DRONE, sensors="true", update_period_s=PERIOD_
 def lap(start: tuple, gates: tuple) -> Plan:
     """Plan from 0.2 m above a start through gates, each with place and direction, to rest behind the last."""
     points = [PlanPoint(start[0], start[1], start[2] + 0.2)]
-    for number, gate in enumerate(gates):
-        points += VIA.get(number, [])
-        points.append(PlanPoint(gate[0], gate[1], gate[2] - BELOW_M, normal=gate[3:], width_m=WIDTH_M))
-    points.append(PlanPoint(*np.add(gate[:3], np.multiply(0.5, gate[3:])).tolist(), tolerance_m=0.2))
+    for number, (x, y, z, *way) in enumerate(gates):
+        points += [*VIA.get(number, []), PlanPoint(x, y, z - BELOW_M, normal=(*way,), width_m=WIDTH_M)]
+    points.append(PlanPoint(*np.add((x, y, z), np.multiply(0.5, way)).tolist(), tolerance_m=0.2))
     return plan(points, Vehicle.of(Vehicle.from_preset(DRONE).drone.with_sensors("true")), nmpc())
 
 
 class Racer(Controller):
     """Plans when a race begins, and flies the plan."""
+
+    step_callback = staticmethod(lambda *_: False)  # the course decides when a race is over
 
     def __init__(self, obs: dict, _info: dict, config: dict) -> None:
         gates = np.hstack([obs["gates_pos"], Rotation.from_quat(obs["gates_quat"]).apply([1.0, 0.0, 0.0])])
