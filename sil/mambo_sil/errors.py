@@ -86,3 +86,7 @@ class PlanError(MamboNmpcError):
     """No plan is possible; the message says at which point, by which limit, by how much, what would do."""
 
     exit_code: ClassVar[int] = 1
+
+
+class UserNotice(UserWarning):
+    """What a user should know of a flight that goes on, such as a law that failed in one of many."""

@@ -99,7 +99,7 @@ def test_firm_settings_come_with_their_price() -> None:
     """After the push that they bear; the file says what is firm."""
     _, said = run("design", "crazyflie-flown", "--firm")
     assert re.search(
-        r"bears a steady push of 3 m/s\^2 from every side bears to be seen .* lever_m says "
+        r"bears a steady push of 3 m/s\^2 from every side bears to be seen .* sensors\.lever_m says "
         r"firm: a push of 0\.5 m/s\^2 moves it by \d+ mm, "
         r"with --calm by \d+; its commands change [\d.]+ times as much flown on the desk",
         unwrapped(said),

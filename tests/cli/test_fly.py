@@ -48,7 +48,7 @@ def test_the_axis_of_the_error_is_for_what_follows_the_start(
     run("fly", "--duration-s", "12", "--wind", "gusts", "-o", "out")
     drawn = Path("out/flight.svg").read_text("utf-8")
     assert "NMPC, mambo on mambo, one flight: " in drawn
-    assert "s, wind 7.72 m/s<" in drawn
+    assert "wind 7.72 m/s<" in drawn
     (found,) = re.findall(r"up to (\S+) m in the first 10 s", drawn)
     assert float(found) == pytest.approx(
         json.loads(Path("out/summary.json").read_text())["metrics"]["max_error_m"], rel=0.01

@@ -22,7 +22,7 @@ from mambo_sil.arguments import (
 from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.errors import ArgumentError, TrajectoryError
+from mambo_sil.errors import ArgumentError, TrajectoryError, UserNotice
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.own_law import Law, OwnLaws, period_of
 from mambo_sil.flight.crashes import detect_crashes
@@ -141,7 +141,7 @@ def fly(
     laws = OwnLaws(controller, flight)
     trace = simulate.fly(flight, laws)
     for number, failure in laws.failures.items():
-        warnings.warn(f"flight {number}, {failure}", stacklevel=2)
+        warnings.warn(f"flight {number}, {failure}", UserNotice, stacklevel=2)
     crashed = detect_crashes(trace, vehicle.drone)
     return Flown(trace, measure(trace, measured_from_s), crashed, laws.failures)
 

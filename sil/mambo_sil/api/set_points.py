@@ -11,6 +11,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.errors import UserNotice
 from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.frames import wrapped
@@ -77,7 +78,7 @@ class HeightHint:
         self._rest_s = np.where(rests, self._rest_s + self._update_period_s, 0.0)
         if (found := np.flatnonzero(self._rest_s >= REST_S)).size:
             self._said = True
-            warnings.warn(self._words(off_m[found[0]]), stacklevel=4)
+            warnings.warn(self._words(off_m[found[0]]), UserNotice, stacklevel=4)
 
     def _words(self, off_m: FloatArray) -> str:
         low = "below" if off_m > 0.0 else "above"

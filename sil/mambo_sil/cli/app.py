@@ -20,6 +20,7 @@ from mambo_sil.cli.generate import generate, identify_binary
 from mambo_sil.cli.margins import margins
 from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
 from mambo_sil.cli.start import doctor, init, playground
+from mambo_sil.errors import UserNotice
 
 PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
     "Start": {"init": init, "doctor": doctor, "playground": playground},
@@ -151,4 +152,5 @@ def main() -> None:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
+        warnings.simplefilter("default", UserNotice)
     app()()

@@ -22,6 +22,8 @@ int run(void) { room[start] = (char)table[start]; return start++; }
 """
 HELPERS = {
     "crazyflie": set(),
+    "nano33ble": set(),
+    "stm32f103": {"__mulsf3"},
     "stm32h743": set(),
     "teensy41": set(),
     "mambo": {"__mulsf3"},

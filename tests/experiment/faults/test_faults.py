@@ -364,7 +364,7 @@ def test_the_table_has_one_row_per_fault() -> None:
         "| state NaN, 1 s | not recovered | BAD_STATE | 1.00 | 2.0 | 1.00 | never | 0.35 | 0.40 | 50.0 |"
         in text
     )
-    assert "eight 0.100 m, hover 0.100 m" in text
+    assert "eight 100 mm, hover 100 mm" in text
 
 
 def test_the_heading_follows_its_yaw_rate() -> None:

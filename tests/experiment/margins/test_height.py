@@ -134,7 +134,7 @@ def test_the_gain_of_a_thrust_is_an_inverse_load() -> None:
 def test_command_shows_the_height_beside_roll_and_pitch() -> None:
     """Verdict, table and JSON have the third axis, with its own units, broken at the command only."""
     Path("c.toml").write_text(to_toml(height_settings()), "utf-8")
-    said, _ = run("margins", "c.toml", "--vehicle", "crazyflie", "--sensors", "mocap")
+    said, _ = run("margins", "c.toml", "--vehicle", "crazyflie", "--sensors", "mocap", "--all")
     assert "height: tolerates 1.7 times the gain or 60 ms more delay\n" in said
     assert "m/s^2 per m/s^2" in said
     axes = json.loads(run("margins", "c.toml", "--vehicle", "crazyflie", "--json")[0])["axes"]

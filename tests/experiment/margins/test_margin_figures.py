@@ -16,7 +16,7 @@ from mambo_sil.experiment.margins.axis_margins import (
 from mambo_sil.experiment.margins.loop_margins import LoopMargins
 from mambo_sil.experiment.margins.margin_figures import figure_rows, figure_table, number, verdict
 from mambo_sil.experiment.margins.margins_record import RESPONSES, ManyDrones, MarginSpread, MarginsSummary
-from mambo_sil.results.blocks import ResultTable
+from mambo_sil.results.blocks import Details, ResultTable
 
 LOOP = LoopMargins(
     gain_up=2.04,
@@ -218,7 +218,10 @@ def test_a_result_has_figures_and_says_what_is_missing(tmp_path: Path) -> None:
     result = summary_of([roll(), height()], many_drones()).result(tmp_path)
     assert result.missing == [RESPONSES]
     assert not result.pictures[0].drawable
-    figures, spreads = (one for one in result.blocks if isinstance(one, ResultTable))
+    (spreads,) = (one for one in result.blocks if isinstance(one, ResultTable))
+    (folded,) = (one for one in result.blocks if isinstance(one, Details))
+    (figures,) = folded.blocks
+    assert isinstance(figures, ResultTable)
     assert figures.heads == ("broken at", "roll", "height", "")
     rows = figure_table([roll(), height()])
     assert figures.rows == [(name, *values, unit) for name, values, unit in rows]

@@ -87,9 +87,9 @@ def bad_guest(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
 
 
 def test_every_board_has_a_core() -> None:
-    """CORES has the core of every board, and every core that can be emulated."""
+    """CORES has the core of every board, and every emulated core but the M33, which no board has."""
     assert {name: boards.load(name).emulated_core.value for name in boards.names()} == CORES
-    assert {*MODELS, AVR} == set(CORES.values())
+    assert {*MODELS, AVR} - {"cortex-m33"} == set(CORES.values())
 
 
 @cache

@@ -93,9 +93,14 @@ def _worst_end(pair: Sequence[Verdict]) -> End:
     return max((flight.end for flight in pair), key=ORDER.index)
 
 
+def _mm(length_m: float) -> str:
+    """Return a length in mm, with two digits."""
+    return f"{float(f'{1e3 * length_m:.2g}'):g}"
+
+
 def _bands(verdicts: Sequence[Verdict]) -> str:
     bands = ", ".join(
-        f"{course} {1e3 * next(v.band_m for v in verdicts if v.course == course and not v.turning):.2g} mm"
+        f"{course} {_mm(next(v.band_m for v in verdicts if v.course == course and not v.turning))} mm"
         for course in COURSES
     )
     return f"Recovered means an error within: {bands}."

@@ -12,6 +12,7 @@ from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.sensors.suites import noises_of
+from mambo_sil.errors import UserNotice
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.thrust_controller import adapted
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
@@ -139,7 +140,7 @@ def _engine(flight: Flight, controllers: Sequence[PositionController]) -> Any:
         toolchain = host_toolchain()
         return load(toolchain, lanes_for(flight.flights, toolchain))
     except BuildError as error:
-        warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=3)
+        warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", UserNotice, stacklevel=3)
         return None
 
 
