@@ -97,6 +97,10 @@ ROOMS: Final = {
             "tilt_gain_constants.py",
         ),
     ),
+    "reach": Room(
+        source=("codegen/mambo_codegen/numbers/reach.py",),
+        tests=("tests/model/derive/test_reach.py", "tests/plan/test_limits.py"),
+    ),
     "tilt gain": Room(
         source=(f"{_METHODS}/tilt_gain_constants.py",),
         tests=("tests/codegen/test_tilt_gain.py",),

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.numbers.reach import FLOWN_SHARE, flown_acceleration_m_s2, largest_acceleration_m_s2
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -52,6 +53,20 @@ def test_a_far_target_is_flown_to_with_it(name: str, attitude: dict[str, object]
     assert largest_acceleration_m_s2(settings) == pytest.approx(found_m_s2, rel=0.08)
     assert settings.observer.disturbance_limit_m_s2 == pytest.approx(found_m_s2, rel=0.08)
     assert reach_words(settings).endswith(f"by limits.tilt_rad = {settings.limits.tilt_rad:g}")
+
+
+@pytest.mark.parametrize("axis", ["roll", "pitch"])
+@pytest.mark.parametrize("trim_rad", [0.05, -0.05])
+def test_the_weaker_axis_limits_it_and_a_trim_of_either_sign_takes_from_it(
+    axis: str, trim_rad: float
+) -> None:
+    """The commanded tilt is the limit; its drone turns by a gain of it, less the trim."""
+    given = settings_for(vehicle_toml.preset("crazyflie"), exact=True)
+    even = {"roll_gain": 1.0, "pitch_gain": 1.0, "roll_trim_rad": 0.0, "pitch_trim_rad": 0.0}
+    weak = even | {f"{axis}_gain": 0.8, f"{axis}_trim_rad": trim_rad, "acceleration_per_tilt": 1.1}
+    settings = given.model_copy(update={"model": given.model.model_copy(update=weak)})
+    reached_rad = 0.8 * settings.limits.tilt_rad - 0.05
+    assert largest_acceleration_m_s2(settings) == pytest.approx(GRAVITY_M_S2 * 1.1 * math.tan(reached_rad))
 
 
 def test_a_curve_may_ask_for_what_tilt_and_thrust_leave() -> None:
