@@ -225,7 +225,16 @@ def test_a_result_has_figures_and_says_what_is_missing(tmp_path: Path) -> None:
     assert figures.heads == ("broken at", "roll", "height", "")
     rows = figure_table([roll(), height()])
     assert figures.rows == [(name, *values, unit) for name, values, unit in rows]
+    assert figures.texts == (0, -1)
     assert spreads == many_drones().blocks[1]
     assert len(summary_of([roll()]).result(tmp_path).blocks) == 2
     without = summary_of(None).result(tmp_path)
     assert (without.missing, without.blocks) == ([], [])
+
+
+def test_all_figures_unfold_where_they_are_asked_for(tmp_path: Path) -> None:
+    """That is no figure itself: a file of a summary does not have it."""
+    summary = summary_of([roll()]).model_copy(update={"all_figures": True})
+    assert not any(isinstance(one, Details) for one in summary.result(tmp_path).blocks)
+    assert any(isinstance(one, ResultTable) for one in summary.result(tmp_path).blocks)
+    assert "all_figures" not in summary.model_dump()
