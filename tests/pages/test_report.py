@@ -23,6 +23,7 @@ from mambo_sil.flight.animation import LONGEST_S, animate
 from mambo_sil.flight.traces import Trace
 from mambo_sil.pages.playground.playground_page import PlaygroundSummary
 from mambo_sil.pages.report_page import RESULTS, ReportSummary
+from mambo_sil.plan.plan_report import PieceSummary, PlanSummary
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.summary import Summary
 from mambo_sil.results.terminal import result_text
@@ -151,14 +152,16 @@ def demand_sound(page: str) -> None:
 
 
 def test_every_result_folder_can_be_reported() -> None:
-    """Whatever a command writes into a folder; a page is no folder."""
+    """Whatever a command writes into a folder; a page is no folder, nor is a plan."""
 
     def kinds(base: type[Summary]) -> set[type[Summary]]:
         return {base}.union(*map(kinds, base.__subclasses__()))
 
     own = {one for one in kinds(Summary) if one.__module__.startswith("mambo")}
     written = {one for one in own if "command" in vars(one)}
-    assert written - {ReportSummary, PlaygroundSummary, UnfinishedCampaign} == set(RESULTS)
+    assert written - {ReportSummary, PlaygroundSummary, UnfinishedCampaign, PlanSummary, PieceSummary} == set(
+        RESULTS
+    )
 
 
 def test_a_flight_far_from_its_target_has_no_tick() -> None:

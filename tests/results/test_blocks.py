@@ -156,7 +156,7 @@ def test_distances_are_in_cm_up_to_a_metre(value_m: float, text: str) -> None:
         ("campaign --flights 2 -o c", "mambo: "),
         ("diff mambo crazyflie", "A: mambo, settings "),
         ("margins", "mambo on mambo, the true state, 10 ms an update"),
-        ("vehicles", "cf2x-pyflyt "),
+        ("vehicles", "cf2x-pybullet "),
         ("presets", "crazyflie "),
     ],
 )

@@ -32,7 +32,7 @@ def draw_plan(planned: Planned, title: str, stem: Path) -> tuple[Path, Path]:
             number = course.choice.point_of(knot)
             point = planned.points[number - 1]
             _mark(plan, point, number)
-            height.plot(since_s[knot], point.z_m, "o", color=INK, markersize=2.0)
+            height.plot(since_s[knot], point.z_m, "o", color=INK)
         plan.set(xlabel="y (to the left), m", ylabel="x (ahead), m", aspect="equal", adjustable="datalim")
         height.set(xlabel="time, s", ylabel="height, m")
         for axes in (plan, height):
