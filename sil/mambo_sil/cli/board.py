@@ -44,7 +44,9 @@ def footprint(
     *,
     scalar: Scalar = None,
     board: Boards = None,
-    optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
+    optimisation: Annotated[
+        str, typer.Option(help="Optimisation flag of the compiler.", metavar="FLAG")
+    ] = "-O2",
     port: PortName = None,
     baud: Baud = None,
     output: OptionalResults = None,
@@ -106,7 +108,7 @@ def sweep(
     *,
     scalar: Scalar = None,
     board: Annotated[
-        str, typer.Option(help="Board, or its TOML file.", autocompletion=complete_boards)
+        str, typer.Option(help="Board, or its TOML file.", metavar="BOARD", autocompletion=complete_boards)
     ] = "crazyflie",
     vary: Annotated[
         list[str],
@@ -225,6 +227,7 @@ def same_bits(
         int | None,
         typer.Option(
             min=100,
+            metavar="N",
             help="Self-test steps, in hundreds; by default as many as the bundle's self-test digest covers.",
         ),
     ] = None,

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import traceback
-from typing import Annotated, Any, Final, Never
+from typing import Annotated, Any, Never
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -32,15 +32,11 @@ EXIT_CODES = (
 )
 
 
-_TYPES: Final = {"int": "N", "float": "X", "Path": "PATH", "str": "TEXT"}
-"""How the help spells the value of an option, by its type in Python."""
-
-
-def _named(parameters: list[Any]) -> list[Any]:
-    """Return parameters whose options say in plain words what they take; a flag takes nothing."""
+def _without_types(parameters: list[Any]) -> list[Any]:
+    """Return parameters whose flags say no type in the help: they take nothing."""
     for one in parameters:
-        if one.param_type_name == "option" and one.metavar is None:
-            one.metavar = "" if one.is_flag else _TYPES.get(one.bare_type())
+        if one.param_type_name == "option" and one.is_flag:
+            one.metavar = ""
     return parameters
 
 
@@ -49,7 +45,7 @@ class RootGroup(TyperGroup):
 
     def get_params(self, ctx: typer.Context) -> list[Any]:  # type: ignore[override] # typer hides the base of Context
         """Return the options."""
-        return _named(super().get_params(ctx))
+        return _without_types(super().get_params(ctx))
 
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Run a command line, help and version included, and flush stdout."""
@@ -87,7 +83,7 @@ class Command(TyperCommand):
 
     def get_params(self, ctx: typer.Context) -> list[Any]:  # type: ignore[override] # as above
         """Return the options and arguments."""
-        return _named(super().get_params(ctx))
+        return _without_types(super().get_params(ctx))
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # as above
         """Parse a command line.

@@ -37,7 +37,9 @@ def generate(
         bool,
         typer.Option("--check", help="Write nothing; exit 1 with a diff if the folder is not up to date."),
     ] = False,
-    prefix: Annotated[str | None, typer.Option(help="Prefix of public names (code.prefix).")] = None,
+    prefix: Annotated[
+        str | None, typer.Option(help="Prefix of public names (code.prefix).", metavar="NAME")
+    ] = None,
     scalar: Scalar = None,
     force: Annotated[
         bool,

@@ -50,7 +50,9 @@ def margins(
     all_figures: Annotated[
         bool, typer.Option("--all", help="Print every figure, not the margins only.")
     ] = False,
-    drones: Annotated[int, typer.Option(help="Number of drones with --campaign.", min=1, max=100_000)] = 100,
+    drones: Annotated[
+        int, typer.Option(help="Number of drones with --campaign.", metavar="N", min=1, max=100_000)
+    ] = 100,
     output: OptionalResults = None,
     as_json: AsJson = False,
 ) -> None:

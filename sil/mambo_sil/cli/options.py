@@ -69,7 +69,9 @@ Results = Annotated[Path, _OUTPUT]
 OptionalResults = Annotated[Path | None, _OUTPUT]
 Workers = Annotated[
     int | None,
-    typer.Option(help="Processes on this machine; by default one for each processor.", min=1, max=1024),
+    typer.Option(
+        help="Processes on this machine; by default one for each processor.", metavar="N", min=1, max=1024
+    ),
 ]
 
 

@@ -116,6 +116,7 @@ def identify(
         float | None,
         typer.Option(
             help="Mass with battery, for vehicle.toml: no log shows it. Without it the file has none.",
+            metavar="KG",
             min=0.001,
             max=100,
         ),
@@ -297,11 +298,16 @@ def tune(
         output_option("Folder for the results; a study started there is continued."),
     ] = Path("tune"),
     vehicle: Drone = None,
-    trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
+    trials: Annotated[
+        int, typer.Option(help="Total number of trials.", metavar="N", min=1, max=100_000)
+    ] = 100,
     workers: Workers = None,
     storage: Annotated[
         str | None,
-        typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
+        typer.Option(
+            help="Address of a database that several machines share, instead of a file in the folder.",
+            metavar="URL",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

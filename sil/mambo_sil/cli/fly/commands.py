@@ -77,11 +77,15 @@ def campaign(
     ] = Path("campaign"),
     vehicle: Drone = None,
     sensors: OptionalSensors = None,
-    flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=1_000_000)] = 1000,
+    flights: Annotated[
+        int, typer.Option(help="Total number of flights.", metavar="N", min=1, max=1_000_000)
+    ] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a running Dask scheduler; its workers fly, not this machine."),
+        typer.Option(
+            help="Address of a running Dask scheduler; its workers fly, not this machine.", metavar="ADDRESS"
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
