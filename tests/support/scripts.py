@@ -180,3 +180,19 @@ def ready_on_desk(scripts: dict[str, ModuleType], patch: pytest.MonkeyPatch, des
 def largest_m(drone: DeskDrone) -> float:
     """Return the largest distance to the target."""
     return float(np.max(drone.off_m))
+
+
+def uploaded(drone: Drone) -> Any:
+    """Return the pieces in the drone's memory (n, 33)."""
+    count = drone.of("define_trajectory")[0][1][2]
+    return np.frombuffer(drone.memory[: PIECE_BYTES * count], "<f4").astype(float).reshape(-1, 33)
+
+
+def evaluate(pieces: Any, time_s: float, order: int = 0) -> Any:
+    """Return x, y, z and yaw, or a derivative of them, at a time."""
+    for piece in pieces:
+        if time_s <= piece[32]:
+            break
+        time_s -= piece[32]
+    polynomials = [np.polynomial.Polynomial(piece[8 * k : 8 * k + 8]) for k in range(4)]
+    return np.array([each.deriv(order)(time_s) if order else each(time_s) for each in polynomials])

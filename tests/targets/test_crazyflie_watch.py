@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from mambo_codegen.settings.model import Settings
+from mambo_sil.model.replay.log_replay import replay_log
 from tests.support.bundles import write_target
 from tests.support.height_settings import height_settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.radio import LOG_BYTES, Drone
 from tests.support.scripts import SETTINGS, at_call, modules_of, run, without
+from tests.support.tools import require
 
 LANDED, STOPPED = ["notify", "land", "stop", "close"], ["stop_setpoint", "notify", "stop", "close"]
 BYTES = {"LOG_UINT8": 1, "LOG_UINT16": 2, "LOG_UINT32": 4, "LOG_FLOAT": 4}
@@ -177,6 +179,14 @@ def test_a_simulated_flight_is_measured_by_the_sensors_that_are_named(
     assert (off_cm > 3.0) == (name == "flow-deck")
     assert run(scripts, "hover", "--simulate", "--sensors", "gps") == 1
     assert 'No flight: sensors = "gps" must be "true" or "mocap"' in capsys.readouterr().err
+
+
+def test_a_landing_that_comes_to_rest_is_no_other_flight(scripts: dict[str, ModuleType]) -> None:
+    """With the true state a drone on the floor has velocities of 0; `replay` goes by the count."""
+    require("gcc", "gcc")
+    assert run(scripts, "hover", "--simulate", "--sensors", "true", "--log", "log.csv") == 0
+    replay = replay_log(Path("log.csv"), {}, SETTINGS)
+    assert np.array_equal(replay.replayed_rad, replay.logged_rad)
 
 
 def test_the_simulated_planner_moves_as_the_firmware_s(scripts: dict[str, ModuleType], folder: Path) -> None:

@@ -175,7 +175,7 @@ def read_inputs(path: Path, columns: Mapping[str, Column], settings: Settings) -
     shift = np.stack([_held_or(log, f"{SHIFT}_{axis}", time_s, 0.0) for axis in range(7)], axis=1)
     is_steady = ~(jump.any(axis=1) | shift.any(axis=1))
     restarts = clock.restarts | _elsewhere(state, is_logged & is_steady, time_s)
-    if all(log.signals[name].resolution is None for name in VELOCITY):
+    if not clock.counted and all(log.signals[name].resolution is None for name in VELOCITY):
         restarts |= _at_rest(state)
     begins |= restarts
     begins |= np.diff(time_s, prepend=time_s[0]) > _PAUSE_UPDATES * period_s
