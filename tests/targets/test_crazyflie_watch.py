@@ -181,11 +181,16 @@ def test_a_simulated_flight_is_measured_by_the_sensors_that_are_named(
     assert 'No flight: sensors = "gps" must be "true" or "mocap"' in capsys.readouterr().err
 
 
-def test_a_landing_that_comes_to_rest_is_no_other_flight(scripts: dict[str, ModuleType]) -> None:
+def test_a_landing_that_comes_to_rest_is_no_other_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With the true state a drone on the floor has velocities of 0; `replay` goes by the count."""
     require("gcc", "gcc")
+    settings = height_settings()
+    monkeypatch.chdir(tmp_path)
+    scripts = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)
     assert run(scripts, "hover", "--simulate", "--sensors", "true", "--log", "log.csv") == 0
-    replay = replay_log(Path("log.csv"), {}, SETTINGS)
+    replay = replay_log(Path("log.csv"), {}, settings)
     assert np.array_equal(replay.replayed_rad, replay.logged_rad)
 
 
