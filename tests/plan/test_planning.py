@@ -39,6 +39,13 @@ def test_a_plan_is_flown_by_all_its_drones(made: Plan) -> None:
     assert f"crazyflie: {summary.time_s:.2f} s through 3 points" in repr(made)
 
 
+def test_thrust_and_tilt_are_those_of_the_plan(made: Plan) -> None:
+    """Those of the run-in before it do not count: a slower plan takes less."""
+    slow = plan(POINTS, Vehicle.from_preset("crazyflie"), drones=3, rate=0.3)
+    assert slow.summary.largest_thrust_weights < 0.95 * made.summary.largest_thrust_weights
+    assert slow.summary.largest_tilt_rad < 0.5 * made.summary.largest_tilt_rad
+
+
 def test_another_flight_passes_the_points_too(made: Plan) -> None:
     """`fly` with the same settings and other noise, judged by the trace alone."""
     controller = Controller.from_vehicle("crazyflie")

@@ -90,7 +90,7 @@ class FlownPlan:
                the plane where the settings do not hold the height.
     crashed:   (m,).
     error_m:   largest distance of each from the plan (m,).
-    tilt_rad, thrust_m_s2: largest of each (m,).
+    tilt_rad, thrust_m_s2: largest of each on the plan (m,).
     """
 
     off_m: FloatArray
@@ -154,12 +154,14 @@ class Drones:
             sensors=choose_sensors(DEFAULT_SENSORS[vehicle.drone.sensors.kind], vehicle.drone),
         )
         trace = fly(flight, CompiledController(self.settings, flights))
+        planned = trace.time_s >= judged_s
+        tilt_rad = np.arccos(np.cos(trace.euler_rad[planned, :, 0]) * np.cos(trace.euler_rad[planned, :, 1]))
         return FlownPlan(
             _off_m(trace, course, points, judged_s, axes=2 if self.settings.height is None else 3),
             detect_crashes(trace, vehicle.drone),
             _error_m(trace, judged_s, axes=2 if self.settings.height is None else 3),
-            np.arccos(np.cos(trace.euler_rad[..., 0]) * np.cos(trace.euler_rad[..., 1])).max(axis=0),
-            trace.thrust_acceleration_m_s2.max(axis=0),
+            tilt_rad.max(axis=0),
+            trace.thrust_acceleration_m_s2[planned].max(axis=0),
         )
 
 
