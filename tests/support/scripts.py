@@ -1,6 +1,7 @@
 """The scripts of the Crazyflie's app: imported and run, with a drone of plain values or one on the desk."""
 
 import builtins
+import dataclasses
 import importlib
 import math
 import sys
@@ -20,20 +21,42 @@ from tests.support.radio import ARMED, CAN_FLY, FLYING, Clock, Drone, install
 SETTINGS = presets.preset("crazyflie")
 PLACE = (1.0, -0.5, 0.1)
 """Where the drone stands: x, y, height of the floor."""
-MODULES = ("heading", "radio", "figures", "checks", "fly", "simulated_drone", "offboard")
+PACKAGE = "crazyflie_flight"
+_PARTS = (
+    *("values", "ends", "calls", "figures", "heading", "radio", "checks", "flying", "possible"),
+    *("log_file", "simulated_drone"),
+)
+MODULES = {
+    PACKAGE: PACKAGE,
+    **{name: f"{PACKAGE}.{name}" for name in _PARTS},
+    **{name: name for name in ("fly", "offboard")},
+}
+"""Modules of the scripts by their short names, each behind those that it imports."""
 
 
 def modules_of(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, ModuleType]:
     """Import the modules of a folder."""
     patch.syspath_prepend(str(folder))
     patch.setattr(sys, "dont_write_bytecode", True)
-    for name in MODULES:
+    for name in MODULES.values():
         patch.delitem(sys.modules, name, raising=False)
-    found = {name: importlib.import_module(name) for name in MODULES}
-    for name in MODULES:
+    found = {short: importlib.import_module(name) for short, name in MODULES.items()}
+    for short, name in MODULES.items():
         patch.delitem(sys.modules, name)
-        patch.setitem(sys.modules, name, found[name])
+        patch.setitem(sys.modules, name, found[short])
     return found
+
+
+def change_values(scripts: dict[str, ModuleType], **values: float) -> None:
+    """Let the scripts have other values of their settings."""
+    possible = vars(scripts["possible"])
+    possible["VALUES"] = dataclasses.replace(possible["VALUES"], **values)
+
+
+def figure_of(scripts: dict[str, ModuleType], *arguments: str) -> Any:
+    """Return the figure that a command line names."""
+    reader = scripts["fly"].parser()
+    return scripts["fly"].figure_of(reader.parse_args(arguments), reader)
 
 
 def run(scripts: dict[str, ModuleType], *arguments: str) -> int:

@@ -12,7 +12,7 @@ from mambo_sil.flight.polynomials import COLUMNS
 from mambo_sil.plan.hermite import pieces_of
 from tests.support import radio
 from tests.support.radio import Drone
-from tests.support.scripts import PLACE, at_call, evaluate, run, uploaded
+from tests.support.scripts import PLACE, at_call, change_values, evaluate, figure_of, run, uploaded
 
 PREPARED = ["set_value", "stop"]
 LANDED = ["notify", "land", "stop", "close"]
@@ -128,11 +128,10 @@ def test_a_lap_may_ask_for_all_that_tilt_and_thrust_give(
     scripts: dict[str, ModuleType], drone: Drone, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It was flown before it was called good; more is refused, with the share of its rate that would fly."""
-    fly = scripts["fly"]
     asked = scripts["figures"].fastest(scripts["figures"].read_lap(lap(tmp_path, 2)))[1]
-    vars(fly).update(MOST_M_S2=0.96 * asked, MOST_OF_LAP_M_S2=1.01 * asked)
+    change_values(scripts, flown_m_s2=0.96 * asked, lap_m_s2=1.01 * asked)
     assert run(scripts, lap(tmp_path, 2)) == 0
-    vars(fly).update(MOST_OF_LAP_M_S2=0.8 * asked)
+    change_values(scripts, lap_m_s2=0.8 * asked)
     begun = len(drone.calls)
     assert run(scripts, lap(tmp_path, 2)) == 1
     assert "plan it at 0.89 of its present --rate" in capsys.readouterr().err
@@ -144,9 +143,8 @@ def too_quick(scripts: dict[str, ModuleType], drone: Drone) -> Any:
     vars(scripts["radio"])["CHECKS"] += ("nmpc.tooQuick",)
     drone.logged["nmpc.tooQuick"] = 0
     at_call(drone, "start_trajectory", 5.0, lambda: drone.logged.update({"nmpc.tooQuick": 1}))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["fly.py", "eight"])
-        found = scripts["figures"].pieces_of(scripts["fly"].arguments(), (*PLACE, math.radians(30.0)))
+    figure = figure_of(scripts, "eight")
+    found = scripts["figures"].pieces_of(figure, (*PLACE, math.radians(30.0)))
     return np.frombuffer(b"".join(piece.pack() for piece in found), "<f4").astype(float).reshape(-1, 33)
 
 

@@ -14,7 +14,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from tests.support.bundles import write_target
 from tests.support.derived import settings_for
-from tests.support.scripts import DeskDrone, modules_of, ready_on_desk, run
+from tests.support.scripts import DeskDrone, figure_of, modules_of, ready_on_desk, run
 
 SETTINGS = settings_for(vehicle_toml.preset("crazyflie"), exact=True)
 HEAVY: dict[str, Any] = {"mass_kg": 0.036}
@@ -109,10 +109,9 @@ def test_the_desk_takes_as_many_pieces_as_the_memory_holds(app: Path) -> None:
 
 def test_the_path_stays_when_time_runs_slower(scripts: dict[str, ModuleType]) -> None:
     """Every place of the slowed figure is one of the figure, to half a centimetre; motions do not jump."""
-    figures, plan = scripts["figures"], scripts["fly"].arguments
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sys.argv", ["fly.py", "eight", "--size", "2", "--rate", "1.2"])
-        pieces = figures.pieces_of(plan(), (0.0, 0.0, 0.0, 0.0))
+    figures = scripts["figures"]
+    figure = figure_of(scripts, "eight", "--size", "2", "--rate", "1.2")
+    pieces = figures.pieces_of(figure, (0.0, 0.0, 0.0, 0.0))
     slower = figures.slow_down(pieces, 10, 0.85)
 
     def motions(of: Any, order: int) -> Any:

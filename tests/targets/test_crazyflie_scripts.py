@@ -17,6 +17,7 @@ from tests.support.scripts import (
     PLACE,
     SETTINGS,
     at_call,
+    change_values,
     evaluate,
     interrupt,
     modules_of,
@@ -325,7 +326,7 @@ def test_a_figure_that_is_too_fast_or_has_no_log_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Before anything is connected."""
-    vars(scripts["fly"])["SPEED_M_S"] = 1.2
+    change_values(scripts, speed_m_s=1.2)
     assert run(scripts, *arguments) == 1
     assert message in capsys.readouterr().err
     assert not drone.calls
@@ -341,11 +342,17 @@ def test_without_cflib_it_says_what_to_install(
 
 
 def test_scripts_have_the_prefix_and_log_what_targets_know(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The group of logs and parameters is that of the app."""
+    """The group of logs and parameters is that of the app; the scripts are those of other settings."""
     settings = with_option(SETTINGS, "code.prefix", "left")
-    radio = modules_of(write_target("crazyflie", settings, tmp_path), monkeypatch)["radio"]
+    other = write_target("crazyflie", settings, tmp_path)
+    scripts = sorted(path.relative_to(other) for path in other.rglob("*.py"))
+    assert len(scripts) == 14
+    assert [(folder / path).read_bytes() for path in scripts] == [
+        (other / path).read_bytes() for path in scripts
+    ]
+    radio = modules_of(other, monkeypatch)["radio"]
     assert radio.GROUP == "left"
     assert radio.LOGGED[0][:2] == ("left.step", "left.x")
     assert {"left.targetAy", "left.targetKnown"} <= {*radio.LOGGED[2]}

@@ -207,6 +207,7 @@ def test_the_simulated_planner_moves_as_the_firmware_s(scripts: dict[str, Module
         [1.0, 2.0, 1.5], [0.5, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], 0, 0, 0
     )
     flown.wait(0.1)
+    flown = flown.planned
     assert flown.vertical([0.0, 1.0, 2.0])[1] == pytest.approx([0.5, 1.09375, 0.0])
     (before,), (after,) = flown.target([5.0 - 1e-6]), flown.target([5.0 + 1e-6])
     assert before == pytest.approx([1.0, 0.5, 1.09375, 0.546875], abs=1e-4)

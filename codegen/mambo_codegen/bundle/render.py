@@ -112,12 +112,19 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"
+    paths = [path for path in templates.list_templates(extensions=["j2", "py"]) if path.startswith(own)]
     files = {
         path.removeprefix(own).removesuffix(".j2"): templates.get_template(path).render(context)
-        for path in templates.list_templates(extensions=["j2"])
-        if path.startswith(own)
+        for path in paths
+        if path.endswith(".j2")
     }
-    return with_sbom(library | _finish(files, settings))
+    scripts = {path.removeprefix(own): _source(path) for path in paths if path.endswith(".py")}
+    return with_sbom(library | _finish(files, settings) | scripts)
+
+
+def _source(path: str) -> str:
+    """Return the text of a script, which is the same for all settings."""
+    return KernelLoader("mambo_templates", "").get_source(environment(), path)[0]
 
 
 def _pil_payload_bytes(method: Method) -> int:

@@ -1,7 +1,8 @@
 """The targets of `mambo-nmpc generate --for`: folders that build as they are, in a firmware or a tool.
 
 A target is an entry here and a folder of templates, `firmware/NAME`, laid out like the folder that they make:
-`src/Kbuild.j2` becomes `src/Kbuild`. Names of the controller in paths and texts get its prefix.
+`src/Kbuild.j2` becomes `src/Kbuild`. Names of the controller in paths and texts get its prefix. Python, such
+as `fly.py`, is copied as it stands: its numbers are in a file of values.
 """
 
 import difflib

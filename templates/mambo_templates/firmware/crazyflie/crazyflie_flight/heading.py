@@ -1,29 +1,32 @@
-"""Whether a drone moves where its tilt pushes it by the heading that its filter believes: what the hop of fly.py compares.
+"""What the hop of fly.py compares: whether a drone moves where its tilt and believed heading push it.
 
-With one camera marker the filter cannot measure the heading: it begins with kalman.initialYaw, and learns the rest in flight. The
-position that it reports is measured. So over a hop the position is a + b t + c t^2 + turn s(t), where s is the second integral of the
-acceleration that tilt and believed heading give, and c stands for wind and a tilt that is off. The angle of the complex `turn` is what
-the heading is off. Least squares find it.
+With one camera marker the filter cannot measure the heading: it begins with kalman.initialYaw, and learns the
+rest in flight. The position that it reports is measured. So over a hop the position is
+a + b t + c t^2 + turn s(t), where s is the second integral of the acceleration that tilt and believed
+heading give, and c stands for wind and a tilt that is off. The angle of the complex `turn` is what the
+heading is off. Least squares find it.
 """
 
 import math
+from collections.abc import Mapping
 
-from radio import GROUP
+from .calls import Rows
+from .values import VALUES
 
-POSE = tuple(f"{GROUP}.{name}" for name in ("x", "y", "inRoll", "inPitch", "inYaw"))
+POSE = tuple(f"{VALUES.group}.{name}" for name in ("x", "y", "inRoll", "inPitch", "inYaw"))
 GRAVITY_M_S2, LEAST_ROWS = 9.81, 30
 
 
-def push(row):
+def push(row: Mapping[str, float]) -> complex:
     """Return the acceleration, x + i y, that tilt and believed heading give."""
     roll, pitch, yaw = (row[name] for name in POSE[2:])
     return -GRAVITY_M_S2 * complex(math.tan(pitch), math.tan(roll)) * complex(math.cos(yaw), math.sin(yaw))
 
 
-def heading_error(rows, duration_s):
-    """Return by how much, in rad to the left, the heading is off; NaN if the rows of the last `duration_s` are too few.
+def heading_error(rows: Rows, duration_s: float) -> float:
+    """Return by how much, in rad to the left, the heading is off, by the rows of the last `duration_s`.
 
-    `rows` are those of the log, by time stamps in ms.
+    NaN if they are too few.
     """
     import numpy as np  # comes with cflib
 
