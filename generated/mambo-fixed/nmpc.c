@@ -1498,15 +1498,15 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
     return (value < (nmpc_square_t)limit) ? (nmpc_real_t)value : limit;
 }
 
-/* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
+/* Speed over distance, and a length over a length, at most 1, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
     return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> NMPC_RATIO_SHIFT, NMPC_STEEPEST_1_S);
 }
 
-static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
+static nmpc_real_t length_ratio(nmpc_real_t part, nmpc_root_t root)
 {
-    return at_most(size_product(speed_m_s, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
+    return at_most(size_product(part, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
 }
 
 /* Ratio times distance, m/s, within the range of velocities. */
@@ -1541,9 +1541,9 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
     return at_most((length(inverse_root(square)) << NMPC_ROOT_UP) >> NMPC_ROOT_DOWN, NMPC_VELOCITY_RANGE_M_S);
 }
 
-static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
+static nmpc_real_t share_product(nmpc_real_t value, nmpc_real_t share)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_s * share, NMPC_SINE_BITS);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)value * share, NMPC_SINE_BITS);
 }
 
 /* ---- Limits ---------------------------------------------------------------------------------------------------------
@@ -1652,7 +1652,7 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
         const nmpc_real_t towards = (within(place_m, half_width_m) != 0) ? velocity_m_s : place_m;
         const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
         const nmpc_real_t room_m = half_width_m - (sign * place_m);
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
+        const nmpc_real_t excess_m = absolute(room_m) - bounds->knee_m;
         nmpc_real_t most_m_s = approach_product(NMPC_APPROACH_1_S, room_m);
 
         if (excess_m > (nmpc_real_t)0) {
@@ -1696,7 +1696,7 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
         const nmpc_root_t root = inverse_root(square);
         const nmpc_real_t distance_m = at_most(length(root), 2 * NMPC_POSITION_RANGE_M);
         /* Not less than 0, by rounding. */
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
+        const nmpc_real_t excess_m = absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = approach_ratio(speed_m_s, root);
@@ -1709,10 +1709,10 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
     }
     square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
     if (square > squared(fastest_m_s)) {
-        const nmpc_real_t share = speed_ratio(fastest_m_s, inverse_root(square));
+        const nmpc_real_t share = length_ratio(fastest_m_s, inverse_root(square));
 
-        limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
-        limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
+        limited->velocity_m_s[0] = share_product(limited->velocity_m_s[0], share);
+        limited->velocity_m_s[1] = share_product(limited->velocity_m_s[1], share);
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */
@@ -2112,6 +2112,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
     /* e, v, w, j, a, i, c and u, right and forward; the first three are those along x and y, turned. */
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
+    nmpc_real_t move_m_step2[2];
     int axis;
 
     NMPC_UNROLL
@@ -2134,11 +2135,10 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t most_m_step2 = largest_move(self, step, axis);
-        const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
-
-        attitude->command_m_step2[axis] = move_acceleration(move_m_step2);
+        move_m_step2[axis] = optimizer_minimize(axis, state[axis], largest_move(self, step, axis));
     }
+    attitude->command_m_step2[0] = move_acceleration(move_m_step2[0]);
+    attitude->command_m_step2[1] = move_acceleration(move_m_step2[1]);
 }
 
 /* Set the angles that stand for the model's command. */

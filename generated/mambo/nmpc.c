@@ -1392,7 +1392,7 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
         const nmpc_real_t towards = (within(place_m, half_width_m) != 0) ? velocity_m_s : place_m;
         const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
         const nmpc_real_t room_m = half_width_m - (sign * place_m);
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
+        const nmpc_real_t excess_m = absolute(room_m) - bounds->knee_m;
         nmpc_real_t most_m_s = NMPC_APPROACH_1_S * room_m;
 
         if (excess_m > (nmpc_real_t)0) {
@@ -1436,7 +1436,7 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
         const nmpc_root_t root = inverse_root(square);
         const nmpc_real_t distance_m = square * root;
         /* Not less than 0, by rounding. */
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
+        const nmpc_real_t excess_m = absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = speed_m_s * root;
@@ -1846,6 +1846,7 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
     /* e, v, w, j, a, i, c and u, right and forward; the first three are those along x and y, turned. */
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
+    nmpc_real_t move_m_step2[2];
     int axis;
 
     NMPC_UNROLL
@@ -1868,11 +1869,10 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t most_m_step2 = largest_move(self, step, axis);
-        const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
-
-        attitude->command_m_step2[axis] = move_m_step2;
+        move_m_step2[axis] = optimizer_minimize(axis, state[axis], largest_move(self, step, axis));
     }
+    attitude->command_m_step2[0] = move_m_step2[0];
+    attitude->command_m_step2[1] = move_m_step2[1];
 }
 
 /* Set the angles that stand for the model's command. */

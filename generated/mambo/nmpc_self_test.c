@@ -126,8 +126,12 @@ NMPC_SELF_TEST_SHARED unsigned long fold_controller(unsigned long digest, const 
 #define NMPC_SELF_TEST_TINY_M 1.1755e-40f
 
 /* Scales of the errors of position and velocity, from large to none; each input draws one. */
-static const nmpc_real_t self_test_error_m[5] = { 2.3841858e-06f, 1.1920929e-07f, 1.1920929e-08f, 5.9604643e-10f, 0.0f };
-static const nmpc_real_t self_test_error_m_s[5] = { 1.1920929e-06f, 5.9604645e-08f, 5.9604646e-09f, 2.9802322e-10f, 0.0f };
+static const nmpc_real_t self_test_error_m[5] = {
+    2.3841858e-06f, 1.1920929e-07f, 1.1920929e-08f, 5.9604643e-10f, 0.0f
+};
+static const nmpc_real_t self_test_error_m_s[5] = {
+    1.1920929e-06f, 5.9604645e-08f, 5.9604646e-09f, 2.9802322e-10f, 0.0f
+};
 
 /* How many numbers the members of nmpc_state_t and nmpc_target_t are, but for integers. */
 #define NMPC_SELF_TEST_STATE_NUMBERS 7U

@@ -199,13 +199,18 @@ NMPC_INLINE unsigned int lowest_set_bit(nmpc_steps_t word)
 #endif
 }
 
-NMPC_INLINE nmpc_sum_t absolute(nmpc_sum_t value)
+NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
 {
 #if defined(__GNUC__)
     return __builtin_fabsf(value);
 #else
-    return (value < (nmpc_sum_t)0) ? -value : value;
+    return (value < (nmpc_real_t)0) ? -value : value;
 #endif
+}
+
+NMPC_INLINE nmpc_sum_t absolute_sum(nmpc_sum_t value)
+{
+    return absolute(value);
 }
 
 NMPC_INLINE nmpc_real_t smaller(nmpc_real_t a, nmpc_real_t b)
@@ -459,7 +464,7 @@ typedef struct {
 NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *errors)
 {
     predictor_step(rollout);
-    errors->distance_m = errors->distance_m + (nmpc_real_t)absolute(rollout->error_m);
+    errors->distance_m = errors->distance_m + absolute(rollout->error_m);
     errors->negative = (errors->negative << 1) | is_negative(rollout->error_m);
 }
 
@@ -646,7 +651,7 @@ static void optimizer_minimize(nmpc_t *self)
         const nmpc_sum_t previous_cost = self->cost;
 
         self->cost = cost_evaluate(self);
-        if ((iteration > 0) && (absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
+        if ((iteration > 0) && (absolute_sum(self->cost - previous_cost) < NMPC_TOLERANCE)) {
             converged = 1;
         }
         if (converged == 0) {

@@ -12,7 +12,7 @@ from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.thrust_vector import ThrustVector
 from mambo_codegen.methods.quadratic.thrust_vector_constants import LEAST_SHARE, LEAST_SPARE_M_S2
 from mambo_codegen.methods.shared.limits import ActiveLimit
-from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT
+from mambo_codegen.numbers.reach import THRUST_LEFT
 from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -108,7 +108,7 @@ def test_the_tilt_gets_what_the_thrust_leaves_beside_the_height() -> None:
     assert method.settings.height is not None
     radius = THRUST_LEFT * method.settings.height.thrust_max_m_s2
     spare = found / step_s2
-    together = np.hypot(spare / SPARE_SHARE, vertical_m_s2) / radius
+    together = np.hypot(spare, vertical_m_s2) / radius
     free = spare > LEAST_SPARE_M_S2 + 1e-9
     assert np.all((together[free] <= 1 + 1e-9) & (together[free] >= 0.98))
     assert np.min(spare) == pytest.approx(LEAST_SPARE_M_S2)
@@ -151,6 +151,48 @@ def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
     (level, _), (climbing, active) = tilts
     assert climbing < 0.6 * level
     assert active & ActiveLimit.THRUST
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_a_move_is_as_long_in_every_direction_as_the_thrust_leaves(scalar: str) -> None:
+    """A target far away and above, by 64 bearings and six headings: the length, within the rounding."""
+    method = Quadratic(exact_settings(1.0, scalar))
+    bearing, heading = np.linspace(0, 2 * np.pi, 65)[:-1], np.linspace(-3, 3, 6)
+    angles = np.array([(one, other) for one in bearing for other in heading])
+    controller = method.reference_controller(len(angles))
+    state, target = np.zeros((len(angles), 10)), np.zeros((len(angles), 13))
+    state[:, 6] = angles[:, 1]
+    target[:, 0], target[:, 1] = 5 * np.cos(angles[:, 0]), 5 * np.sin(angles[:, 0])
+    target[:, 6] = 5.0
+    for _ in range(40):
+        step = controller.step(state, target)
+    assert step.active is not None
+    assert np.all(step.active & ActiveLimit.THRUST)
+    command = si(method, controller.memory.attitude.command, "acceleration")
+    found = controller.parts.height.spare(controller.memory.height)
+    assert found is not None
+    left = si(method, found, "acceleration")
+    bits = method.numbers.bits
+    rounding = 0.0 if bits is None else 2.0 ** -bits["move"]
+    np.testing.assert_allclose(np.hypot(*command.T), left, rtol=1e-6, atol=1.5 * rounding)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_a_short_move_stays_and_a_long_one_keeps_its_direction(scalar: str) -> None:
+    """Drawn moves around a drawn length, against the vector of that length."""
+    method = Quadratic(exact_settings(1.0, scalar))
+    draw = np.random.default_rng(3)
+    moves = numbers(method, draw.uniform(-0.05, 0.05, (5000, 2)), "move")
+    lengths = numbers(method, draw.uniform(0.005, 0.06, (5000, 2)), "move")[:, 0]
+    found, is_long = method.reference_controller(1).parts.limits.shortened(moves, lengths)
+    before, after, most = (si(method, one, "move") for one in (moves, found, lengths))
+    size = np.hypot(*before.T)
+    np.testing.assert_array_equal(is_long, size >= most)
+    np.testing.assert_array_equal(found[~is_long], moves[~is_long])
+    np.testing.assert_allclose(
+        after[is_long], (before * (most / size)[:, None])[is_long], rtol=2e-6, atol=1e-7
+    )
+    assert np.all(np.abs(after) <= np.abs(before))
 
 
 def test_small_angles_know_no_thrust_budget() -> None:

@@ -95,6 +95,9 @@ FAULTS = {
         ),
         "the share has another least": Harm("nmpc.c", r"(#define NMPC_LEAST_SHARE) [^ ]*", r"\1 0.9f"),
         "the thrust leaves all": Harm("nmpc.c", r"= \(step->left_m_step2 < most_m_step2\) \?", "= (0) ?"),
+        "a long move keeps its length": Harm(
+            "nmpc.c", r"smaller\(step->left_m_step2 \* inverse_root\(square\), NMPC_ONE\)", "NMPC_ONE"
+        ),
         "no word of the thrust": Harm("nmpc.c", r"step->by_thrust = NMPC_LIMIT_THRUST;", ""),
         "a bounded command is told as it was": Harm(
             "nmpc.c",

@@ -1,7 +1,6 @@
 """What the templates of the limits insert."""
 
 import math
-from typing import Final
 
 from mambo_codegen.methods.interface import Method
 from mambo_codegen.methods.shared.limits import ActiveLimit
@@ -21,9 +20,6 @@ from mambo_codegen.methods.shared.limits_constants import (
 )
 from mambo_codegen.numbers import literals
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
-
-LEAST_SQUARE: Final = 1e-9
-"""In floating point every square whose root the C takes is at least this, m^2 or m^2/s^2."""
 
 
 def limits_context(method: Method) -> dict[str, object]:
@@ -56,8 +52,8 @@ def limits_context(method: Method) -> dict[str, object]:
         "turn_bits": TURN_BITS,
         "least_turn": LEAST_TURN_M2_S2,
         "outage_steps": method.outage_steps,
-        "least_square": LEAST_SQUARE,
-        "root_limit": 2 / math.sqrt(LEAST_SQUARE),
+        "least_square": method.least_square,
+        "root_limit": 2 / math.sqrt(method.least_square),
     }
 
 

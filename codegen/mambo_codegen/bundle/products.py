@@ -14,8 +14,8 @@ _OTHER_NAMES: Final = (
     *("attitude_sum", "distance_gradient", "disturbance_correction", "effort_cost", "effort_gradient"),
     *("error_change", "factor_to_sine", "gain_correction", "half_change", "halved"),
     *("initial_error", "move_acceleration", "position_change", "position_correction", "row_sum"),
-    *("scaled_velocity", "sine_difference", "sine_sum", "sine_to_angle", "slope_acceleration"),
-    *("speed_ratio", "squared", "to_factor", "to_move", "tracking_cost"),
+    *("share_product", "sine_difference", "sine_sum", "sine_to_angle", "slope_acceleration"),
+    *("length_ratio", "squared", "to_factor", "to_move", "tracking_cost"),
     *("tracking_gradient", "velocity_change", "velocity_correction"),
 )
 """The functions of fixed point beside those whose name ends in `_product`."""

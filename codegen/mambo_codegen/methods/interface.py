@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.shared.constants import Constants
+from mambo_codegen.methods.shared.limits_constants import LEAST_SQUARE
 from mambo_codegen.methods.shared.math import Real
 from mambo_codegen.methods.shared.proofs import FIXED_PROOFS, with_limits
 from mambo_codegen.port.row import BYTE, NUMBER, SUM
@@ -194,6 +195,11 @@ class Method(Constants):
     def outage_steps(self) -> int | None:
         """Control steps without a good state over which the method flies on by an estimate; None without."""
         return None
+
+    @property
+    def least_square(self) -> float:
+        """In floating point every square whose root the C takes is at least this, in the units of each."""
+        return LEAST_SQUARE
 
     @property
     def proofs(self) -> Mapping[str, tuple[str, ...]]:

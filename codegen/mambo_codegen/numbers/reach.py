@@ -10,8 +10,8 @@ from mambo_codegen.settings.sections import Sections
 THRUST_LEFT: Final = 0.92
 """Share of the largest thrust that height and tilt may take together: the rest is for attitude and yaw."""
 
-SPARE_SHARE: Final = 0.85
-"""Share of what the height leaves that each of right and forward may take."""
+PLANNED_SHARE: Final = 0.85
+"""Share of what the height leaves of the thrust that a curve may take: the rest is for corrections."""
 
 FLOWN_SHARE: Final = 0.95
 """Of the largest acceleration, what a curve may ask for: the rest is for corrections and drag."""
@@ -38,6 +38,6 @@ def flown_acceleration_m_s2(settings: Sections) -> float:
     largest_m_s2 = largest_acceleration_m_s2(settings)
     if settings.height is not None:
         left_m_s2 = THRUST_LEFT * settings.height.thrust_max_m_s2
-        spare_m_s2 = SPARE_SHARE * math.sqrt(max(left_m_s2**2 - GRAVITY_M_S2**2, 0.0))
+        spare_m_s2 = PLANNED_SHARE * math.sqrt(max(left_m_s2**2 - GRAVITY_M_S2**2, 0.0))
         largest_m_s2 = min(largest_m_s2, spare_m_s2)
     return FLOWN_SHARE * largest_m_s2

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT, largest_acceleration_m_s2
+from mambo_codegen.numbers.reach import PLANNED_SHARE, THRUST_LEFT, largest_acceleration_m_s2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -211,12 +211,12 @@ def _cone(slope: float) -> Rule:
 
 
 def _ellipsoid(most_m_s2: float) -> Rule:
-    """Bound the thrust, of which the horizontal part may take SPARE_SHARE of what the height leaves.
+    """Bound the thrust, of which the horizontal part may take PLANNED_SHARE of what the height leaves.
 
     The share is that of the thrust beyond the weight.
     """
     ball, spare = (
-        _ball(most_m_s2, np.array([1.0 / SPARE_SHARE, 1.0 / SPARE_SHARE, 1.0])),
+        _ball(most_m_s2, np.array([1.0 / PLANNED_SHARE, 1.0 / PLANNED_SHARE, 1.0])),
         most_m_s2 - GRAVITY_M_S2,
     )
 

@@ -1,5 +1,6 @@
 """The quadratic cost, minimised in closed form, behind the interface of all methods."""
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -127,6 +128,13 @@ class Quadratic(QuadraticConstants, Method):
     def outage_steps(self) -> int:
         """Control steps without a good state over which the observer predicts."""
         return self.observer.outage_steps
+
+    @property
+    def least_square(self) -> float:
+        """That of the limits or, with the direction of the thrust, of the shortest move that it leaves."""
+        vector = self.thrust_vector
+        left = vector.least_spare_m_step2 if vector else math.inf
+        return min(super().least_square, 0.99 * left**2)
 
     @property
     def linear_law(self) -> LinearLaw:

@@ -378,7 +378,7 @@ class ControlStep:
     def _minimize(self, memory: QuadraticMemory, seen: _Observed, aim: _Aim) -> tuple[Real, Rows]:
         """Return the first free moves (n, 2), right and forward, by the minimum of the cost along both axes.
 
-        And whether what the thrust leaves limits one of them (n,).
+        And whether what the thrust leaves limits them (n,).
         """
         attitude, estimate = seen.attitude, seen.estimate
         disturbance = self.observer.disturbance(estimate) - aim.motion.acceleration_m_step2
@@ -399,16 +399,16 @@ class ControlStep:
         moves = self.optimizer.minimize(np.stack(state, axis=2), limit)
         if left is None:
             return moves, np.zeros(len(moves), np.bool_)
-        return moves, np.any((limit == left) & (np.abs(moves) >= limit), axis=1)
+        return self.limits.shortened(moves, left)
 
     def _largest_move(self, memory: QuadraticMemory, aim: _Aim) -> tuple[Real, Real | None]:
-        """Return the largest moves (n, 2), and what the thrust leaves to each, None if it does not count."""
+        """Return the largest moves (n, 2), and what the thrust leaves (n,), None if it does not count."""
         spare = self.height.spare(aim.height)
         limit = self.model.weighed(self._learnt_limit(memory, aim.limits.command_limit), aim.weight)
         if spare is None:
             return limit, None
         left = self.products.to_move(spare)[:, None]
-        return np.where(left < limit, left, limit), left
+        return np.where(left < limit, left, limit), left[:, 0]
 
     def _find_angles(self, memory: QuadraticMemory, attitude: AttitudeState, aim: _Aim) -> Real:
         """Return roll and pitch (n, 2) that stand for the commands of models."""

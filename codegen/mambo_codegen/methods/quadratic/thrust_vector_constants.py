@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, reciprocal
-from mambo_codegen.numbers.reach import SPARE_SHARE, THRUST_LEFT
+from mambo_codegen.numbers.reach import THRUST_LEFT
 from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR, arc_tangent
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
@@ -102,7 +102,6 @@ def thrust_vector_context(vector: ThrustVectorConstants | None) -> dict[str, obj
         "most_slope": MOST_SLOPE,
         "quarter_turn": math.pi / 2,
         "thrust_left": THRUST_LEFT,
-        "spare_share": SPARE_SHARE,
         "least_spare_m_s2": LEAST_SPARE_M_S2,
         "known_spare_rad": KNOWN_SPARE_RAD,
     }
@@ -145,10 +144,7 @@ def _tilts_rad(settings: Sections, side: float) -> NDArray[np.float64]:
 
 
 def _chords() -> NDArray[np.float64]:
-    """Return (CHORDS, 2) a, b of a r - b z, whose least stands for SPARE_SHARE sqrt(r^2 - z^2)."""
+    """Return (CHORDS, 2) a, b of a r - b z, whose least stands for sqrt(r^2 - z^2)."""
     angle = math.pi / 2 / CHORDS
     middles = (np.arange(CHORDS) + 0.5) * angle
-    chords: NDArray[np.float64] = SPARE_SHARE * np.stack(
-        [math.cos(angle / 2) / np.cos(middles), np.tan(middles)], axis=1
-    )
-    return chords
+    return np.stack([math.cos(angle / 2) / np.cos(middles), np.tan(middles)], axis=1)

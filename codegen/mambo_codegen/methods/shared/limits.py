@@ -146,6 +146,7 @@ class LimitsLaw:
         constant = self._numbers.constant
         self._smallest_speed = constant(SMALLEST_LIMIT, "velocity")
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
+        self._whole = constant(1.0, "sine")
         self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
         self._trim = constant(limits.tilted.trim_m_s2, "braking")
         self._turn = None
@@ -342,6 +343,14 @@ class LimitsLaw:
             return memory
         moved = clamp(memory.target_m_s + change_m_s[:, 0:2], self._ranges.velocity)
         return replace(memory, target_m_s=moved)
+
+    def shortened(self, move: Real, length: Real) -> tuple[Real, Rows]:
+        """Return vectors (n, 2) of at most a length (n,), and which were as long or longer (n,)."""
+        products = self._products
+        square = products.square_sum(move)
+        is_long = square >= products.square(length)
+        share = smaller(products.share(length, products.inverse_root(square)), self._whole)
+        return np.where(is_long[:, None], products.share_product(move, share[:, None]), move), is_long
 
     def is_slow(self, bounds: Bounds, target: Real) -> Rows:
         """Return whether targets move at half the speed at which braking ends or less, along x and y (n,)."""

@@ -148,13 +148,13 @@ class LimitsArithmetic(Products):
         """Return speed over distance, 1/s, at most k / NEAR_SHARE, given the inverse of the distance."""
         return self._at_most(self._down(self._root_product(speed_m_s, root), "ratio"), self._steepest)
 
-    def share(self, speed_m_s: Real, root: Any) -> Real:
-        """Return speed over speed, given the inverse of the second."""
-        return self._at_most(self._root_product(speed_m_s, root), 2**SHARE_BITS)
+    def share(self, part: Real, root: Any) -> Real:
+        """Return a length over a length, in fixed point at most 1, given the inverse of the second."""
+        return self._at_most(self._root_product(part, root), 2**SHARE_BITS)
 
-    def share_product(self, velocity_m_s: Real, share: Real) -> Real:
-        """Return velocity * share."""
-        return self.nearest(velocity_m_s * share, "share")
+    def share_product(self, value: Real, share: Real) -> Real:
+        """Return value * share."""
+        return self.nearest(value * share, "share")
 
     def least_braking(self, braking: Real, speed_m_s: Real) -> Real:
         """Return twice the braking, at most what the approach rate asks for at a speed."""

@@ -41,6 +41,9 @@ TURN_SHARE: Final = 0.9
 LEAST_TURN_M2_S2: Final = 4e-5
 """The smallest turn that limits a speed: its square has a root in float32."""
 
+LEAST_SQUARE: Final = 1e-9
+"""In floating point every square whose root the limits take is at least this, m^2 or m^2/s^2."""
+
 _MEMBERS: Final = [row.member for row in taken.LIMITS for _ in range(int(row.count))]
 PLACES: Final = {row.member: _MEMBERS.index(row.member) for row in taken.LIMITS}
 """The place of each member of nmpc_limits_t among its numbers, the first of a fence's two."""

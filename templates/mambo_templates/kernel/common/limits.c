@@ -84,12 +84,12 @@ static nmpc_real_t limits_turn(nmpc_bounds_t *bounds, const nmpc_real_t velocity
         bounds->turn_m2_s2 = turn_m2_s2;
         if ((size_m2_s2 > most_m2_s2) && (size_m2_s2 > NMPC_LEAST_TURN_M2_S2)) {
 #if WITH_FIXED
-            const nmpc_real_t share = speed_ratio((nmpc_real_t)most_m2_s2, inverse_root(squared(size_m2_s2)));
+            const nmpc_real_t share = length_ratio((nmpc_real_t)most_m2_s2, inverse_root(squared(size_m2_s2)));
 #else
-            const nmpc_real_t share = speed_ratio(most_m2_s2, inverse_root(squared(size_m2_s2)));
+            const nmpc_real_t share = length_ratio(most_m2_s2, inverse_root(squared(size_m2_s2)));
 #endif
 
-            fastest_m_s = smaller(fastest_m_s, larger(scaled_velocity(speed_m_s, share), slow_m_s));
+            fastest_m_s = smaller(fastest_m_s, larger(share_product(speed_m_s, share), slow_m_s));
         }
     }
     return fastest_m_s;
@@ -177,7 +177,7 @@ NMPC_SHARED unsigned int limits_wall(const nmpc_bounds_t *bounds, nmpc_target_t 
         const nmpc_real_t towards = (within(place_m, half_width_m) != 0) ? velocity_m_s : place_m;
         const nmpc_real_t sign = (towards < (nmpc_real_t)0) ? (nmpc_real_t)-1 : (nmpc_real_t)1;
         const nmpc_real_t room_m = half_width_m - (sign * place_m);
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(room_m) - bounds->knee_m;
+        const nmpc_real_t excess_m = absolute(room_m) - bounds->knee_m;
         nmpc_real_t most_m_s = approach_product(NMPC_APPROACH_1_S, room_m);
 
         if (excess_m > (nmpc_real_t)0) {
@@ -225,7 +225,7 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
         const nmpc_real_t distance_m = square * root;
 #endif
         /* Not less than 0, by rounding. */
-        const nmpc_real_t excess_m = (nmpc_real_t)absolute(distance_m - end_m);
+        const nmpc_real_t excess_m = absolute(distance_m - end_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_square(bounds, excess_m));
 
         ratio_1_s = approach_ratio(speed_m_s, root);
@@ -238,10 +238,10 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
     }
     square = square_sum(limited->velocity_m_s[0], limited->velocity_m_s[1]);
     if (square > squared(fastest_m_s)) {
-        const nmpc_real_t share = speed_ratio(fastest_m_s, inverse_root(square));
+        const nmpc_real_t share = length_ratio(fastest_m_s, inverse_root(square));
 
-        limited->velocity_m_s[0] = scaled_velocity(limited->velocity_m_s[0], share);
-        limited->velocity_m_s[1] = scaled_velocity(limited->velocity_m_s[1], share);
+        limited->velocity_m_s[0] = share_product(limited->velocity_m_s[0], share);
+        limited->velocity_m_s[1] = share_product(limited->velocity_m_s[1], share);
         others = NMPC_LIMIT_SPEED;
     }
     /* Rounding aside this changes nothing: it tells a proof by intervals how large the velocities are. */

@@ -128,15 +128,15 @@ static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
     return (value < (nmpc_square_t)limit) ? (nmpc_real_t)value : limit;
 }
 
-/* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
+/* Speed over distance, and a length over a length, at most 1, given 1/sqrt of the square of the second. */
 static nmpc_real_t approach_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
 {
     return at_most((size_product(speed_m_s, root.mantissa) >> root.half) >> NMPC_RATIO_SHIFT, NMPC_STEEPEST_1_S);
 }
 
-static nmpc_real_t speed_ratio(nmpc_real_t speed_m_s, nmpc_root_t root)
+static nmpc_real_t length_ratio(nmpc_real_t part, nmpc_root_t root)
 {
-    return at_most(size_product(speed_m_s, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
+    return at_most(size_product(part, root.mantissa) >> root.half, (nmpc_real_t)1 << NMPC_SINE_BITS);
 }
 
 /* Ratio times distance, m/s, within the range of velocities. */
@@ -171,9 +171,9 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
     return at_most((length(inverse_root(square)) << NMPC_ROOT_UP) >> NMPC_ROOT_DOWN, NMPC_VELOCITY_RANGE_M_S);
 }
 
-static nmpc_real_t scaled_velocity(nmpc_real_t velocity_m_s, nmpc_real_t share)
+static nmpc_real_t share_product(nmpc_real_t value, nmpc_real_t share)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_s * share, NMPC_SINE_BITS);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)value * share, NMPC_SINE_BITS);
 }
 #else
 typedef nmpc_real_t nmpc_square_t;

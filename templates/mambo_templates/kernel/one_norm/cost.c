@@ -18,7 +18,7 @@ typedef struct {
 NMPC_INLINE void predict_error(nmpc_rollout_t *rollout, nmpc_axis_errors_t *errors)
 {
     predictor_step(rollout);
-    errors->distance_m = errors->distance_m + (nmpc_real_t)absolute(rollout->error_m);
+    errors->distance_m = errors->distance_m + absolute(rollout->error_m);
     errors->negative = (errors->negative << 1) | is_negative(rollout->error_m);
 }
 

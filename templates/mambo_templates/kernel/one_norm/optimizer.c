@@ -86,7 +86,7 @@ static void optimizer_minimize(nmpc_t *self)
         const nmpc_sum_t previous_cost = self->cost;
 
         self->cost = cost_evaluate(self);
-        if ((iteration > 0) && (absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
+        if ((iteration > 0) && (absolute_sum(self->cost - previous_cost) < NMPC_TOLERANCE)) {
             converged = 1;
         }
         if (converged == 0) {

@@ -75,10 +75,10 @@ NMPC_INLINE unsigned int lowest_set_bit(nmpc_steps_t word)
 }
 
 #endif
-NMPC_INLINE nmpc_sum_t absolute(nmpc_sum_t value)
+NMPC_INLINE nmpc_real_t absolute(nmpc_real_t value)
 {
 #if WITH_FIXED
-    return (value < (nmpc_sum_t)0) ? -value : value;
+    return (value < (nmpc_real_t)0) ? -value : value;
 #else
 #if defined(__GNUC__)
 #if WITH_DOUBLE
@@ -87,8 +87,17 @@ NMPC_INLINE nmpc_sum_t absolute(nmpc_sum_t value)
     return __builtin_fabsf(value);
 #endif
 #else
-    return (value < (nmpc_sum_t)0) ? -value : value;
+    return (value < (nmpc_real_t)0) ? -value : value;
 #endif
+#endif
+}
+
+NMPC_INLINE nmpc_sum_t absolute_sum(nmpc_sum_t value)
+{
+#if WITH_FIXED
+    return (value < (nmpc_sum_t)0) ? -value : value;
+#else
+    return absolute(value);
 #endif
 }
 

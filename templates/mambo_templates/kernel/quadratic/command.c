@@ -35,6 +35,23 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
     return most_m_step2;
 }
 
+#if WITH_THRUST_VECTOR
+/* Shorten a move, right and forward, to what the thrust leaves in its direction. */
+NMPC_INLINE void limit_to_thrust(nmpc_step_t *step, nmpc_real_t move_m_step2[2])
+{
+    const nmpc_square_t square = square_sum(move_m_step2[0], move_m_step2[1]);
+
+    step->by_thrust = 0U;
+    if (square >= squared(step->left_m_step2)) {
+        const nmpc_real_t share = smaller(length_ratio(step->left_m_step2, inverse_root(square)), NMPC_ONE);
+
+        move_m_step2[0] = share_product(move_m_step2[0], share);
+        move_m_step2[1] = share_product(move_m_step2[1], share);
+        step->by_thrust = NMPC_LIMIT_THRUST;
+    }
+}
+
+#endif
 /* Set the next command of the model to the minimum of the cost along both axes. */
 NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
 {
@@ -42,11 +59,11 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
     /* e, v, w, j, a, i, c and u, right and forward; the first three are those along x and y, turned. */
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
+    nmpc_real_t move_m_step2[2];
     int axis;
 
 #if WITH_THRUST_VECTOR
     step->left_m_step2 = to_move(height_spare(&self->height));
-    step->by_thrust = 0U;
 #endif
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
@@ -72,17 +89,13 @@ NMPC_INLINE void minimize(nmpc_t *self, nmpc_step_t *step)
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
     NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
-        const nmpc_real_t most_m_step2 = largest_move(self, step, axis);
-        const nmpc_real_t move_m_step2 = optimizer_minimize(axis, state[axis], most_m_step2);
-
-        attitude->command_m_step2[axis] = move_acceleration(move_m_step2);
-#if WITH_THRUST_VECTOR
-        if ((most_m_step2 >= step->left_m_step2)
-            && ((move_m_step2 >= step->left_m_step2) || (move_m_step2 <= -step->left_m_step2))) {
-            step->by_thrust = NMPC_LIMIT_THRUST;
-        }
-#endif
+        move_m_step2[axis] = optimizer_minimize(axis, state[axis], largest_move(self, step, axis));
     }
+#if WITH_THRUST_VECTOR
+    limit_to_thrust(step, move_m_step2);
+#endif
+    attitude->command_m_step2[0] = move_acceleration(move_m_step2[0]);
+    attitude->command_m_step2[1] = move_acceleration(move_m_step2[1]);
 }
 
 /* Set the angles that stand for the model's command. */

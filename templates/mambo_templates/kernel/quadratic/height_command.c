@@ -20,9 +20,9 @@
 
 #endif
 #if WITH_THRUST_VECTOR
-/* Right and forward get what the thrust leaves beside the height. With r a share of kg t_max and z = g + u each is at
- * most a share of sqrt(r^2 - z^2), for which chords of the quarter circle stand, 2 % of r inside at most, and at least
- * NMPC_LEAST_SPARE_M_STEP2. */
+/* The tilt gets what the thrust leaves beside the height. With r a share of kg t_max and z = g + u, its acceleration in
+ * any direction is at most sqrt(r^2 - z^2), for which chords of the quarter circle stand, 2 % of r inside at most, and
+ * at least NMPC_LEAST_SPARE_M_STEP2. */
 
 #endif
 /* A row times the state. */
@@ -41,11 +41,9 @@ NMPC_INLINE nmpc_real_t height_row(const nmpc_real_t row[NMPC_HEIGHT_STATES],
 
 /* Return u that minimises the cost from `state`, of the members that the rows name, in m, m/step and m/step^2, between
  * the limits. */
-NMPC_INLINE nmpc_real_t height_minimize(const nmpc_real_t state[NMPC_HEIGHT_STATES], nmpc_real_t least_m_step2,
-                                        nmpc_real_t most_m_step2)
+NMPC_INLINE nmpc_real_t height_minimize(const nmpc_real_t state[NMPC_HEIGHT_STATES], nmpc_real_t low_m_step2,
+                                        nmpc_real_t high_m_step2)
 {
-    const nmpc_real_t low_m_step2 = to_move(least_m_step2);
-    const nmpc_real_t high_m_step2 = to_move(most_m_step2);
     nmpc_real_t move_m_step2 = height_row(height_rows[0], state);
 #if WITH_TWO_MOVES
     const nmpc_real_t second_m_step2 = height_row(height_rows[1], state);
@@ -106,7 +104,7 @@ NMPC_INLINE int height_aim(nmpc_t *self, const nmpc_state_t *state, const nmpc_t
 #endif
     const nmpc_real_t least_m_step2 = factor_product(NMPC_THRUST_MIN_M_STEP2, share) - NMPC_GRAVITY_M_STEP2;
     const nmpc_real_t most_m_step2 = factor_product(NMPC_THRUST_MAX_M_STEP2, share) - NMPC_GRAVITY_M_STEP2;
-    nmpc_real_t command_m_step2 = height_minimize(errors, least_m_step2, most_m_step2);
+    nmpc_real_t command_m_step2 = height_minimize(errors, to_move(least_m_step2), to_move(most_m_step2));
     nmpc_real_t thrust_m_step2;
 
     if ((state != NULL) && (state->grounded != 0) && ((goal_m - state->height_m) <= NMPC_FLOOR_MARGIN_M)) {
@@ -126,7 +124,7 @@ NMPC_INLINE int height_aim(nmpc_t *self, const nmpc_state_t *state, const nmpc_t
 }
 
 #if WITH_THRUST_VECTOR
-/* The horizontal acceleration that the thrust leaves to each of right and forward, beside the command of the height. */
+/* The horizontal acceleration that the thrust leaves beside the command of the height. */
 NMPC_INLINE nmpc_real_t height_spare(const nmpc_height_t *height)
 {
 #if WITH_THRUST_GAIN

@@ -39,10 +39,10 @@ typedef struct {
     int limit_active;
 #endif
 #if WITH_THRUST_VECTOR
-    /* The slopes of the thrust, right and forward; the largest move that it leaves. */
+    /* The slopes of the thrust, right and forward; the longest move that it leaves. */
     nmpc_real_t slope[2];
     nmpc_real_t left_m_step2;
-    /* NMPC_LIMIT_THRUST if that limits a move, else 0. */
+    /* NMPC_LIMIT_THRUST if that limits the move, else 0. */
     unsigned int by_thrust;
 #endif
 } nmpc_step_t;
