@@ -6,6 +6,7 @@ import sys
 
 from benchmarks.evidence.item import EvidenceError, changes, make, restamp, write_tables
 from benchmarks.evidence.items import ITEMS
+from benchmarks.evidence.page_charts import draw_page_charts
 
 
 def main(arguments: list[str]) -> int:
@@ -40,6 +41,7 @@ def main(arguments: list[str]) -> int:
                     f"{item.name}: is as new as the code"
                     + (f"; wrote {', '.join(written)}" if written else "")
                 )
+        print("charts of pages:", ", ".join(draw_page_charts()) or "as new as their tables")
     except EvidenceError as error:
         print(error, file=sys.stderr)
         return 1

@@ -28,13 +28,13 @@ def opponents_chart(figures: Figures) -> Figure:
     distance, crashes = figure.subplots(1, 2, sharey=True)
     of = {campaign: figures[campaign]["controllers"] for campaign in figures if campaign != "improvements"}
     names = list(SHOWN)
-    _bars(
+    bars(
         distance,
         {"": [of["drawn"][name]["quantiles"]["seen_iae_m_s"]["0.5"] for name in names]},
         "median distance as estimated, cm (left is better)",
     )
     curves = {"eight, 0.5 rad/s": "slow-motors", "circle, 1.5 rad/s": "slow-motors-circle"}
-    _bars(
+    bars(
         crashes,
         {title: [of[one][name]["crashed"]["count"] for name in names] for title, one in curves.items()},
         "crashes of 300 (left is better)",
@@ -50,17 +50,41 @@ def opponents_chart(figures: Figures) -> Figure:
     return figure
 
 
+def peers_chart(figures: Figures) -> Figure:
+    """Return bars of a step's instructions by solver, on a logarithmic axis."""
+    rows = figures["rows"]
+    means = [_thousands(row["near, mean (most)"]) for row in rows]
+    figure = Figure(figsize=(PAGE_INCHES, 2.4), layout="constrained")
+    axes = figure.subplots()
+    bars(axes, {"": means}, "instructions per step near the target, mean, logarithmic (left is better)")
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.set_yticks(range(len(rows)), [row["solver"] for row in rows])
+    axes.invert_yaxis()
+    add_headline(
+        figure,
+        f"This MPC solves a step in {means[0]:.0f} instructions, the next solver in {sorted(means)[1]:,.0f}",
+        "Crazyflie's Cortex-M4F, -O2, the problem of preset mambo, 20 states each, counted in an emulator",
+    )
+    return figure
+
+
+def _thousands(cell: str) -> int:
+    """Return the first number of a cell, with commas between thousands."""
+    return int(cell.split(maxsplit=1)[0].replace(",", ""))
+
+
 def boards_chart(figures: Figures) -> Figure:
     """Return bars of a step's instructions and of the flash of preset `mambo`, by board and scalar type."""
     types = {"float32": figures["mambo"], "fixed point": figures["mambo --scalar fixed"]}
     figure = Figure(figsize=(PAGE_INCHES, 3.2), layout="constrained")
     instructions, flash = figure.subplots(1, 2, sharey=True)
-    _bars(
+    bars(
         instructions,
         {title: [one["instructions"]["mean"] for one in boards] for title, boards in types.items()},
         "instructions per step, mean",
     )
-    _bars(
+    bars(
         flash,
         {title: [one["flash_bytes"] / 1000 for one in boards] for title, boards in types.items()},
         "flash, KB",
@@ -77,7 +101,7 @@ def boards_chart(figures: Figures) -> Figure:
     return figure
 
 
-def _bars(axes: Axes, rows: dict[str, Sequence[float]], label: str) -> None:
+def bars(axes: Axes, rows: dict[str, Sequence[float]], label: str) -> None:
     """Draw horizontal bars, one or two per row, each with its value."""
     looks: list[dict[str, Any]] = [{"color": BLUE}, {"color": ORANGE, "hatch": "///", "edgecolor": "white"}]
     for number, (title, values) in enumerate(rows.items()):

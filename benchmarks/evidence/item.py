@@ -19,6 +19,7 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure
 
+from benchmarks.evidence.drawn import keep
 from benchmarks.evidence.sources import ROOT, controller_digests, git, object_ids
 from mambo_sil.results.folders import finite
 from mambo_sil.results.pictures import save
@@ -220,13 +221,13 @@ def write_tables(item: Item) -> list[str]:
 
 
 def draw_charts(item: Item, figures: Figures) -> None:
-    """Draw the charts of an item's figures into docs/evidence."""
+    """Draw the charts of an item's figures into docs/evidence, with the digest of the figures."""
     results = ROOT / RESULTS / item.name
     results.mkdir(parents=True, exist_ok=True)
     for name, chart in item.charts.items():
         with style():
             png, _ = save(chart(figures), results / name)
-        shutil.copyfile(png, PICTURES / png.name)
+        keep(png, PICTURES / png.name, figures)
 
 
 def run(command: str) -> str:

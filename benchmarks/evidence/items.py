@@ -32,7 +32,7 @@ from benchmarks.evidence.campaign_tables import (
     read_opponents,
     read_quantiles,
 )
-from benchmarks.evidence.charts import boards_chart, opponents_chart
+from benchmarks.evidence.charts import boards_chart, opponents_chart, peers_chart
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause, link_wires
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
@@ -309,6 +309,7 @@ ITEMS: Final = (
         paths=("benchmarks/peers", "sil/mambo_sil/board/emulation", "codegen/mambo_codegen/bundle/flags.py"),
         read=read_printed,
         tables={"peers": printed},
+        charts={"peers-step": peers_chart},
         variable="PEERS",
     ),
     Item(

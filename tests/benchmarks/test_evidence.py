@@ -11,6 +11,7 @@ import pytest
 from benchmarks.evidence import item as evidence
 from benchmarks.evidence import sources
 from benchmarks.evidence.charts import SHOWN
+from benchmarks.evidence.drawn import is_drawn_from, keep
 from benchmarks.evidence.item import (
     DATA,
     PICTURES,
@@ -29,6 +30,7 @@ from benchmarks.evidence.item import (
     with_tables,
 )
 from benchmarks.evidence.items import ITEMS
+from benchmarks.evidence.page_charts import PAGE_CHARTS, table_of, tables_of
 from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
 from benchmarks.generated import interfaces
 from benchmarks.peers.ours import ONE_NORM
@@ -95,6 +97,53 @@ def test_headlines_of_charts_are_what_the_figures_say() -> None:
         saves = fixed["instructions"]["mean"] < 0.5 * plain["instructions"]["mean"]
         without_fpu = plain["instructions"]["mean"] > 3000
         assert saves == (without_fpu and plain["name"] != "mega"), plain["name"]
+
+
+@pytest.mark.parametrize("item", [item for item in ITEMS if item.charts], ids=lambda item: item.name)
+def test_a_chart_is_drawn_from_the_figures_of_the_stamp(item: Item) -> None:
+    """A stamp with other figures demands other pictures."""
+    figures = read_stamp(item)["figures"]
+    old = [name for name in item.charts if not is_drawn_from(PICTURES / f"{name}.png", figures)]
+    assert old == [], f"python -m benchmarks.evidence {item.name}"
+
+
+@pytest.mark.parametrize("name", PAGE_CHARTS)
+def test_a_chart_of_a_page_is_drawn_from_its_tables(name: str) -> None:
+    """And stands on the page."""
+    assert is_drawn_from(PICTURES / f"{name}.png", tables_of(name)), (
+        "python -m benchmarks.evidence.page_charts"
+    )
+    assert f"]({name}.png)" in (PICTURES / f"{name}.md").read_text("utf-8")
+
+
+def test_headlines_of_pages_charts_are_what_their_tables_say() -> None:
+    """Derived settings win but on the Mambo; the manoeuvre keeps its errors; hover is refused."""
+    (flown,) = tables_of("design")
+    for row in flown:
+        medians = {
+            title: float(cell.split(",")[1])
+            for title, cell in row.items()
+            if title != "vehicle" and cell.startswith("0,")
+        }
+        closest = min(medians, key=lambda title: medians[title])
+        assert closest == ("preset mambo" if row["vehicle"] == "mambo" else "derived")
+    (found,) = tables_of("identify")
+    short = [row for row in found if row["flight"] == "manoeuvre, 30 s"]
+    assert [round(float(row["lag + dead time, ms"])) for row in short] == [4, 6]
+    assert all(float(row["gain"]) < 0.015 for row in short)
+    assert found[-1]["flight"] == "hover, 30 s"
+    assert found[-1]["verdicts"] == "40 refused"
+
+
+def test_a_picture_of_other_figures_is_found(tmp_path: Path) -> None:
+    """By the digest in the picture; a missing picture and a missing table are found too."""
+    picture = tmp_path / "speed.png"
+    assert not is_drawn_from(picture, [1])
+    keep(PICTURES / "speed.png", picture, [1])
+    assert is_drawn_from(picture, [1])
+    assert not is_drawn_from(picture, [2])
+    with pytest.raises(EvidenceError, match="begins with the titles b"):
+        table_of("| a |\n|---|\n| 1 |\n", "b")
 
 
 def all_tables() -> dict[str, str]:
