@@ -31,8 +31,8 @@ FLAGS: Final = (
         "-ffp-contract=off",
         "-ffreestanding",
     ),
-    f"-I{ROOT / 'sil/mambo_sil/board/desk/stand_ins'}",
-    f"-I{ROOT / 'tests/targets/crazyflie_libc'}",
+    f"-I{ROOT / 'sil/mambo_extensions/crazyflie/desk/stand_ins'}",
+    f"-I{ROOT / 'tests/support/crazyflie_libc'}",
 )
 LIBRARY: Final = {"nmpc.c": "controller, `nmpc.c`", "nmpc_self_test.c": "self-test"}
 APP: Final = "the app, with the instance of the controller"

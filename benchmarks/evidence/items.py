@@ -257,7 +257,7 @@ ITEMS: Final = (
         ),
         controllers=("design crazyflie-brushless", "design crazyflie"),
         paths=(
-            *(*_FLIGHT, "sil/mambo_sil/plan", _STYLE),
+            *(*_FLIGHT, "sil/mambo_extensions/plan", _STYLE),
             *("benchmarks/flights/laps.py", f"{_HERE}/points.csv"),
         ),
         read=read_printed,
@@ -318,7 +318,8 @@ ITEMS: Final = (
         controllers=("design crazyflie", "crazyflie"),
         paths=(
             *("benchmarks/app_sizes.py", "codegen/mambo_codegen/bundle/episodes.py"),
-            *("sil/mambo_sil/board/desk/stand_ins", "templates/mambo_templates/firmware/crazyflie/src"),
+            "sil/mambo_extensions/crazyflie/desk/stand_ins",
+            "templates/mambo_templates/firmware/crazyflie/src",
             *(f"templates/mambo_templates/common/nmpc_self_test.{end}.j2" for end in "ch"),
         ),
         read=read_printed,
@@ -345,8 +346,9 @@ ITEMS: Final = (
         commands=(f"python -m benchmarks.flights.link {RESULTS}/link/link",),
         controllers=(f"design {_HERE}/link-drone.toml",),
         paths=(
-            *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/link", "sil/mambo_sil/model/derive"),
-            *("benchmarks/flights/link.py", "benchmarks/flights/wire.py", f"{_HERE}/link-drone.toml"),
+            *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/life", "sil/mambo_sil/model/derive"),
+            *("sil/mambo_extensions/mavlink", f"{_HERE}/link-drone.toml"),
+            *("benchmarks/flights/link.py", "benchmarks/flights/wire.py"),
         ),
         read=read_figures("link"),
         tables={

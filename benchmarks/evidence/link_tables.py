@@ -2,7 +2,7 @@
 
 from benchmarks.evidence.item import Figures
 from benchmarks.markdown import table
-from mambo_sil.link.records import STACKS
+from mambo_sil.life.records import STACKS
 from mambo_sil.results.number_format import three_digits
 
 

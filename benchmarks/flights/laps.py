@@ -13,16 +13,16 @@ import numpy as np
 
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml
+from mambo_extensions.plan.course import PlannedCourse, course_of
+from mambo_extensions.plan.limits import Figures, figures_of, limits_of
+from mambo_extensions.plan.plan_flight import Drones
+from mambo_extensions.plan.planning import make_plan, reach_of, shares_of, slowed
+from mambo_extensions.plan.points import PlanPoint
+from mambo_extensions.plan.solver import first_course, solve
 from mambo_sil.api.campaigns import draw_vehicles
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.model.derive.derived_flight import chosen_text
-from mambo_sil.plan.course import PlannedCourse, course_of
-from mambo_sil.plan.limits import Figures, figures_of, limits_of
-from mambo_sil.plan.plan_flight import Drones
-from mambo_sil.plan.planning import make_plan, reach_of, shares_of, slowed
-from mambo_sil.plan.points import PlanPoint
-from mambo_sil.plan.solver import first_course, solve
 
 VEHICLE: Final = Vehicle.from_preset("crazyflie-brushless")
 WIDTH_M, GATES, COURSES = 0.4, 9, 3

@@ -19,17 +19,17 @@ import numpy as np
 
 from benchmarks.flights.wire import Faults, WiredLink
 from mambo_codegen.settings import controller_toml
+from mambo_extensions.mavlink.pilot import Pilot
+from mambo_extensions.mavlink.simulated import Condition
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import PilotError
 from mambo_sil.flight.states import TargetState
 from mambo_sil.flight.trajectories import Circle, Gerono, Trajectory
-from mambo_sil.link.pilot import Pilot
-from mambo_sil.link.records import STACKS, EstimatedState
-from mambo_sil.link.simulated import Condition
-from mambo_sil.link.steady_frame import SteadyFrame
-from mambo_sil.link.steering import Update
+from mambo_sil.life.records import STACKS, EstimatedState
+from mambo_sil.life.steady_frame import SteadyFrame
+from mambo_sil.life.steering import Update
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 DRONE: Final = Path(__file__).parents[1] / "evidence" / "link-drone.toml"

@@ -4,11 +4,11 @@ import random
 import socket
 from dataclasses import dataclass
 
+from mambo_extensions.mavlink.links import UdpLink
+from mambo_extensions.mavlink.simulated import Condition, SimulatedAutopilot
+from mambo_extensions.mavlink.sockets import Address
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.link.links import UdpLink
-from mambo_sil.link.records import STACKS, Record
-from mambo_sil.link.simulated import Condition, SimulatedAutopilot
-from mambo_sil.link.sockets import Address
+from mambo_sil.life.records import STACKS, Record
 
 
 @dataclass

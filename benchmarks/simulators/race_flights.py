@@ -15,9 +15,9 @@ from crazyflow.sim import Sim
 from scipy.spatial.transform import Rotation
 
 from benchmarks.flights.laps import spline
+from mambo_extensions.plan.hermite import pieces_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.polynomials import PiecesInSpace
-from mambo_sil.plan.hermite import pieces_of
 
 EXAMPLE: Final = Path(__file__).parents[2] / "examples" / "race.py"
 DRONES: Final = 24

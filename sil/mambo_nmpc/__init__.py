@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from mambo_codegen.errors import MamboNmpcError
+    from mambo_extensions.mavlink.pilot import Pilot
+    from mambo_extensions.plan.plans import Plan, plan
+    from mambo_extensions.plan.points import PlanPoint
     from mambo_sil.api.api_controller import Controller
     from mambo_sil.api.campaigns import CampaignFlights, campaign, draw_vehicles
     from mambo_sil.api.flights import Flown, fly
@@ -20,9 +23,6 @@ if TYPE_CHECKING:
     from mambo_sil.errors import ArgumentError
     from mambo_sil.flight.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
-    from mambo_sil.link.pilot import Pilot
-    from mambo_sil.plan.plans import Plan, plan
-    from mambo_sil.plan.points import PlanPoint
 
 __all__ = [
     "ArgumentError",
@@ -54,9 +54,9 @@ _HOMES: Final = {
     "DroneState": "mambo_sil.flight.states",
     "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
-    "Pilot": "mambo_sil.link.pilot",
-    "Plan": "mambo_sil.plan.plans",
-    "PlanPoint": "mambo_sil.plan.points",
+    "Pilot": "mambo_extensions.mavlink.pilot",
+    "Plan": "mambo_extensions.plan.plans",
+    "PlanPoint": "mambo_extensions.plan.points",
     "StepOutcome": "mambo_sil.flight.states",
     "TargetState": "mambo_sil.flight.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
@@ -65,7 +65,7 @@ _HOMES: Final = {
     "command_in_frame": "mambo_sil.flight.frames",
     "draw_vehicles": "mambo_sil.api.campaigns",
     "fly": "mambo_sil.api.flights",
-    "plan": "mambo_sil.plan.plans",
+    "plan": "mambo_extensions.plan.plans",
 }
 """The module of each name: imported at its first use, so that the command line starts at once."""
 

@@ -8,7 +8,7 @@ import pytest
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.presets import load
-from mambo_sil.model.tune.tuning_file import read
+from mambo_extensions.tune.tuning_file import read
 from tests.support.command import run, unwrapped
 
 DRONE = """\

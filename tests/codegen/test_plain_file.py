@@ -12,10 +12,10 @@ from mambo_codegen.atomic import put, put_stream
 from mambo_codegen.errors import MamboNmpcError
 from mambo_codegen.plain_file import find_obstacle, read_plain_file
 from mambo_codegen.settings import presets
+from mambo_extensions.tune import tuning_file
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.flight.scenario import read_record
 from mambo_sil.flight.trajectories import Waypoints
-from mambo_sil.model.tune import tuning_file
 
 
 @pytest.fixture

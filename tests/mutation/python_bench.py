@@ -99,7 +99,7 @@ ROOMS: Final = {
     ),
     "reach": Room(
         source=("codegen/mambo_codegen/numbers/reach.py",),
-        tests=("tests/model/derive/test_reach.py", "tests/plan/test_limits.py"),
+        tests=("tests/model/derive/test_reach.py", "tests/extensions/plan/test_limits.py"),
     ),
     "tilt gain": Room(
         source=(f"{_METHODS}/tilt_gain_constants.py",),

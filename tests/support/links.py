@@ -1,4 +1,4 @@
-"""Pilots of a simulated autopilot."""
+"""A drone with an autopilot, and controllers for it."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -6,11 +6,6 @@ from pathlib import Path
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.link.links import SimulatedLink
-from mambo_sil.link.pilot import Pilot
-from mambo_sil.link.records import STACKS
-from mambo_sil.link.simulated import Condition, SimulatedAutopilot
-from mambo_sil.link.steering import Update
 from mambo_sil.model.derive.derived_settings import controller_text
 from tests.support.derived import settings_for
 
@@ -46,12 +41,3 @@ def write_drone(folder: Path) -> None:
 def controller(vehicle: VehicleFile | None = None) -> Controller:
     """Return a new controller with the settings that `design` derives for a drone, or that of these tests."""
     return Controller(settings_for(vehicle or drone()))
-
-
-def simulated(
-    stack: str, condition: Condition | None = None
-) -> tuple[Pilot, SimulatedAutopilot, list[Update]]:
-    """Return a pilot, its autopilot, and the steps of the flight."""
-    updates: list[Update] = []
-    link = SimulatedLink(STACKS[stack], drone(), condition)
-    return Pilot(controller(), lambda: link, updates.append), link.autopilot, updates

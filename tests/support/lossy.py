@@ -11,8 +11,8 @@ from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
 
-from mambo_sil.link.life_cycle import LifeCycle
-from mambo_sil.link.records import (
+from mambo_sil.life.life_cycle import LifeCycle
+from mambo_sil.life.records import (
     SET_MODE,
     Answer,
     Arm,

@@ -16,20 +16,20 @@ from typer.testing import CliRunner
 
 from mambo_codegen.bundle.render import render, render_target, with_prefix
 from mambo_codegen.bundle.targets import TARGETS
-from mambo_sil.board.pil.board_controller import BoardController
-from mambo_sil.board.pil.connection import Connection
-from mambo_sil.board.pil.serial_port import open_port
+from mambo_extensions.pil.board_controller import BoardController
+from mambo_extensions.pil.connection import Connection
+from mambo_extensions.pil.serial_port import open_port
 from mambo_sil.cli.app import app
 from mambo_sil.flight import loop
 from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.engine.simulate import fly as fly_in_engine
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.traces import read_npz
+from tests.extensions.pil.support.serial_line import Faults, build_firmware, serial_line
+from tests.extensions.px4.support import px4_files
 from tests.support.bundles import place
 from tests.support.command import unwrapped
 from tests.support.option_flights import OptionFlights
-from tests.support.px4 import px4_files
-from tests.support.serial_line import Faults, build_firmware, serial_line
 from tests.support.shell import shell
 from tests.support.tools import board_builder, require_module
 

@@ -12,6 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.settings.controller_toml import to_toml
+from mambo_extensions.mavlink.pilot import Pilot
+from mambo_extensions.playground.page_controllers import page_controllers
 from mambo_nmpc import Controller, DroneState, TargetState
 from mambo_nmpc.adapters.rotorpy import RotorpyController
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -20,9 +22,7 @@ from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.frames import vectors_to_ned
 from mambo_sil.flight.scenario import flight_of
-from mambo_sil.link.pilot import Pilot
 from mambo_sil.model.replay.log_replay import replay_log
-from mambo_sil.pages.playground.page_controllers import page_controllers
 from tests.support.option_flights import OptionFlights, Update
 
 Consumer = Callable[[OptionFlights, Path], str]

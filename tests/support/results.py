@@ -12,9 +12,12 @@ import numpy as np
 
 from mambo_codegen import __version__, boards
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.desk import desk_report
-from mambo_sil.board.desk.desk_events import DeskTrace
-from mambo_sil.board.desk.events_file import BoundSection, EventsFile
+from mambo_extensions.crazyflie.desk import desk_report
+from mambo_extensions.crazyflie.desk.desk_events import DeskTrace
+from mambo_extensions.crazyflie.desk.events_file import BoundSection, EventsFile
+from mambo_extensions.mavlink.pilot_report import PilotSummary
+from mambo_extensions.tune.study import FinishedTrial
+from mambo_extensions.tune.tuning_report import TuneSummary
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint
@@ -49,13 +52,10 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace, write_npz
-from mambo_sil.link.pilot_report import PilotSummary
 from mambo_sil.model.identify.curves import Curves, curves_csv
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, Interval
-from mambo_sil.model.tune.study import FinishedTrial
-from mambo_sil.model.tune.tuning_report import TuneSummary
 from mambo_sil.verify import verify_report
 from mambo_sil.verify.check import CHECKS, CheckOutcome
 

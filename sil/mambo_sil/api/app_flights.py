@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.desk.desk_trial import fly_trial
+from mambo_extensions.crazyflie.desk.desk_trial import fly_trial
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FirmwareName
 from mambo_sil.flight.flown_settings import FlownSettings

@@ -10,12 +10,12 @@ from typing import Final
 
 import typer
 
+from mambo_extensions.mavlink.pilot_command import pilot
+from mambo_extensions.plan.plan_command import plan
 from mambo_sil.cli.board import footprint, same_bits, sweep
 from mambo_sil.cli.command import Command, examples, root
 from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
 from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
-from mambo_sil.cli.fly.pilot import pilot
-from mambo_sil.cli.fly.plan import plan
 from mambo_sil.cli.generate import generate, identify_binary
 from mambo_sil.cli.margins import margins
 from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles

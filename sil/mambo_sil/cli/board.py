@@ -71,9 +71,9 @@ def footprint(
         )
         on_board = None
         if port is not None:
+            from mambo_extensions.pil.on_board import choose_board, measure_on_board
+            from mambo_extensions.pil.port_command import connect
             from mambo_sil.board.footprint.measure import usual_ticks
-            from mambo_sil.board.footprint.on_board import choose_board, measure_on_board
-            from mambo_sil.cli.fly.port import connect
 
             with connect(port, baud, settings) as connection:
                 chosen = [choose_board(chosen, port, connection.greeting.board)]
@@ -259,7 +259,7 @@ def same_bits(
         if port is None:
             results = run_everywhere(settings, chosen, count)
         else:
-            from mambo_sil.cli.fly.port import connect
+            from mambo_extensions.pil.port_command import connect
 
             results = run_on_board(
                 settings, stack.enter_context(connect(port, baud, settings)), count, progress

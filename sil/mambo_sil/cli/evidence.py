@@ -275,7 +275,7 @@ def report(
 
     To show results to somebody, or to keep them.
     """
-    from mambo_sil.pages.report_page import ReportSummary, report_page
+    from mambo_sil.report.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 
     with new_page(output, "report") as write, counting_bar("drawing", "folders", len(folders)) as bar:

@@ -37,8 +37,8 @@ from mambo_sil.results.terminal import sentence, table
 
 if TYPE_CHECKING:
     from mambo_codegen.settings.model import Settings
+    from mambo_extensions.tune.tuning_report import TuneSummary
     from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-    from mambo_sil.model.tune.tuning_report import TuneSummary
 
 
 def list_presets(as_json: AsJson = False) -> None:
@@ -318,7 +318,7 @@ def tune(
     with counting_bar("starting", "trials", trials) as bar:
         count = workers or os.cpu_count() or 1
         summary = _tune(source, vehicle, output, trials, bar, workers=count, storage=storage)
-    from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT
+    from mambo_extensions.tune.tuning_report import CONTROLLER, FRONT
 
     written = (CONTROLLER, f"{FRONT}.csv", f"{FRONT}.png", f"{FRONT}.svg", SUMMARY)
     show_result(summary, output, written, as_json=as_json)
@@ -335,11 +335,11 @@ def _tune(
     storage: str | None,
 ) -> "TuneSummary":
     """Run the missing trials and write the results; if interrupted print how many are finished."""
+    from mambo_extensions.tune import tuning_file
+    from mambo_extensions.tune.study import demand_optuna, finished_trials, open_study, owner_of, search
+    from mambo_extensions.tune.tuning_report import finish
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.campaign.store import claim, convert_os_errors
-    from mambo_sil.model.tune import tuning_file
-    from mambo_sil.model.tune.study import demand_optuna, finished_trials, open_study, owner_of, search
-    from mambo_sil.model.tune.tuning_report import finish
 
     tuning = tuning_file.default(vehicle) if source is None else tuning_file.read(source, vehicle)
     demand_optuna()

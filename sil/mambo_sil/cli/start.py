@@ -82,9 +82,9 @@ def playground(
 
     To see how controllers fly before you read a figure.
     """
+    from mambo_extensions.playground.page_controllers import DEFAULTS, page_controllers
+    from mambo_extensions.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.flight.polynomials import PiecesInSpace
-    from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
-    from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.results.html_page import new_page
 
     chosen = sources or DEFAULTS

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, UnreadableFileError
+from mambo_extensions.tune import tuning_file
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_report import Drawn
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
-from mambo_sil.model.tune import tuning_file
 from mambo_sil.results.blocks import Facts
 
 ROOT = Path(__file__).parents[3]

@@ -11,9 +11,9 @@ from mambo_codegen.errors import BuildError, echo
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
+from mambo_extensions.pil.connection import Connection
 from mambo_sil.board.emulated import build_guest, digest_emulated
 from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, Builder, builder, clang_builder
-from mambo_sil.board.pil.connection import Connection
 from mambo_sil.errors import EmulatorError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library

@@ -46,7 +46,7 @@ def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output,
         fly_again(other.repeat, output, other)
         return
     if other.app is not None:
-        from mambo_sil.cli.fly.app import fly_app
+        from mambo_extensions.crazyflie.app_command import fly_app
 
         fly_app(course, conditions, runner, output, other)
         return
@@ -54,7 +54,7 @@ def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output,
         raise typer.BadParameter("it is for a flight with --app", param_hint="--events")
     demand_port(runner.port, runner.baud)
     if runner.port is not None:
-        from mambo_sil.cli.fly.port import fly_on_port
+        from mambo_extensions.pil.port_command import fly_on_port
 
         fly_on_port(course, conditions, runner, output)
     else:

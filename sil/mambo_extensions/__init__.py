@@ -1,0 +1,1 @@
+"""Extensions of the core: it never imports them, and none imports another; `pyproject.toml` joins them."""

@@ -1,0 +1,277 @@
+"""Plan a course through points: limits from the drone, least time, and flights that decide how far to go.
+
+The weakest of the drawn drones follows a plan of share 1 with all that its controller keeps in reserve. A
+larger share is quicker, and some drone then passes a point too far away: the flights find the quickest one
+that all fly.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.model import Settings
+from mambo_extensions.plan.course import PlannedCourse, course_of
+from mambo_extensions.plan.heading import first_heading, headings_of
+from mambo_extensions.plan.hermite import motion
+from mambo_extensions.plan.limits import FlightLimit, figures_of, limits_of
+from mambo_extensions.plan.plan_flight import Drones, FlownPlan, judged_of
+from mambo_extensions.plan.points import PlanPoint
+from mambo_extensions.plan.solver import HELD, first_course, passed_at_knots, silent, solve
+from mambo_sil.api.campaigns import draw_vehicles
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.errors import PlanError
+from mambo_sil.model.derive.derived_flight import chosen_text
+
+SHARES: Final = (0.35, 4.0)
+"""Least and largest share of tilt and spare thrust that a plan takes."""
+STEP: Final = 1.35
+"""Factor between shares, until one is found that drones do not fly."""
+NO_QUICKER: Final = 0.997
+"""Time of a plan over that of one with a smaller share, above which a larger share is of no use."""
+FINE: Final = 1.03
+"""Factor between the largest share that is flown and the next one, which is not, at the end."""
+TRIES: Final = 8
+SURE: Final = 0.85
+"""Of a tolerance, what the flown drones must not leave: others fly a little wider."""
+DENSE: Final = (np.arange(65) / 64.0).astype(np.float64)
+"""Times in a piece at which a plan is judged: others than those at which it was made."""
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done, and the share that is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A course and how it was flown.
+
+    limits: what the course keeps, `share` of what the weakest drawn drone is sure to follow.
+    flown:  by the drone of the file, the drawn ones, and those at the ends of [uncertainty].
+    """
+
+    points: tuple[PlanPoint, ...]
+    course: PlannedCourse
+    limits: list[FlightLimit]
+    share: float
+    flown: FlownPlan
+    yaw: FloatArray
+    height_judged: bool
+
+    @property
+    def reach_m(self) -> FloatArray:
+        """How far from each judged point a drone may pass (p,)."""
+        return reach_of(self.points, self.course)
+
+    @property
+    def good(self) -> bool:
+        """Whether all drones passed all points."""
+        return not self.flown.misses(self.reach_m).any()
+
+
+def reach_of(points: Sequence[PlanPoint], course: PlannedCourse) -> FloatArray:
+    """Return how far from each judged point a drone may pass (p,)."""
+    return np.array([points[course.choice.point_of(knot) - 1].reach_m for knot in judged_of(course)])
+
+
+def shares_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
+    """Return what a course takes of each limit at the times DENSE of each piece (m, n, 65)."""
+    moved = motion(course.knots, course.duration_s, DENSE)
+    return np.stack([limit.of(moved)[0] for limit in limits]) + 1.0
+
+
+def make_plan(
+    points: Sequence[PlanPoint],
+    vehicle: Vehicle,
+    settings: Settings | None = None,
+    *,
+    closed: bool = False,
+    rate: float = 1.0,
+    drones: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Planned:
+    """Plan a course through points for a drone and the settings of its controller, and fly it.
+
+    settings: None for those that `design` derives from the drone.
+    closed:   return to the first point, in a lap that repeats.
+    rate:     speed of the plan over that of the quickest one.
+    drones:   how many are drawn, as `draw_vehicles` does with `seed`.
+
+    Raises PlanError if no plan keeps the limits, or none is flown; BuildError, CacheError.
+    """
+    drone = vehicle.drone
+    if settings is None:
+        settings = controller_toml.parse(chosen_text(drone, drone.name), f"settings for {drone.name}")
+    drawn = draw_vehicles(vehicle, drones, seed)
+    figures = figures_of(drone, settings, drawn)
+    search = _Search(
+        tuple(points), course_of(points, closed=closed), Drones.of(vehicle, drawn, settings), rate, progress
+    )
+    share = 1.0
+    if points[0].time_s is not None:
+        course = _timed(search, limits_of(figures))
+        flown = search.fly(course)
+    else:
+        course, share, flown = search.quickest(lambda share: limits_of(figures, share))
+        if rate < 1.0:
+            course = course.slower(rate)
+            flown = search.fly(course)
+    yaw = headings_of(points, course, rate)
+    return Planned(
+        tuple(points), course, limits_of(figures, share), share, flown, yaw, settings.height is not None
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    points: tuple[PlanPoint, ...]
+    first: PlannedCourse
+    drones: Drones
+    rate: float
+    progress: Progress
+
+    def fly(self, course: PlannedCourse) -> FlownPlan:
+        return self.drones.fly(course, self.points, first_heading(self.points, closed=course.choice.closed))
+
+    def quickest(
+        self, limits_at: Callable[[float], list[FlightLimit]]
+    ) -> tuple[PlannedCourse, float, FlownPlan]:
+        """Return the quickest course that all drones fly, its share of the limits, and how it was flown."""
+        least, most = SHARES
+        reach_m = reach_of(self.points, self.first)
+        found: tuple[PlannedCourse, float, FlownPlan] | None = None
+        missed: tuple[PlannedCourse, FlownPlan] | None = None
+        share, fails = 1.0, np.inf
+        for attempt in range(TRIES):
+            begun = attempt / TRIES
+
+            def report(part: float, begun: float = begun) -> None:
+                self.progress("planning", begun + 0.7 * part / TRIES)
+
+            limits = limits_at(share)
+            course = slowed(solve(first_course(self.first, limits), limits, report), limits)
+            if fault := _fault_of(course, limits):
+                if found is None:
+                    raise PlanError(fault)
+                fails = share
+            else:
+                self.progress("flying", begun + 0.7 / TRIES)
+                flown = self.fly(course)
+                if flown.misses(SURE * reach_m).any():
+                    fails, missed = share, (course, flown)
+                elif found is None or course.time_s < NO_QUICKER * found[0].time_s:
+                    found = course, share, flown
+                else:
+                    break  # more thrust makes it no quicker
+            flies = 0.0 if found is None else found[1]
+            if fails <= least or flies >= most or fails < FINE * flies:
+                break
+            share = _next_share(flies, fails)
+        if found is None:
+            assert missed is not None
+            raise PlanError(_missed_words(self.points, reach_m, *missed))
+        return found
+
+
+def _over(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
+    """Return by what share of each limit itself a course passes it, at the times DENSE (m, n, 65)."""
+    scale = np.array([limit.scale for limit in limits])
+    return np.asarray(scale[:, np.newaxis, np.newaxis] * (shares_of(course, limits) - 1.0))
+
+
+def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
+    """Return which limit a course does not keep, where and by how much; nothing if it keeps all."""
+    over = _over(course, limits)
+    if over.max() > 3.0 * HELD:
+        return _passed_words(course, limits, over)
+    passed = passed_at_knots(course).max(axis=0)
+    if passed.max() > 3.0 * HELD:
+        number = course.choice.point_of(int(passed.argmax()))
+        return f"point {number}: is not reached within the limits; a wider tolerance would do"
+    return ""
+
+
+def _next_share(flies: float, fails: float) -> float:
+    """Return the share to be tried next, between one that is flown (0: none) and one that is not."""
+    least, most = SHARES
+    if flies == 0.0:
+        return max(fails / STEP**2, least)
+    if np.isinf(fails):
+        return min(flies * STEP, most)
+    return float(np.sqrt(flies * fails))
+
+
+def slowed(course: PlannedCourse, limits: Sequence[FlightLimit]) -> PlannedCourse:
+    """Return a course so much slower that it takes no more than all of each limit, at most by a tenth.
+
+    Where jerk and acceleration take from each other a slower one may take more: then that which takes least.
+    """
+    tried = [course.slower(float(rate)) for rate in np.arange(1.0, 0.9, -0.0025)]
+    taken = [float(shares_of(one, limits).max()) for one in tried]
+    return next(
+        (one for one, share in zip(tried, taken, strict=True) if share <= 1.0), tried[int(np.argmin(taken))]
+    )
+
+
+def _timed(search: _Search, limits: list[FlightLimit]) -> PlannedCourse:
+    """Return the course of least snap at the times of the points; raises PlanError if a limit is passed."""
+    times_s = np.array([point.time_s for point in search.points], np.float64)
+    if search.first.choice.closed:
+        raise PlanError("a closed lap cannot have times: leave out the column time, or --closed")
+    search.progress("planning", 0.0)
+    course = search.first.smooth(np.diff(times_s)).slower(search.rate)
+    over = _over(course, limits)
+    if over.max() > 1e-6:
+        keeps = [
+            rate
+            for rate in np.arange(0.99, 0.02, -0.01)
+            if shares_of(course.slower(rate), limits).max() <= 1.0
+        ]
+        cure = (
+            f"--rate {search.rate * keeps[0]:.2f} would do"
+            if keeps
+            else "no slower flight of this path would do"
+        )
+        raise PlanError(f"{_passed_words(course, limits, over)}; {cure}")
+    search.progress("flying", 0.5)
+    return course
+
+
+def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: FloatArray) -> str:
+    """Return which limit is passed most, where, and by how much."""
+    limit, piece, sample = (int(one) for one in np.unravel_index(over.argmax(), over.shape))
+    tau = DENSE[sample]
+    time_s = course.duration_s[:piece].sum() + tau * course.duration_s[piece]
+    name, point_of = limits[limit].name, course.choice.point_of
+    amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * over.max():.0f} %"
+    where = f"between points {point_of(piece)} and {point_of(piece + 1)}"
+    for knot, near in ((piece, tau < 0.1), (piece + 1, tau > 0.9)):
+        if near:
+            where = f"at point {point_of(knot)}"
+    return f"{where}, {time_s:.2f} s after the start: passes the limit of {name} by {amount}"
+
+
+def _missed_words(
+    points: Sequence[PlanPoint], reach_m: FloatArray, course: PlannedCourse, flown: FlownPlan
+) -> str:
+    """Return which point drones miss even at the slowest plan, by how much, and what would do."""
+    off_m = np.where(np.isfinite(flown.off_m), flown.off_m, np.inf)
+    over_m = (off_m - SURE * reach_m).max(axis=0)
+    worst = int(over_m.argmax())
+    missed = int(flown.misses(SURE * reach_m).sum())
+    point = course.choice.point_of(judged_of(course)[worst])
+    if flown.crashed.any():
+        crashed = int(flown.crashed.sum())
+        return (
+            f"{crashed} of {len(flown.crashed)} drones crash on the slowest plan; a point higher up would do"
+        )
+    far_m = float(off_m[:, worst].max())
+    kind = "width" if points[point - 1].normal is not None else "tolerance"
+    wanted_m = far_m / SURE * (2.0 if kind == "width" else 1.0)
+    return (
+        f"point {point}: {missed} of {len(flown.crashed)} drones pass it up to {far_m:.3f} m away on a "
+        f"plan of {course.time_s:.2f} s; {kind} = {wanted_m:.3f} would do"
+    )

@@ -1,0 +1,1 @@
+"""The life of a flight, without a transport: checks, take-off, courses, lost estimates, landing."""

@@ -1,0 +1,1 @@
+"""Tests of the Crazyflie's app, its scripts and its flights on the desk."""

@@ -1,0 +1,1 @@
+"""What the tests of processors in the loop share."""

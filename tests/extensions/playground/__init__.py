@@ -1,0 +1,1 @@
+"""Tests of sil/mambo_extensions/playground."""

@@ -1,0 +1,1 @@
+"""Tests of PX4's module."""

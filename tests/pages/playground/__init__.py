@@ -1,1 +1,0 @@
-"""Tests of sil/mambo_sil/pages/playground."""
