@@ -10,7 +10,9 @@
 #include "controller_pid.h"
 #include "debug.h"
 #include "estimator.h"
+#include "lighthouse.h"
 #include "log.h"
+#include "noise.h"
 #include "param.h"
 #include "power_distribution.h"
 #include "set_points.h"
@@ -42,7 +44,6 @@ static airframe_t airframe;
 static estimator_t filter;
 static double motors[MOTORS];
 static double history_m[HISTORY_MS][3]; /* of positions */
-static uint64_t random_state;
 
 static uint32_t now_ms;
 static uint32_t ticks;
@@ -62,18 +63,6 @@ static int jumping_frames;
 static double flow_counts[2];
 
 static char console[CONSOLE_BYTES];
-
-/* Marsaglia's xorshift64; in [0, 1). */
-static double uniform(void)
-{
-    random_state ^= random_state << 13;
-    random_state ^= random_state >> 7;
-    random_state ^= random_state << 17;
-    return (double)(random_state >> 11) * 0x1p-53;
-}
-
-/* Box and Muller. */
-static double normal(void) { return sqrt(-2.0 * log(1.0 - uniform())) * cos(2.0 * M_PI * uniform()); }
 
 /* What the app calls. */
 
@@ -279,6 +268,10 @@ static void measure_position(void)
 
     if (flight.sensors == DESK_FLOW_DECK) {
         look_down(clock_ms);
+    } else if (flight.sensors == DESK_LIGHTHOUSE) {
+        if (measures) {
+            lighthouse_look(&filter, &airframe, flight.sweep_reflections, clock_ms);
+        }
     } else if (measures && ((clock_ms % (uint32_t)flight.camera_period_ms) == 0U)) {
         look_by_camera();
     }
@@ -382,7 +375,8 @@ static void stabilize(void)
 int desk_start(const desk_flight_t *wanted)
 {
     flight = *wanted;
-    random_state = 0x9E3779B97F4A7C15ULL * (flight.seed + 1ULL);
+    noise_start(flight.seed);
+    lighthouse_start();
     now_ms = START_MS;
     ticks = 1U;
     controller_number = OUT_OF_TREE;

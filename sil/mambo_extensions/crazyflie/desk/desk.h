@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 /* What measures the position. */
-enum { DESK_MOCAP, DESK_FLOW_DECK };
+enum { DESK_MOCAP, DESK_FLOW_DECK, DESK_LIGHTHOUSE };
 
 /* What a flight begins with. */
 typedef struct {
@@ -26,14 +26,15 @@ typedef struct {
     double table_radius_m;
     double gyroscope_bias_rad_s[3];
     double accelerometer_bias_g[3];
-    int sensors;                        /* DESK_MOCAP or DESK_FLOW_DECK */
+    int sensors;                        /* DESK_MOCAP, DESK_FLOW_DECK or DESK_LIGHTHOUSE */
     int camera_period_ms;
     int camera_delay_ms;                /* at most 200 */
-    int camera_offset_ms;               /* of the camera's, or the flow deck's, clock against the estimator's */
+    int camera_offset_ms;               /* of the clock of camera, flow deck or base stations against the estimator's */
     double camera_noise_m;
     double camera_outliers;             /* share of the frames that are off, in a direction at random */
     double camera_outlier_m;            /* by so much */
     double flow_noise_counts;           /* of a frame of the flow deck, tenths of pixels */
+    double sweep_reflections;           /* share of the sweeps of base stations that are off, by up to half a radian */
     double initial_yaw_rad;             /* what the estimator believes of the heading */
     double lost_ticks;                  /* share of the milliseconds in which the stabilizer does not run */
 } desk_flight_t;
@@ -67,10 +68,10 @@ void desk_go_to(const double position_m[3], double yaw_rad, double duration_s);
 void desk_write_pieces(int first, const double *pieces, int count);
 void desk_start_trajectory(int count);
 
-/* Whether the camera, or the flow deck, measures. */
+/* Whether the camera, the flow deck or the base stations measure. */
 void desk_measure(int is_on);
 
-/* Let DESK_MOCAP or DESK_FLOW_DECK measure from now on. */
+/* Let DESK_MOCAP, DESK_FLOW_DECK or DESK_LIGHTHOUSE measure from now on. */
 void desk_switch(int to);
 
 /* Let the camera's next frames be off by a jump; one that is not a number is a frame that is not. */

@@ -22,10 +22,11 @@ MEMORY_PIECES: Final = 31
 
 
 class DeskSensors(IntEnum):
-    """What measures the position: motion capture, or the flow deck."""
+    """What measures the position: motion capture, the flow deck, or sweeps of two Lighthouse stations."""
 
     MOCAP = 0
     FLOW_DECK = 1
+    LIGHTHOUSE = 2
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class DeskConditions:
     camera_outliers: float = 0.0
     camera_outlier_m: float = 0.0
     flow_noise_counts: float = 2.0
+    sweep_reflections: float = 0.0
     initial_yaw_rad: float = 0.0
     lost_ticks: float = 0.0
 
@@ -166,11 +168,11 @@ class Desk:
         self._c.desk_start_trajectory(count)
 
     def measure(self, *, on: bool) -> None:
-        """Let the camera, or the flow deck, measure, or not."""
+        """Let the camera, the flow deck or the base stations measure, or not."""
         self._c.desk_measure(on)
 
     def switch(self, sensors: DeskSensors) -> None:
-        """Let the cameras or the flow deck measure from now on."""
+        """Let others measure from now on."""
         self._c.desk_switch(sensors)
 
     def jump(self, jump_m: Three, frames: int) -> None:

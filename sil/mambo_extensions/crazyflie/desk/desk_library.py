@@ -15,8 +15,11 @@ from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.results.shared_library import LibrarySource, built_library, load_library
 
-SOURCES: Final = ("airframe.c", "desk.c", "estimator.c", "loops.c", "set_points.c")
-HEADERS: Final = ("airframe.h", "desk.h", "estimator.h", "set_points.h")
+SOURCES: Final = (
+    *("airframe.c", "desk.c", "estimator.c", "lighthouse.c", "loops.c", "noise.c"),
+    "set_points.c",
+)
+HEADERS: Final = ("airframe.h", "desk.h", "estimator.h", "lighthouse.h", "noise.h", "set_points.h")
 FLAGS: Final = ("-std=gnu11", "-O2", "-ffp-contract=off", "-Wl,-Bsymbolic", "-I.", "-Istand_ins", "-Isrc")
 """With -Bsymbolic two libraries in a process do not share the variables of an app."""
 TARGET: Final = "crazyflie"

@@ -17,6 +17,7 @@
 #define RATE_RAD_S 0.1
 #define CAMERA_M 0.01
 #define FLOW_COUNTS 2.0
+#define SWEEP_RAD 0.001
 
 /* A drone on the ground is drawn to level, by this share with each prediction. */
 #define LEVELLING 0.001
@@ -300,4 +301,54 @@ void estimator_see_range(estimator_t *filter, double range_m)
         slope[POSITION + 2] = 1.0 / cos(angle_rad);
         update(filter, slope, range_m - (filter->position_m[2] / cos(angle_rad)), range_deviation(range_m));
     }
+}
+
+/* Write where a sensor is in the frame of a station. */
+static void seen_by_station(const sweep_t *sweep, const double position_m[3], const double attitude[4], double place_m[3])
+{
+    double r[3][3], away_m[3];
+
+    rotation_of(attitude, r);
+    for (int i = 0; i < 3; i++) {
+        away_m[i] = position_m[i] - sweep->station_m[i];
+        for (int k = 0; k < 3; k++) {
+            away_m[i] += r[i][k] * sweep->sensor_m[k];
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        place_m[i] = (sweep->axes[0][i] * away_m[0]) + (sweep->axes[1][i] * away_m[1]) + (sweep->axes[2][i] * away_m[2]);
+    }
+}
+
+/* A plane that is tilted by t passes (x, y, z) when the rotor is at atan2(y, x) + asin(z tan t / r), where r is the distance to the axis. */
+double sweep_error(const sweep_t *sweep, const double position_m[3], const double attitude[4], double *distance_m)
+{
+    double place_m[3];
+
+    seen_by_station(sweep, position_m, attitude, place_m);
+    *distance_m = hypot(place_m[0], place_m[1]);
+    return sweep->angle_rad - (atan2(place_m[1], place_m[0]) + asin(fmax(fmin(place_m[2] * tan(sweep->tilt_rad) / *distance_m, 1.0), -1.0)));
+}
+
+/* As the firmware's documentation says, the angle corrects by the position only. */
+void estimator_see_sweep(estimator_t *filter, const sweep_t *sweep)
+{
+    double slope[ESTIMATOR_STATES] = { 0.0 }, place_m[3], slope_m[3], distance_m, share;
+    const double error_rad = sweep_error(sweep, filter->position_m, filter->attitude, &distance_m);
+
+    seen_by_station(sweep, filter->position_m, filter->attitude, place_m);
+    share = squared(distance_m) - squared(place_m[2] * tan(sweep->tilt_rad));
+    if (!(share > 0.0)) {
+        return;
+    }
+    share = tan(sweep->tilt_rad) / sqrt(share);
+    slope_m[0] = (-place_m[1] - (place_m[0] * place_m[2] * share)) / squared(distance_m);
+    slope_m[1] = (place_m[0] - (place_m[1] * place_m[2] * share)) / squared(distance_m);
+    slope_m[2] = share;
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            slope[POSITION + i] += sweep->axes[i][k] * slope_m[k];
+        }
+    }
+    update(filter, slope, error_rad, SWEEP_RAD);
 }

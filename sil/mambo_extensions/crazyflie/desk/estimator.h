@@ -38,6 +38,20 @@ void estimator_see_flow(estimator_t *filter, const double counts[2], double dura
 /* Take the distance to the floor along the body's z. */
 void estimator_see_range(estimator_t *filter, double range_m);
 
+/* What a plane of light of a Lighthouse station measures at a sensor: the angle of the station's rotor. */
+typedef struct {
+    double station_m[3];
+    double axes[3][3];   /* of the station, columns: ahead, to the left, along the rotor's axis */
+    double tilt_rad;     /* of the plane */
+    double sensor_m[3];  /* in the body's frame */
+    double angle_rad;
+} sweep_t;
+
+/* Return by how much the measured angle exceeds that of a drone at a place; write the sensor's distance to the rotor's axis. */
+double sweep_error(const sweep_t *sweep, const double position_m[3], const double attitude[4], double *distance_m);
+
+void estimator_see_sweep(estimator_t *filter, const sweep_t *sweep);
+
 /* The flow chip sees this angle on this many pixels, and counts tenths of them. */
 #define FLOW_PIXELS 35.0
 #define FLOW_ANGLE_RAD 0.71674

@@ -22,7 +22,7 @@ EVENTS: Final = ShippedFiles(
     "docs/how-to/desk.md shows how to write one",
     "mambo_extensions.crazyflie.desk",
 )
-SensorsKind = Literal["mocap", "flow-deck"]
+SensorsKind = Literal["mocap", "flow-deck", "lighthouse"]
 MeasureName = Literal[
     "lowest_m",
     "highest_m",
@@ -38,7 +38,11 @@ MeasureName = Literal[
     "largest_x_m",
 ]
 """Measures of a flight; `desk_report` says what they are."""
-SENSORS: Final = {"mocap": DeskSensors.MOCAP, "flow-deck": DeskSensors.FLOW_DECK}
+SENSORS: Final = {
+    "mocap": DeskSensors.MOCAP,
+    "flow-deck": DeskSensors.FLOW_DECK,
+    "lighthouse": DeskSensors.LIGHTHOUSE,
+}
 
 CourseFile = Annotated[str, Field(pattern=r"(?i)\.csv$|\.py:\w+$")]
 """A file of waypoints or polynomial pieces, or a class of a file, FILE.py:CLASS."""
@@ -75,6 +79,7 @@ class SensorsSection(FileSection):
     camera_outliers: float = Field(0.0, ge=0.0, le=1.0)
     camera_outlier_m: float = Field(0.5, ge=0.0, le=10.0)
     flow_noise_counts: float = Field(2.0, ge=0.0, le=100.0)
+    sweep_reflections: float = Field(0.0, ge=0.0, le=1.0)
     initial_yaw_deg: float = Field(0.0, ge=-180.0, le=180.0)
 
 
@@ -185,6 +190,7 @@ class EventsFile(FileSection):
             camera_outliers=sensors.camera_outliers,
             camera_outlier_m=sensors.camera_outlier_m,
             flow_noise_counts=sensors.flow_noise_counts,
+            sweep_reflections=sensors.sweep_reflections,
             initial_yaw_rad=math.radians(sensors.initial_yaw_deg),
         )
 
