@@ -13,13 +13,15 @@ from tests.support.height_settings import height_settings
 from tests.support.parity import inputs_of_steps
 from tests.support.quadratic import TWO_MOVES, quadratic_settings, settings_of
 
-GUARDED = settings_of(TWO_MOVES | {"guard.tilt_rad": 1.5})
+GUARDED = settings_of(TWO_MOVES | {"guard.tilt_budget_rad": 1.5})
 
 
 def guarded_height(scalar: str) -> Settings:
     """Return settings with a height whose guard soon has nothing left."""
     settings = with_option(height_settings(), "code.scalar", scalar)
-    return with_option(settings, "guard", {"thrust_m_s2": 5.0, "thrust_m_s3": 20.0, "tilt_rad_s": 1.0})
+    return with_option(
+        settings, "guard", {"thrust_budget_m_s2": 5.0, "thrust_budget_m_s3": 20.0, "tilt_budget_rad_s": 1.0}
+    )
 
 
 @pytest.mark.parametrize("scalar", SCALARS)
@@ -35,8 +37,8 @@ def test_commands_vary_by_no_more_than_the_budget_and_what_it_gains(scalar: str)
         assert step.thrust_m_s2 is not None
         commands.append(np.column_stack([step.command_rad, step.thrust_m_s2]))
     varied = np.cumsum(np.abs(np.diff(commands, axis=0)), axis=0).astype(np.float64)
-    full = np.array([guard.tilt_rad, guard.tilt_rad, guard.thrust_m_s2])
-    rho = 0.01 * np.array([guard.tilt_rad_s, guard.tilt_rad_s, guard.thrust_m_s3])
+    full = np.array([guard.tilt_budget_rad, guard.tilt_budget_rad, guard.thrust_budget_m_s2])
+    rho = 0.01 * np.array([guard.tilt_budget_rad_s, guard.tilt_budget_rad_s, guard.thrust_budget_m_s3])
     most = full + (np.arange(1, steps)[:, np.newaxis, np.newaxis] * rho)
     levelled = np.any(np.all(np.array(commands)[:, :, :2] == 0, axis=2)[1:], axis=0)
     found = varied[:, ~levelled] - most
@@ -87,10 +89,10 @@ def test_without_a_measured_position_the_estimate_follows_less() -> None:
 
 def test_a_budget_holds_a_swing_at_least() -> None:
     """Twice the tilt limit, if the setting says less; and with a 1-norm there is no guard."""
-    found = Quadratic(with_option(GUARDED, "guard.tilt_rad", 0.1)).guard
+    found = Quadratic(with_option(GUARDED, "guard.tilt_budget_rad", 0.1)).guard
     assert found is not None
-    assert found.tilt_rad == 2 * GUARDED.limits.tilt_rad
-    assert found.thrust_m_s2 == 12.0
+    assert found.tilt_budget_rad == 2 * GUARDED.limits.tilt_rad
+    assert found.thrust_budget_m_s2 == 12.0
     with pytest.raises(InvalidSettingsError, match=r'must be "quadratic" with \[guard\]'):
         parse("[guard]\n", "controller.toml")
 
@@ -99,7 +101,7 @@ def test_a_budget_of_the_thrust_is_of_what_is_delivered() -> None:
     """Its commands vary by more where the thrust is less than the commanded one."""
     found = Quadratic(with_option(guarded_height("float64"), "height.thrust_gain", 0.8)).guard
     assert found is not None
-    assert 0.8 * np.array([found.thrust_m_s2, found.thrust_growth_m_s2]) == pytest.approx([5.0, 0.2])
+    assert 0.8 * np.array([found.thrust_budget_m_s2, found.thrust_growth_m_s2]) == pytest.approx([5.0, 0.2])
 
 
 def test_without_the_section_there_is_no_guard() -> None:

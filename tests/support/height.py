@@ -24,7 +24,7 @@ EVERY_FUNCTION: Final = settings_of(
         "model.drag_1_s": 0.2,
         "model.roll_gain": 0.9,
         "limits.speed_m_s": 5.0,
-        "guard.tilt_rad_s": 5.0,
+        "guard.tilt_budget_rad_s": 5.0,
         "guard.position_noise": 0.03,
     }
 )
@@ -67,9 +67,9 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     CRAZYFLIE
     | {
         "limits.speed_m_s": 1.5,
-        "guard.tilt_rad_s": 1.0,
-        "guard.thrust_m_s2": 3.0,
-        "guard.thrust_m_s3": 20.0,
+        "guard.tilt_budget_rad_s": 1.0,
+        "guard.thrust_budget_m_s2": 3.0,
+        "guard.thrust_budget_m_s3": 20.0,
     },
     CRAZYFLIE
     | {
@@ -80,9 +80,9 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "model.pitch_trim_rad": -0.03,
         "limits.speed_m_s": 1.5,
         "damping.pitch_rate_feedback_s": 0.02,
-        "guard.tilt_rad_s": 1.0,
-        "guard.thrust_m_s2": 3.0,
-        "guard.thrust_m_s3": 20.0,
+        "guard.tilt_budget_rad_s": 1.0,
+        "guard.thrust_budget_m_s2": 3.0,
+        "guard.thrust_budget_m_s3": 20.0,
     },
     CRAZYFLIE
     | {
@@ -101,7 +101,7 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "model.drag_1_s": 0.244,
         "limits.speed_m_s": 1.5,
         "observer.outage_s": 0.05,
-        "guard.tilt_rad_s": 8.4,
+        "guard.tilt_budget_rad_s": 8.4,
     },
 )
 """One move and two, all that can be learnt, with and without limits, fence, age, feedback

@@ -86,7 +86,7 @@ ALL: Final[Base] = SPACE | {
     "limits.fence.x_max_m": 0.6,
     "limits.fence.ceiling_m": 1.2,
     "observer.tilt_gain": "learnt",
-    "guard.tilt_rad_s": 1.0,
+    "guard.tilt_budget_rad_s": 1.0,
     "horizon.ramp_s": 0.4,
 }
 """What there is of a quadratic cost, at once."""
@@ -172,7 +172,7 @@ OPTIONS: Final[dict[str, Option]] = {
         LEVEL, {"observer.outage_s": 0.0, "observer.disturbance_limit_m_s2": 0.0}, _LEVEL
     ),
     "limits": Option(LEVEL, _LIMITS, _LEVEL),
-    "guard": Option(LEVEL, {"guard.tilt_rad": 0.02, "guard.tilt_rad_s": 0.1}, _LEVEL),
+    "guard": Option(LEVEL, {"guard.tilt_budget_rad": 0.02, "guard.tilt_budget_rad_s": 0.1}, _LEVEL),
     "float64": Option(LEVEL, {"code.scalar": "float64"}, _LEVEL),
     "fixed": Option(LEVEL, {"code.scalar": "fixed"}, _LEVEL),
     "prefix": Option(LEVEL, {"code.prefix": "own"}, _LEVEL),
@@ -189,7 +189,9 @@ OPTIONS: Final[dict[str, Option]] = {
         {"limits.speed_m_s": 1.5, "limits.fence.floor_m": 0.8, "limits.fence.ceiling_m": 1.1},
         _SPACE,
     ),
-    "height, guard": Option(SPACE, {"guard.thrust_m_s2": 1.0, "guard.thrust_m_s3": 10.0}, _SPACE),
+    "height, guard": Option(
+        SPACE, {"guard.thrust_budget_m_s2": 1.0, "guard.thrust_budget_m_s3": 10.0}, _SPACE
+    ),
     "all, float32": Option(ALL, {"code.scalar": "float32"}, _SPACE),
     "all, float64": Option(ALL, {"code.scalar": "float64"}, _SPACE),
     "all, fixed": Option(ALL, {"code.scalar": "fixed"}, _SPACE),

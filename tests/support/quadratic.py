@@ -206,7 +206,7 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     | {
         "damping.roll_rate_feedback_s": 0.02,
         "limits.speed_m_s": 1.5,
-        "guard.tilt_rad_s": 1.0,
+        "guard.tilt_budget_rad_s": 1.0,
         "guard.position_noise": 0.1,
     },
     TWO_MOVES
@@ -214,7 +214,7 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
         "limits.speed_m_s": 1.5,
         "model.drag_1_s": 0.2,
         "observer.outage_s": 0.03,
-        "guard.tilt_rad_s": 8.0,
+        "guard.tilt_budget_rad_s": 8.0,
     },
 )
 """One move and two, attitude measured and predicted, with feedback, drag, age, trim and guard."""
@@ -284,8 +284,8 @@ def _guard_of(index: int, tilt_rad: float) -> Values:
     if index % 2:
         return {}
     return {
-        "guard.tilt_rad": min(10.0, tilt_rad * float(rng.uniform(2, 4))),
-        "guard.tilt_rad_s": float(10.0 ** rng.uniform(-1, 2)),
+        "guard.tilt_budget_rad": min(10.0, tilt_rad * float(rng.uniform(2, 4))),
+        "guard.tilt_budget_rad_s": float(10.0 ** rng.uniform(-1, 2)),
         "guard.position_noise": float(10.0 ** rng.uniform(-3, 1)),
     }
 

@@ -100,27 +100,27 @@ class Height(SettingsSection):
 class Guard(SettingsSection):
     """Bounds of what commands do where target or estimate are noisy."""
 
-    tilt_rad: Number = Field(
+    tilt_budget_rad: Number = Field(
         1.5,
         ge=0.02,
         le=10,
         description="How much roll and pitch commands may vary at once, in radians; twice the tilt limit, "
         "a swing from one end to the other, if this is less.",
     )
-    tilt_rad_s: Number = Field(
+    tilt_budget_rad_s: Number = Field(
         6.0,
         ge=0.1,
         le=1000,
         description="How much they may vary for long, in radians per second. A mixer that serves attitude "
         "first takes the thrust of a drone whose commands rattle by more.",
     )
-    thrust_m_s2: Annotated[Number, WITH_HEIGHT] = Field(
+    thrust_budget_m_s2: Annotated[Number, WITH_HEIGHT] = Field(
         12.0,
         ge=0.1,
         le=10000,
         description="How much the thrust over mass may vary at once, in metres per second squared.",
     )
-    thrust_m_s3: Annotated[Number, WITH_HEIGHT] = Field(
+    thrust_budget_m_s3: Annotated[Number, WITH_HEIGHT] = Field(
         100.0,
         ge=0.1,
         le=100000,

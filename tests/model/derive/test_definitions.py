@@ -134,8 +134,8 @@ def test_the_height_is_what_thrust_and_lag_allow(ratio: float, lag_s: float, dea
     assert height.thrust_min_m_s2 == pytest.approx(0.3 * GRAVITY_M_S2, rel=0.02)
     swing_m_s2 = height.thrust_max_m_s2 - height.thrust_min_m_s2
     assert settings.guard is not None
-    assert settings.guard.thrust_m_s2 == pytest.approx(swing_m_s2, rel=ROUNDED)
-    assert settings.guard.thrust_m_s3 == pytest.approx(8.0 * swing_m_s2, rel=ROUNDED)
+    assert settings.guard.thrust_budget_m_s2 == pytest.approx(swing_m_s2, rel=ROUNDED)
+    assert settings.guard.thrust_budget_m_s3 == pytest.approx(8.0 * swing_m_s2, rel=ROUNDED)
     constants = method_of(settings)
     braked_m_s = getattr(constants, "height").most_m_s[1]  # noqa: B009 - of the quadratic cost only
     assert height.descent_m_s <= braked_m_s
@@ -275,8 +275,8 @@ def test_exact_settings_have_a_share_of_the_possible_tilt(ratio: float, share: f
         BRAKING_SHARE * GRAVITY_M_S2 * braking_rad, rel=2.0 * ROUNDED
     )
     assert exact.guard is not None
-    assert exact.guard.tilt_rad == pytest.approx(3.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
-    assert exact.guard.tilt_rad_s == pytest.approx(12.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
+    assert exact.guard.tilt_budget_rad == pytest.approx(3.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
+    assert exact.guard.tilt_budget_rad_s == pytest.approx(12.0 * exact.limits.tilt_rad, rel=2.0 * ROUNDED)
 
 
 def test_a_drone_that_can_hardly_lift_itself_has_the_least_tilt() -> None:

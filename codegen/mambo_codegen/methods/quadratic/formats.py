@@ -282,11 +282,11 @@ def _level_bounds(settings: Sections) -> _Bounds:
             (2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
             * max([1.0, *(feedback_steps(settings) or ())])
             + (2 * settings.limits.tilt_rad),
-            guard.tilt_rad + guard.tilt_growth_rad if guard else 0.0,
+            guard.tilt_budget_rad + guard.tilt_growth_rad if guard else 0.0,
         ),
         thrust_m_s2=max(
             settings.ranges.thrust_acceleration_max_m_s2,
-            guard.thrust_m_s2 + guard.thrust_growth_m_s2 if guard and settings.height else 0.0,
+            guard.thrust_budget_m_s2 + guard.thrust_growth_m_s2 if guard and settings.height else 0.0,
         ),
         learnt_m_s2=max(settings.observer.disturbance_limit_m_s2, 0.001),
     )

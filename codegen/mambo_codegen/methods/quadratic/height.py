@@ -123,7 +123,9 @@ class HeightAxis:
         self._target_observer = climb_observer(constants, products, found)
         self._budget: VariationBudget | None = None
         if guard := constants.guard:
-            self._budget = VariationBudget(products, guard.thrust_m_s2, guard.thrust_growth_m_s2, "thrust")
+            self._budget = VariationBudget(
+                products, guard.thrust_budget_m_s2, guard.thrust_growth_m_s2, "thrust"
+            )
         self._height_limit = constant(settings.ranges.position_m, "position")
         self._step2 = constant(found.step2_s2, "step2")
         self._steps2 = constant(found.steps2_per_s2, "thrust_per_step2")

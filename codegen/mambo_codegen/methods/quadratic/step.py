@@ -136,7 +136,9 @@ class ControlStep:
             self.height = HeightAxis(constants, constants.height, products)
         self.tilt_budget: VariationBudget | None = None
         if guard := constants.guard:
-            self.tilt_budget = VariationBudget(products, guard.tilt_rad, guard.tilt_growth_rad, "angle")
+            self.tilt_budget = VariationBudget(
+                products, guard.tilt_budget_rad, guard.tilt_growth_rad, "angle"
+            )
         self.tilt_gain: TiltGain | None = None
         if learnt := constants.tilt_gain:
             self.tilt_gain = TiltGain(learnt, products)

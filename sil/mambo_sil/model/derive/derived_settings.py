@@ -386,16 +386,16 @@ def _height(drone: VehicleFile) -> Iterator[Derived]:
 def _guard(tilt_rad: float, height: list[Derived]) -> Iterator[Derived]:
     """Yield the guard, by the tilt limit and, with settings of the height, the range of the thrust."""
     words = f"{TILT_SWINGS:g} times limits.tilt_rad: swings are free, and a mixer keeps its thrust"
-    yield Derived("guard", "tilt_rad", _round(TILT_SWINGS * tilt_rad), words)
+    yield Derived("guard", "tilt_budget_rad", _round(TILT_SWINGS * tilt_rad), words)
     words = f"{TILT_SWINGS_1_S:g} times limits.tilt_rad in a second: commands that rattle by more are bounded"
-    yield Derived("guard", "tilt_rad_s", _round(TILT_SWINGS_1_S * tilt_rad), words)
+    yield Derived("guard", "tilt_budget_rad_s", _round(TILT_SWINGS_1_S * tilt_rad), words)
     found = {each.key: float(each.value) for each in height}
     if not found:
         return
     swing_m_s2 = found["thrust_max_m_s2"] - found["thrust_min_m_s2"]
-    yield Derived("guard", "thrust_m_s2", _round(swing_m_s2), "From the least thrust to the largest")
+    yield Derived("guard", "thrust_budget_m_s2", _round(swing_m_s2), "From the least thrust to the largest")
     words = f"{THRUST_SWINGS_1_S:g} times that in a second"
-    yield Derived("guard", "thrust_m_s3", _round(THRUST_SWINGS_1_S * swing_m_s2), words)
+    yield Derived("guard", "thrust_budget_m_s3", _round(THRUST_SWINGS_1_S * swing_m_s2), words)
 
 
 def _round(value: float) -> float:
