@@ -30,6 +30,8 @@ HEIGHT = {path for path in KEYS if path.startswith("height.")} | {
     "limits.fence.ceiling_m",
 }
 """The keys that only a controller with a height uses."""
+ACCELERATION = {"height.learnt_acceleration_limit_m_s2"}
+"""What only a controller uses that learns an acceleration, not a gain."""
 GUARD = {path for path in KEYS if path.startswith("guard.")}
 """The keys that only a controller with a guard uses; two of them need a height too."""
 
@@ -38,9 +40,11 @@ def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
     """Every key is used by one norm at least; some by both."""
     paths = {norm: {key.path for key in keys} for norm, keys in USED.items()}
     assert paths["1-norm"] | paths["quadratic"] == set(KEYS) - HEIGHT - GUARD
-    assert {key for key in KEYS if settings_with_height().uses(key)} == paths["quadratic"] | HEIGHT
+    assert {key for key in KEYS if settings_with_height().uses(key)} == paths[
+        "quadratic"
+    ] | HEIGHT - ACCELERATION
     guarded = controller_toml.parse(f"{toml(QUADRATIC)}[height]\n[guard]\n", "slow.toml")
-    assert {key for key in KEYS if guarded.uses(key)} == paths["quadratic"] | HEIGHT | GUARD
+    assert {key for key in KEYS if guarded.uses(key)} == paths["quadratic"] | HEIGHT - ACCELERATION | GUARD
     assert {"horizon.update_period_s", "model.roll_lag_s", "damping.roll_rate_feedback_s", "cost.norm"} <= (
         paths["1-norm"] & paths["quadratic"]
     )

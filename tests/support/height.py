@@ -42,14 +42,14 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     },
     ONE_MOVE
     | {
-        "height.learn": "acceleration",
+        "height.learnt": "acceleration",
         "model.attitude": "measured",
-        "height.learn_limit": 0.1,
+        "height.learnt_acceleration_limit_m_s2": 0.981,
         "height.descent_m_s": 1.2,
     },
     CRAZYFLIE
     | {
-        "height.learn": "none",
+        "height.learnt": "none",
         "height.thrust_gain": 0.4,
         "height.delay_s": 0.0,
         "limits.braking_m_s2": 2.0,
@@ -59,7 +59,7 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "limits.fence.x_min_m": -1.5,
         "limits.fence.x_max_m": 2.0,
         "damping.pitch_rate_feedback_s": 0.02,
-        "height.learn_limit": 0.6,
+        "height.learnt_gain_limit": 0.6,
         "height.thrust_gain": 1.7,
         "ranges.position_m": 5.0,
         "ranges.velocity_m_s": 2.0,
@@ -88,8 +88,8 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     | {
         "model.tilt": "exact",
         "limits.tilt_rad": 1.2,
-        "height.learn": "acceleration",
-        "height.learn_limit": 0.1,
+        "height.learnt": "acceleration",
+        "height.learnt_acceleration_limit_m_s2": 0.981,
         "height.thrust_max_m_s2": 39.0,
         "model.attitude": "measured",
         "observer.outage_s": 0.05,
@@ -107,6 +107,15 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
 """One move and two, all that can be learnt, with and without limits, fence, age, feedback
 and guard; drones that deliver less than the commanded thrust, and more; with small angles and with the
 thrust vector."""
+
+
+def _learnt(learnt: str, share: float) -> Values:
+    """Return what is learnt, at most `share` of the thrust, or of g."""
+    limits: dict[str, Values] = {
+        "gain": {"height.learnt_gain_limit": share},
+        "acceleration": {"height.learnt_acceleration_limit_m_s2": 9.81 * share},
+    }
+    return {"height.learnt": learnt} | limits.get(learnt, {})
 
 
 def height_case(index: int, scalar: str) -> Settings:
@@ -129,8 +138,7 @@ def _values(index: int) -> Values:
         "height.thrust_max_m_s2": float(rng.uniform(14, 40)),
         "height.climb_m_s": float(rng.uniform(0.1, 0.4)),
         "height.descent_m_s": float(rng.uniform(0.1, 0.3)),
-        "height.learn": str(rng.choice(["gain", "gain", "acceleration", "none"])),
-        "height.learn_limit": float(rng.uniform(0, 0.6)),
+        **_learnt(str(rng.choice(["gain", "gain", "acceleration", "none"])), float(rng.uniform(0, 0.6))),
         "height.disturbance_noise": float(10.0 ** rng.uniform(-1, 1)),
     }
     if rng.random() < 0.4:

@@ -177,11 +177,11 @@ OPTIONS: Final[dict[str, Option]] = {
     "fixed": Option(LEVEL, {"code.scalar": "fixed"}, _LEVEL),
     "prefix": Option(LEVEL, {"code.prefix": "own"}, _LEVEL),
     "exact tilt": Option(SPACE, {"model.tilt": "exact", "limits.tilt_rad": 0.8}, _SPACE),
-    "acceleration learnt": Option(SPACE, {"height.learn": "acceleration"}, _SPACE),
-    "nothing learnt": Option(SPACE, {"height.learn": "none"}, _SPACE),
+    "acceleration learnt": Option(SPACE, {"height.learnt": "acceleration"}, _SPACE),
+    "nothing learnt": Option(SPACE, {"height.learnt": "none"}, _SPACE),
     "height, delay, no weight, no limit": Option(
         SPACE,
-        {"height.delay_s": 0.02, "height.velocity_weight_s": 0.0, "height.learn_limit": 0.0},
+        {"height.delay_s": 0.02, "height.velocity_weight_s": 0.0, "height.learnt_gain_limit": 0.0},
         _SPACE,
     ),
     "height, limits": Option(

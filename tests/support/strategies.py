@@ -236,7 +236,8 @@ def base_of(path: str) -> Values:
         }
         return WIDE | {other: value for other, value in (SLOW | strong).items() if other != path}
     if path == "model.tilt" or path.startswith(("height.", "guard.thrust")):
-        return SLOW
+        learns = path == "height.learnt_acceleration_limit_m_s2"
+        return SLOW | ({"height.learnt": "acceleration"} if learns else {})
     if path.startswith("limits.fence."):
         walls = {
             f"limits.fence.{axis}_{end}_m": value

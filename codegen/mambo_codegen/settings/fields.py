@@ -73,9 +73,10 @@ BrakingLimit = Annotated[float, _none_or(SMALLEST_LIMIT, 10), _REFUSE_LIMIT, _NO
 
 @dataclass(frozen=True)
 class OnlyFor:
-    """Marks a section or a key that only controllers with this `cost.norm` use."""
+    """Marks a section or a key that only controllers use whose key at `path` has this value."""
 
-    norm: str
+    path: str
+    value: str
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,10 @@ class OnlyWith:
     section: str
 
 
-ONE_NORM: Final = OnlyFor("1-norm")
-QUADRATIC: Final = OnlyFor("quadratic")
+ONE_NORM: Final = OnlyFor("cost.norm", "1-norm")
+QUADRATIC: Final = OnlyFor("cost.norm", "quadratic")
+LEARNT_GAIN: Final = OnlyFor("height.learnt", "gain")
+LEARNT_ACCELERATION: Final = OnlyFor("height.learnt", "acceleration")
 WITH_GUARD: Final = OnlyWith("guard")
 WITH_HEIGHT: Final = OnlyWith("height")
 

@@ -4,7 +4,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mambo_codegen.settings.fields import WITH_HEIGHT, Delay, Number, SettingsSection
+from mambo_codegen.settings.fields import (
+    LEARNT_ACCELERATION,
+    LEARNT_GAIN,
+    WITH_HEIGHT,
+    Delay,
+    Number,
+    SettingsSection,
+)
 
 
 class Height(SettingsSection):
@@ -70,18 +77,20 @@ class Height(SettingsSection):
         le=20,
         description="Largest speed downwards that the controller aims at, in metres per second.",
     )
-    learn: Literal["gain", "acceleration", "none"] = Field(
+    learnt: Literal["gain", "acceleration", "none"] = Field(
         "gain",
         description='What the observer learns of the height: "gain", by which factor the thrust is more or '
         'less than expected, as weight, battery and propellers make it; "acceleration", a vertical '
         'acceleration, such as wind; "none", nothing.',
     )
-    learn_limit: Number = Field(
-        0.5,
+    learnt_gain_limit: Annotated[Number, LEARNT_GAIN] = Field(
+        0.5, ge=0, le=0.6, description='With "gain": largest deviation of the learnt gain from 1.'
+    )
+    learnt_acceleration_limit_m_s2: Annotated[Number, LEARNT_ACCELERATION] = Field(
+        4.905,
         ge=0,
-        le=0.6,
-        description="Largest deviation of the learnt gain from 1; or largest learnt acceleration, in units "
-        "of 9.81 m/s^2.",
+        le=5.886,
+        description='With "acceleration": largest learnt acceleration, in metres per second squared.',
     )
     disturbance_noise: Number = Field(
         3.0,

@@ -433,8 +433,8 @@ class Sections(SettingsSection):
             metadata += field.metadata
             model = type_of(field)
         for mark in metadata:
-            if isinstance(mark, OnlyFor) and mark.norm != self.cost.norm:
-                return f'with cost.norm = "{self.cost.norm}"'
+            if isinstance(mark, OnlyFor) and (value := self.value(mark.path)) != mark.value:
+                return f'with {mark.path} = "{value}"'
             if isinstance(mark, OnlyWith) and getattr(self, mark.section) is None:
                 return f"without [{mark.section}]"
         return None

@@ -109,7 +109,7 @@ CASES = {
     "limits": settings_of(TWO_MOVES | LIMITED),
     "height, limits": settings_of(CRAZYFLIE | LIMITED),
     "height, feedback": settings_of(CRAZYFLIE | {"damping.roll_rate_feedback_s": 0.01}),
-    "height, acceleration": settings_of(CRAZYFLIE | {"height.learn": "acceleration"}),
+    "height, acceleration": settings_of(CRAZYFLIE | {"height.learnt": "acceleration"}),
     "height, guard": settings_of(CRAZYFLIE | {"guard.tilt_budget_rad_s": 1.0}),
     "1-norm": ONE_NORM,
     "1-norm, no tracker": with_option(ONE_NORM, "target.acceleration", "none"),

@@ -61,7 +61,7 @@ def test_loop_is_that_of_python_control() -> None:
 @pytest.mark.parametrize("learn", ["none", "acceleration"])
 def test_a_load_divides_the_gain_of_a_loop_that_does_not_learn_it(learn: str) -> None:
     """With 1.2 times the mass both gain margins are 1.2 times larger: thrust has 1/1.2 of its effect."""
-    settings = height_settings(learn=learn)
+    settings = height_settings(learnt=learn)
     light, heavy = (margins_of(settings, _loaded(load))[HEIGHT].command for load in (1.0, 1.2))
     assert heavy.gain_up == pytest.approx(1.2 * light.gain_up, rel=1e-4)
     assert heavy.gain_down == pytest.approx(1.2 * light.gain_down, rel=1e-4)
@@ -96,9 +96,9 @@ def test_a_thrust_that_cannot_be_learnt_has_no_margins(gain: float, limit: float
         vehicle_toml.parse(text.replace("thrust_max_n = 0.575", "thrust_max_n = 1.5"), "mine", "mine.toml")
     )
     with pytest.raises(
-        FlightError, match=f"does not hold its height with height.learn_limit = {limit:g} and"
+        FlightError, match=f"does not hold its height with height.learnt_gain_limit = {limit:g} and"
     ):
-        margins_of(height_settings(learn_limit=limit), drone)
+        margins_of(height_settings(learnt_gain_limit=limit), drone)
     assert margins_of(height_settings(thrust_gain=gain), drone)[HEIGHT].stable
 
 
@@ -123,7 +123,7 @@ def test_the_gain_of_a_thrust_is_an_inverse_load() -> None:
         Vehicle.of(vehicle_toml.parse(text + gain, "mine", "mine.toml")) for gain in ("", "gain = 0.8\n")
     )
     for settings, axis, factor in (
-        (height_settings(learn="none"), HEIGHT, 0.8),
+        (height_settings(learnt="none"), HEIGHT, 0.8),
         (preset("crazyflie"), 0, 1.0),
     ):
         found, expected = (margins_of(settings, one)[axis].command.gain_up for one in (weak, full))

@@ -151,4 +151,4 @@ def test_a_load_that_is_learnt_multiplies_the_thrust(settings: Settings, load: f
 def test_a_drone_that_falls_is_not_at_hover() -> None:
     """Also one whose controller learns nothing, which need not be at its target."""
     with pytest.raises(FlightError, match=r"hovers with 3 times the expected thrust does not hold"):
-        linear_controller(height_settings(learn="none"), 3.0)
+        linear_controller(height_settings(learnt="none"), 3.0)

@@ -52,7 +52,7 @@ def delivering(gain: float) -> VehicleFile:
 )
 def test_a_drone_that_delivers_too_little_is_seen(learnt: str, words: str) -> None:
     """0.8 of the expected thrust: settings that learn it hold their place, others fly lower."""
-    settings = with_option(settings_for(delivering(1.0)), "height.learn", learnt)
+    settings = with_option(settings_for(delivering(1.0)), "height.learnt", learnt)
     found = fly_derived(settings, delivering(0.8))
     assert found.good is (learnt == "gain")
     assert found.words.startswith(f"flown for 10 s: {words}")

@@ -117,7 +117,7 @@ class HeightAxis:
         self._most = constant((MOST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
         self._thrusts = [constant(value, "acceleration") for value in found.thrust_m_step2]
         *self._thrusts_m_s2, self._hover_m_s2 = (constant(value, "thrust") for value in found.command_m_s2)
-        self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
+        self._learnt_limit = constant(found.learnt_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._target_observer = climb_observer(constants, products, found)
@@ -364,12 +364,12 @@ class HeightAxis:
         if self._found.learns_gain:
             change = products.gain_correction(gains[2][0], by[0], gains[2][1], by[1])
             learnt = state.gain + np.where(grounded & (change > 0), 0, change)
-            least, most = self._one - self._learn_limit, self._one + self._learn_limit
+            least, most = self._one - self._learnt_limit, self._one + self._learnt_limit
             return replace(corrected, gain=confine(learnt, least, most))
         if self._found.learns_acceleration:
             change = products.disturbance_correction(gains[2][0], by[0], gains[2][1], by[1])
             change = np.where(grounded & (change > 0), 0, change)
-            learnt = clamp(state.disturbance_m_step2 + change, self._learn_limit)
+            learnt = clamp(state.disturbance_m_step2 + change, self._learnt_limit)
             return replace(corrected, disturbance_m_step2=learnt)
         return corrected
 

@@ -56,7 +56,7 @@ class HeightConstants:
     states:        (k,) those of the law less the integral part.
     gain:          (3, 2) of the observer, as in `ObserverConstants`; with a learnt thrust gain the last row
                    is that of the gain.
-    learn_limit:   largest deviation of the gain from 1, or largest learnt acceleration, m/step^2.
+    learnt_limit:  largest deviation of the gain from 1, or largest learnt acceleration, m/step^2.
     gravity_m_step2, per_gravity: g and its inverse.
     thrust_m_step2: (2,) least and largest thrust over mass.
     limit_m_step2: beyond every |a|, |c| and |u|.
@@ -77,8 +77,8 @@ class HeightConstants:
     states: tuple[str, ...]
     ratio: float
     gain: NDArray[np.float64]
-    learn: str
-    learn_limit: float
+    learnt: str
+    learnt_limit: float
     gravity_m_step2: float
     per_gravity: float
     thrust_m_step2: tuple[float, float]
@@ -99,12 +99,12 @@ class HeightConstants:
     @property
     def learns_gain(self) -> bool:
         """Whether a factor of the thrust is learnt."""
-        return self.learn == "gain"
+        return self.learnt == "gain"
 
     @property
     def learns_acceleration(self) -> bool:
         """Whether a vertical acceleration is learnt."""
-        return self.learn == "acceleration"
+        return self.learnt == "acceleration"
 
 
 def height_constants(settings: Sections) -> HeightConstants | None:
@@ -116,8 +116,8 @@ def height_constants(settings: Sections) -> HeightConstants | None:
     rows, law = np.array(attitude_solution(step_s, _loop(height))["rows"]), _law(settings, height)
     gravity = GRAVITY_M_S2 * (step_s * step_s)
     gain = observer_gain(settings, height.disturbance_noise)
-    deviation = height.learn_limit if height.learn == "gain" else 0.0
-    if height.learn == "gain":
+    deviation = height.learnt_gain_limit if height.learnt == "gain" else 0.0
+    if height.learnt == "gain":
         gain = gain / np.array([[1.0], [1.0], [gravity]])
     least, most = (step_s * step_s * thrust for thrust in (height.thrust_min_m_s2, height.thrust_max_m_s2))
     reach_steps = float(law[0, 1] / law[0, 0])
@@ -129,8 +129,8 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         states=tuple(name for name in STATES if name != "i"),
         ratio=_solution(settings, height).ratio,
         gain=gain,
-        learn=height.learn,
-        learn_limit=height.learn_limit * (1.0 if height.learn == "gain" else gravity),
+        learnt=height.learnt,
+        learnt_limit=_learnt_limit(height, step_s),
         gravity_m_step2=gravity,
         per_gravity=1 / gravity,
         thrust_m_step2=(least, most),
@@ -148,6 +148,13 @@ def height_constants(settings: Sections) -> HeightConstants | None:
         weight_inverse=never_too_small(reciprocal(LEAST_WEIGHT, MOST_WEIGHT)),
         snap_s=_solution(settings, height).snap_s,
     )
+
+
+def _learnt_limit(height: Height, step_s: float) -> float:
+    """Return the largest deviation of the gain from 1, or the largest learnt acceleration, m/step^2."""
+    if height.learnt == "gain":
+        return height.learnt_gain_limit
+    return height.learnt_acceleration_limit_m_s2 * (step_s * step_s)
 
 
 def refusals(settings: Sections) -> list[Refusal]:

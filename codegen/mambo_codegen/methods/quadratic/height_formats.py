@@ -45,8 +45,8 @@ def vertical_bounds(
     """Return the bounds of the height for inputs within `ranges`."""
     reach_m = ranges.position_m
     limit, speed, gravity = height.limit_m_step2, observer.velocity_limit_m_step, height.gravity_m_step2
-    learnt = height.learn_limit if height.learns_acceleration else 0.0
-    deviation = height.learn_limit if height.learns_gain else 0.0
+    learnt = height.learnt_limit if height.learns_acceleration else 0.0
+    deviation = height.learnt_limit if height.learns_gain else 0.0
     assert observed.climb is not None, "with a height"
     target, jerk = (observed.update_s * one for one in (observed.climb.acceleration, observed.climb.jerk))
     innovation = (2 * reach_m) + (observer.age_steps * speed)
@@ -111,7 +111,7 @@ def vertical_shifts(bits: Mapping[str, int]) -> dict[str, int]:
 
 def spare_bound(vector: ThrustVectorConstants, height: HeightConstants) -> float:
     """Return a bound of what the thrust leaves to the tilt, chord by chord, m/step^2."""
-    deviation = height.learn_limit if height.learns_gain else 0.0
+    deviation = height.learnt_limit if height.learns_gain else 0.0
     vertical = height.gravity_m_step2 + height.limit_m_step2
     return float(np.max(vector.chords)) * ((1 + deviation) * vector.spare_m_step2 + vertical)
 
@@ -128,4 +128,4 @@ def vector_shifts(bits: Mapping[str, int]) -> dict[str, int]:
 
 def learnt_m_s2(height: HeightConstants) -> float:
     """Return the largest learnt acceleration, m/s^2; 0 if none is learnt."""
-    return height.learn_limit / height.gravity_m_step2 * GRAVITY_M_S2 if height.learns_acceleration else 0.0
+    return height.learnt_limit / height.gravity_m_step2 * GRAVITY_M_S2 if height.learns_acceleration else 0.0

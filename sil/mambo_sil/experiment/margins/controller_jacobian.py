@@ -11,6 +11,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.optional_sections import Height
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.columns import LEVEL, SPACE, TARGET
@@ -129,13 +130,24 @@ def _learn(
             break
         before = now
     off_m = abs(height_m - goal_m)
-    if abs(lift_m_s2) > _STILL or (height.learn != "none" and off_m > _ON_TARGET_M):
+    if abs(lift_m_s2) > _STILL or (height.learnt != "none" and off_m > _ON_TARGET_M):
         raise FlightError(
             f"height: a drone that hovers with {load * height.thrust_gain:.3g} times the expected thrust "
-            f"does not hold its height with height.learn_limit = {height.learn_limit:g} "
+            f"does not hold its height with {_learnt(height)} "
             f"and height.thrust_max_m_s2 = {height.thrust_max_m_s2:g}; derive settings from its vehicle.toml"
         )
     return seen, stored
+
+
+def _learnt(height: Height) -> str:
+    """Return what a controller learns of the height, as keys and values."""
+    match height.learnt:
+        case "gain":
+            return f"height.learnt_gain_limit = {height.learnt_gain_limit:g}"
+        case "acceleration":
+            return f"height.learnt_acceleration_limit_m_s2 = {height.learnt_acceleration_limit_m_s2:g}"
+        case _:
+            return 'height.learnt = "none"'
 
 
 def _step(controller: CompiledController, state: FloatArray, target: FloatArray) -> Any:
