@@ -43,7 +43,7 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
     ONE_MOVE
     | {
         "height.learnt": "acceleration",
-        "model.attitude": "measured",
+        "model.start_attitude": "measured",
         "height.learnt_acceleration_limit_m_s2": 0.981,
         "height.descent_m_s": 1.2,
     },
@@ -91,7 +91,7 @@ HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
         "height.learnt": "acceleration",
         "height.learnt_acceleration_limit_m_s2": 0.981,
         "height.thrust_max_m_s2": 39.0,
-        "model.attitude": "measured",
+        "model.start_attitude": "measured",
         "observer.outage_s": 0.05,
     },
     CRAZYFLIE

@@ -152,7 +152,7 @@ OPTIONS: Final[dict[str, Option]] = {
     "1-norm, float64": Option(PAPER, {"code.scalar": "float64"}, _PAPER),
     "1-norm, fixed": Option(PAPER, {"code.scalar": "fixed"}, _PAPER),
     "quadratic": Option(LEVEL, {"cost.norm": "quadratic"}, _LEVEL),
-    "predicted attitude": Option(LEVEL, {"model.attitude": "predicted"}, _LEVEL),
+    "predicted attitude": Option(LEVEL, {"model.start_attitude": "predicted"}, _LEVEL),
     "learnt gain": Option(LEVEL, {"observer.tilt_gain": "learnt"}, _LEVEL),
     "ramp": Option(LEVEL, {"horizon.ramp_s": 0.4}, _LEVEL),
     "attitude model": Option(

@@ -30,7 +30,7 @@ ONE_MOVE: Final[Values] = MAMBO_LOOPS | {
     "cost.norm": "quadratic",
     "cost.response_time_s": 0.01 ** (1 / 3),
     "damping.roll_rate_feedback_s": 0.05,
-    "model.attitude": "predicted",
+    "model.start_attitude": "predicted",
 }
 """One free move, for the Mambo."""
 TWO_MOVES: Final[Values] = {
@@ -184,7 +184,7 @@ def closed_loop(axis: Axis, row: Any) -> Array:
 
 
 CORNER_SETTINGS: Final[tuple[Values, ...]] = (
-    ONE_MOVE | {"model.attitude": "measured", "damping.roll_rate_feedback_s": 0.0},
+    ONE_MOVE | {"model.start_attitude": "measured", "damping.roll_rate_feedback_s": 0.0},
     TWO_MOVES | {"observer.outage_s": 0.03},
     ONE_MOVE
     | {"horizon.ramp_s": 0.4, "model.drag_1_s": 0.067, "observer.age_s": 0.041, "model.roll_trim_rad": 0.02},
@@ -240,7 +240,7 @@ def case_values(index: int) -> Values:
         "horizon.update_period_s": period_s,
         "horizon.ramp_s": float(rng.choice([0.0, max(0.02, 2 * period_s), 0.4, 1.0])),
         "limits.tilt_rad": tilt_rad,
-        "model.attitude": str(rng.choice(["measured", "predicted"])),
+        "model.start_attitude": str(rng.choice(["measured", "predicted"])),
         "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),
         "model.drag_1_s": some(0.01, 5),
         "cost.norm": "quadratic",

@@ -129,7 +129,7 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     require("frama-c", "frama-c-base")
     document = quadratic_settings(chosen.scalar).model_dump()
     document["horizon"]["ramp_s"] = chosen.ramp_s
-    document["model"]["attitude"] = chosen.attitude
+    document["model"]["start_attitude"] = chosen.attitude
     document["observer"]["age_s"] = 0.03 if chosen.attitude == "measured" else 0.0
     document["damping"]["roll_rate_feedback_s"] = 0.0
     result = proven.check(subject(Settings.model_validate(document), tmp_path))

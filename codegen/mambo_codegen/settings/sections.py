@@ -163,7 +163,7 @@ class Model(SettingsSection):
         'good to about 0.4 rad; "exact", as the direction of the thrust says, and no more is asked of the '
         "tilt than the largest thrust leaves beside the height. For tilt limits of more than 0.5 rad.",
     )
-    attitude: Annotated[Literal["measured", "predicted"], QUADRATIC] = Field(
+    start_attitude: Annotated[Literal["measured", "predicted"], QUADRATIC] = Field(
         "measured",
         description='Attitude at the start of the prediction: "measured", or "predicted" from the past '
         "commands, which closes no quick loop through the attitude and so tolerates slow motors.",

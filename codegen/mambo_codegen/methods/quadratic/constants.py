@@ -90,7 +90,7 @@ class QuadraticConstants(Constants):
             "lift": self.height is not None and self.height.learns_acceleration,
             "pitch_feedback": feedback[1] != 0,
             "pitch_trim": model.pitch_trim_rad != 0,
-            "predicted": model.attitude == "predicted",
+            "predicted": model.start_attitude == "predicted",
             "quadratic": True,
             "roll_feedback": feedback[0] != 0,
             "roll_trim": model.roll_trim_rad != 0,

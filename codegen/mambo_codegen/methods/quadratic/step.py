@@ -149,7 +149,7 @@ class ControlStep:
         self._level, self._upward = (
             [one.column for one in numbers if one.row.member in members] for members in (_LEVEL, _UPWARD)
         )
-        self._is_predicted = constants.settings.model.attitude == "predicted"
+        self._is_predicted = constants.settings.model.start_attitude == "predicted"
         self._no_estimate = constants.observer.outage_steps + 1
         """`missed` while the model brakes after an outage."""
         self.at_rest = self._no_estimate + 1

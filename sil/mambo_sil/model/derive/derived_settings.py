@@ -109,7 +109,7 @@ def derive(drone: VehicleFile, *, exact_share: float | None = None, firm: bool =
         *_horizon(drone),
         *attitude,
         Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
-        Derived("model", "attitude", "predicted", "No quick loop through the measured attitude"),
+        Derived("model", "start_attitude", "predicted", "No quick loop through the measured attitude"),
         *([] if exact_share is None else [_exact_tilt(drone)]),
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0, firm=firm),
