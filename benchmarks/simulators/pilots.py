@@ -84,7 +84,7 @@ class Preset:
         """Return the C for new drones."""
         settings = presets.preset("crazyflie")
         if not noisy:
-            settings = with_options(settings, {"age_s": 0.0})
+            settings = with_options(settings, {"measurement_age_s": 0.0})
         hold = HeightHold("feedforward", self.drone, settings, drones)
         return OurPilot(Controller(settings, drones, hold), mass_kg)
 

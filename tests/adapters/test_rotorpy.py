@@ -16,8 +16,8 @@ from tests.support.tools import require_module
 MADE = pytest.mark.parametrize(
     "made",
     [
-        lambda: Controller.from_preset("crazyflie", vehicle="crazyflie", height="pid", age_s=0.0),
-        lambda: Controller.from_vehicle("crazyflie", age_s=0.0),
+        lambda: Controller.from_preset("crazyflie", vehicle="crazyflie", height="pid", measurement_age_s=0.0),
+        lambda: Controller.from_vehicle("crazyflie", measurement_age_s=0.0),
     ],
     ids=["loop", "axis"],
 )
@@ -65,7 +65,9 @@ def test_each_flight_starts_afresh(made: Callable[[], Controller]) -> None:
 )
 def test_a_drone_on_the_ground_idles(ground: bool, height_m: float, idle: bool) -> None:
     """If the vehicle has one: without, height 0 is a height as others."""
-    adapter = RotorpyController(Controller.from_vehicle("crazyflie", age_s=0.0), 0.03, enable_ground=ground)
+    adapter = RotorpyController(
+        Controller.from_vehicle("crazyflie", measurement_age_s=0.0), 0.03, enable_ground=ground
+    )
     here = np.array([0.0, 0.0, height_m])
     state = {"x": here, "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0])}
     thrust_n = adapter.update(0.0, state, {"x": here, "x_dot": np.zeros(3)})["cmd_thrust"]

@@ -73,9 +73,10 @@ def states(worlds: int, drones: int) -> dict[str, Any]:
     "controller",
     [
         pytest.param(
-            lambda: Controller.from_vehicle("crazyflie-flown", 6, height="pid", age_s=0.0), id="loop"
+            lambda: Controller.from_vehicle("crazyflie-flown", 6, height="pid", measurement_age_s=0.0),
+            id="loop",
         ),
-        pytest.param(lambda: Controller.from_vehicle("crazyflie", 6, age_s=0.0), id="axis"),
+        pytest.param(lambda: Controller.from_vehicle("crazyflie", 6, measurement_age_s=0.0), id="axis"),
     ],
 )
 def test_a_crazyflow_simulation_gets_its_attitude_commands(controller: Callable[[], Controller]) -> None:
@@ -95,7 +96,7 @@ def test_a_crazyflow_simulation_gets_its_attitude_commands(controller: Callable[
 
 def test_drones_on_the_floor_of_crazyflow_idle_until_they_shall_climb() -> None:
     """At -1 mm, where crazyflow holds them, and at rest; one that sinks there still flies."""
-    made = Controller.from_vehicle("crazyflie", 3, age_s=0.0)
+    made = Controller.from_vehicle("crazyflie", 3, measurement_age_s=0.0)
     at_rest = states(3, 1)
     at_rest["position"] = np.array([[[0.0, 0.0, -0.001]], [[0.0, 0.0, 0.001]], [[0.0, 0.0, 0.02]]])
     at_rest["velocity"] = np.array([[[0.0, 0.0, 0.0]], [[0.0, 0.0, -0.3]], [[0.0, 0.0, 0.0]]])
@@ -238,7 +239,7 @@ def test_a_base_control_gets_thrust_and_attitude() -> None:
 @pytest.mark.parametrize(("height_m", "idle"), [(0.0125, True), (0.02, True), (0.03, False)])
 def test_a_base_control_on_the_floor_idles(height_m: float, idle: bool) -> None:
     """PyBullet gives the middle of the body: it lies on the floor at half its length, here 12.5 mm."""
-    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", age_s=0.0))
+    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", measurement_age_s=0.0))
     here = np.array([0.0, 0.0, height_m])
     pwm = control.computeControl(0.01, here, LEVEL, np.zeros(3), here)[0]
     thrust_n = 4.0 * KF * (pwm * control.PWM2RPM_SCALE + control.PWM2RPM_CONST) ** 2

@@ -90,7 +90,7 @@ def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
 def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     """From a vehicle, a preset and a file alike."""
     document: dict[str, Any] = presets.load("crazyflie").model_dump()
-    document["observer"]["age_s"] = 0.0
+    document["observer"]["measurement_age_s"] = 0.0
     document["limits"] = {
         "tilt_rad": 0.4,
         "speed_m_s": 3.0,
@@ -99,7 +99,7 @@ def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
     }
     made = Controller.from_preset(
         "crazyflie",
-        age_s=0.0,
+        measurement_age_s=0.0,
         tilt_rad=0.4,
         speed_m_s=3.0,
         braking_m_s2=2.5,
@@ -129,11 +129,11 @@ def test_another_update_period_changes_the_delay_of_the_thrust() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"age_s": 0.3}, r"age_s = 0\.3 must lie in 0\.\.0\.2"),
-        ({"age_s": float("nan")}, "age_s = nan must"),
-        ({"age_s": "old"}, 'age_s = "old" must be a number'),
-        ({"age_s": True}, "age_s = True must be no truth value"),
-        ({"age_s": None}, "age_s = .* must be a number"),
+        ({"measurement_age_s": 0.3}, r"measurement_age_s = 0\.3 must lie in 0\.\.0\.2"),
+        ({"measurement_age_s": float("nan")}, "measurement_age_s = nan must"),
+        ({"measurement_age_s": "old"}, 'measurement_age_s = "old" must be a number'),
+        ({"measurement_age_s": True}, "measurement_age_s = True must be no truth value"),
+        ({"measurement_age_s": None}, "measurement_age_s = .* must be a number"),
         ({"tilt_rad": 2.0}, r"tilt_rad = 2\.0 must lie in"),
         ({"speed_m_s": -1.0}, r"speed_m_s = -1\.0 must"),
         ({"tilt_rad": 0.2, "braking_m_s2": 9.0}, "braking_m_s2 = 9.0"),
@@ -147,7 +147,7 @@ def test_another_update_period_changes_the_delay_of_the_thrust() -> None:
         ({"height": "firm"}, 'height = "firm" must be "stock" or "feedforward" or "pid"'),
         ({"update_period_s": 0.0}, r"update_period_s = 0\.0 must lie in"),
         ({"update_period_s": "slow"}, 'update_period_s = "slow" must be a number'),
-        ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "tilt_rad"'),
+        ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "measurement_age_s" or "tilt_rad"'),
     ],
 )
 def test_a_wrong_option_is_refused_by_name(options: dict[str, Any], message: str) -> None:
@@ -169,8 +169,10 @@ def test_sensors_without_figures_are_refused_by_name() -> None:
 
 def test_what_does_not_fit_together_is_refused() -> None:
     """An age with a 1-norm, a height without a drone, x and y where x, y, z are needed."""
-    with pytest.raises(ArgumentError, match=r'age_s = 0\.0 has no use with cost\.norm = "1-norm"'):
-        Controller.from_preset("mambo-1norm", age_s=0.0)
+    with pytest.raises(
+        ArgumentError, match=r'measurement_age_s = 0\.0 has no use with cost\.norm = "1-norm"'
+    ):
+        Controller.from_preset("mambo-1norm", measurement_age_s=0.0)
     limits: dict[str, Any] = {"floor_m": 1.0, "ceiling_m": 1.0, "climb_m_s": 1.0, "descent_m_s": 1.0}
     for name, value in limits.items():
         with pytest.raises(ArgumentError, match=rf"{name} = 1\.0 has no use without \[height\]"):

@@ -164,7 +164,10 @@ def test_a_target_on_the_floor_gets_the_least_thrust_there() -> None:
 
 def test_flights_in_space_follow_the_height() -> None:
     """By `fly`; a level curve at its height."""
-    controller, vehicle = Controller.from_vehicle("crazyflie", age_s=0.0), Vehicle.from_preset("crazyflie")
+    controller, vehicle = (
+        Controller.from_vehicle("crazyflie", measurement_age_s=0.0),
+        Vehicle.from_preset("crazyflie"),
+    )
     names: tuple[CurveName, ...] = ("helix", "circle")
     for name in names:
         flown = fly(controller, vehicle, curve(name, 1.0, 1.0), duration_s=6.0)
@@ -178,7 +181,7 @@ ALOFT_M = np.array([[0.0, 0.0, -1.0]] * 2)
 
 def hold(height: AltitudeName, off_m: float, steps: int = 220, **how: Any) -> None:
     """Let two drones rest, of which the second is lower than its target."""
-    pilot = Controller.from_preset("crazyflie", 2, vehicle="crazyflie", height=height, age_s=0.0)
+    pilot = Controller.from_preset("crazyflie", 2, vehicle="crazyflie", height=height, measurement_age_s=0.0)
     low = ALOFT_M + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, off_m]])
     climb = np.array([0.0, 0.0, how.get("climb_m_s", 0.0)])
     state = DroneState(low, np.zeros((2, 3)) - climb, np.zeros((2, 3)), how.get("grounded", False))

@@ -93,7 +93,7 @@ def fly(
 )
 def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> None:
     """From a small error, on the model's own plant: error and velocity vanish, whatever the settings."""
-    without = {"model.drag_1_s": 0.0, "observer.age_s": 0.0}
+    without = {"model.drag_1_s": 0.0, "observer.measurement_age_s": 0.0}
     without |= {f"damping.{angle}_rate_feedback_s": 0.0 for angle in ANGLES}
     without |= {f"limits.fence.{axis}_{end}_m": 0.0 for axis in "xy" for end in ("min", "max")}
     settings = settings_of(case_values(20 + index) | without | {"code.scalar": "float64"})

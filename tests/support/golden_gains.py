@@ -16,7 +16,8 @@ from tests.support.quadratic import ONE_MOVE, TWO_MOVES, settings_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_gains.json")
 CONTROLLERS: Final = {
-    "one move": ONE_MOVE | {"model.drag_1_s": 0.067, "observer.age_s": 0.013, "model.roll_trim_rad": 0.017},
+    "one move": ONE_MOVE
+    | {"model.drag_1_s": 0.067, "observer.measurement_age_s": 0.013, "model.roll_trim_rad": 0.017},
     "two moves": TWO_MOVES | {"model.pitch_gain": 0.93, "model.acceleration_per_tilt": 1.07},
 }
 _MACHINES: Final = "spectral_radius"

@@ -20,7 +20,7 @@ CRAZYFLIE: Final[Values] = TWO_MOVES | {
 EVERY_FUNCTION: Final = settings_of(
     CRAZYFLIE
     | {
-        "observer.age_s": 0.01,
+        "observer.measurement_age_s": 0.01,
         "model.drag_1_s": 0.2,
         "model.roll_gain": 0.9,
         "limits.speed_m_s": 5.0,
@@ -31,7 +31,7 @@ EVERY_FUNCTION: Final = settings_of(
 """Settings of every function of nmpc.h; roll and pitch differ."""
 
 HEIGHT_CORNERS: Final[tuple[Values, ...]] = (
-    CRAZYFLIE | {"observer.age_s": 0.01, "observer.outage_s": 0.05},
+    CRAZYFLIE | {"observer.measurement_age_s": 0.01, "observer.outage_s": 0.05},
     CRAZYFLIE
     | {
         "limits.speed_m_s": 1.5,

@@ -167,7 +167,9 @@ OPTIONS: Final[dict[str, Option]] = {
         {"damping.roll_rate_feedback_s": 0.05, "damping.pitch_rate_feedback_s": 0.02},
         _LEVEL,
     ),
-    "age, velocity weight": Option(LEVEL, {"observer.age_s": 0.02, "cost.velocity_weight_s": 0.1}, _LEVEL),
+    "age, velocity weight": Option(
+        LEVEL, {"observer.measurement_age_s": 0.02, "cost.velocity_weight_s": 0.1}, _LEVEL
+    ),
     "no outage, no disturbance": Option(
         LEVEL, {"observer.outage_s": 0.0, "observer.disturbance_limit_m_s2": 0.0}, _LEVEL
     ),

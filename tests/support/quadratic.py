@@ -187,7 +187,12 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
     ONE_MOVE | {"model.start_attitude": "measured", "damping.roll_rate_feedback_s": 0.0},
     TWO_MOVES | {"observer.outage_s": 0.03},
     ONE_MOVE
-    | {"horizon.ramp_s": 0.4, "model.drag_1_s": 0.067, "observer.age_s": 0.041, "model.roll_trim_rad": 0.02},
+    | {
+        "horizon.ramp_s": 0.4,
+        "model.drag_1_s": 0.067,
+        "observer.measurement_age_s": 0.041,
+        "model.roll_trim_rad": 0.02,
+    },
     TWO_MOVES
     | {
         "limits.tilt_rad": 0.05,
@@ -247,7 +252,7 @@ def case_values(index: int) -> Values:
         "cost.response_time_s": float(10.0 ** rng.uniform(-1.5, 0.2)),
         "cost.velocity_weight_s": some(0.01, 2),
         "observer.disturbance_limit_m_s2": float(rng.choice([0.0, 3.0, 20.0])),
-        "observer.age_s": some(0.001, 0.2),
+        "observer.measurement_age_s": some(0.001, 0.2),
         "observer.outage_s": float(rng.integers(0, 40)) * period_s if period_s < 0.05 else 0.3,
         "ranges.position_m": float(rng.choice([5.0, 1000.0, 10000.0])),
         "ranges.velocity_m_s": float(rng.choice([2.0, 100.0])),
@@ -307,7 +312,7 @@ EVERYTHING = settings_of(
         "model.roll_gain": 0.9,
         "model.pitch_gain": 1.1,
         "damping.pitch_rate_feedback_s": 0.02,
-        "observer.age_s": 0.013,
+        "observer.measurement_age_s": 0.013,
         "observer.outage_s": 0.05,
         "limits.tilt_rad": 0.25,
     }

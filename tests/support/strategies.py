@@ -126,7 +126,7 @@ def quadratic_values(draw: st.DrawFn) -> Values:
         }
     trim_rad = max(abs(values["model.roll_trim_rad"]), abs(values["model.pitch_trim_rad"]))
     values |= draw(limits(tilt_rad, 9.81 * per_tilt * ((gain * tilt_rad) - trim_rad)))
-    for name in ("model.drag_1_s", "observer.age_s", "cost.velocity_weight_s"):
+    for name in ("model.drag_1_s", "observer.measurement_age_s", "cost.velocity_weight_s"):
         values[name] = draw(none | numbers(name))
     settings = Settings.model_validate(nested(QUADRATIC))
     for key in KEYS.values():

@@ -33,7 +33,7 @@ SHAPES: dict[str, Settings] = {
     "least": settings_of(ONE_MOVE),
     "old and trimmed": with_option(
         with_option(
-            with_option(height_settings(learnt="acceleration"), "observer.age_s", 0.02),
+            with_option(height_settings(learnt="acceleration"), "observer.measurement_age_s", 0.02),
             "model.roll_trim_rad",
             0.01,
         ),

@@ -130,7 +130,7 @@ def test_other_settings_are_proven(chosen: Options, tmp_path: Path) -> None:
     document = quadratic_settings(chosen.scalar).model_dump()
     document["horizon"]["ramp_s"] = chosen.ramp_s
     document["model"]["start_attitude"] = chosen.attitude
-    document["observer"]["age_s"] = 0.03 if chosen.attitude == "measured" else 0.0
+    document["observer"]["measurement_age_s"] = 0.03 if chosen.attitude == "measured" else 0.0
     document["damping"]["roll_rate_feedback_s"] = 0.0
     result = proven.check(subject(Settings.model_validate(document), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence

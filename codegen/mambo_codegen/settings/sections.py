@@ -274,7 +274,7 @@ class Observer(SettingsSection):
     disturbance_limit_m_s2: Number = Field(
         3.0, ge=0, le=20, description="Largest disturbance, in m/s^2; 0 for none."
     )
-    age_s: Number = Field(
+    measurement_age_s: Number = Field(
         0.0,
         ge=0,
         le=0.2,

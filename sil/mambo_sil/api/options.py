@@ -13,8 +13,8 @@ from mambo_sil.flight.names import AltitudeName
 class ControllerOptions(TypedDict, total=False):
     """What differs from the settings; a missing one leaves them as they are."""
 
-    age_s: float
-    """Age of the measured position and velocity (`observer.age_s`): 0 for the true state of a simulator."""
+    measurement_age_s: float
+    """Age of the measured position and velocity (`observer.measurement_age_s`): 0 for true states."""
     tilt_rad: float
     """Largest command (`limits.tilt_rad`); a smaller one without `braking_m_s2` lowers that by as much."""
     speed_m_s: float
@@ -40,7 +40,7 @@ class ControllerOptions(TypedDict, total=False):
 
 
 KEYS: Final = {
-    "age_s": "observer.age_s",
+    "measurement_age_s": "observer.measurement_age_s",
     "tilt_rad": "limits.tilt_rad",
     "speed_m_s": "limits.speed_m_s",
     "braking_m_s2": "limits.braking_m_s2",

@@ -130,7 +130,7 @@ def test_the_observer_s_constants_are_in_steps() -> None:
     observer = {
         "observer.disturbance_limit_m_s2": 2.5,
         "model.drag_1_s": 0.3,
-        "observer.age_s": 0.013,
+        "observer.measurement_age_s": 0.013,
         "observer.outage_s": 0.5,
         "ranges.velocity_m_s": 7.0,
     }

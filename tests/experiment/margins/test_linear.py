@@ -129,7 +129,7 @@ def test_a_narrow_fence_changes_nothing_midway() -> None:
     [
         (height_settings(delay_s=0.0), 1.2),
         (height_settings(delay_s=0.05), 1.2),
-        (with_option(height_settings(), "observer.age_s", 0.024), 1.1),
+        (with_option(height_settings(), "observer.measurement_age_s", 0.024), 1.1),
     ],
     ids=["thrust without delay", "thrust with delay", "old state"],
 )

@@ -145,7 +145,7 @@ def test_settings_derived_with_the_delay_of_the_link_fly_closer_over_it() -> Non
     """Of 50 ms each way: the way down is dead time, the way up the age of the position."""
     slow = DRONE.replace("dead_time_s = 0.04", "dead_time_s = 0.09").replace("time_s = 0.01", "time_s = 0.06")
     told = vehicle_toml.parse(slow, "drone", "drone.toml")
-    known = controller_toml.with_option(settings_for(told), "observer.age_s", 0.05, "age_s")
+    known = controller_toml.with_option(settings_for(told), "observer.measurement_age_s", 0.05, "age_s")
 
     def rms_m(settings: Settings) -> float:
         link, updates = WiredLink("px4", drone()), list[Update]()

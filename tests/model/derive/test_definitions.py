@@ -92,7 +92,7 @@ def test_the_age_is_the_mean_of_that_of_the_newest_position(rate_hz: int, delay_
     sensors = {"position_rate_hz": rate_hz, "position_delay_s": delay_s}
     held = [update % round(100 / rate_hz) / 100 for update in range(200)]
     expected_s = min(delay_s + sum(held) / len(held), 0.2)
-    assert settings_for(changed(GENERIC, sensors=sensors)).observer.age_s == pytest.approx(
+    assert settings_for(changed(GENERIC, sensors=sensors)).observer.measurement_age_s == pytest.approx(
         expected_s, rel=ROUNDED
     )
 
@@ -102,7 +102,7 @@ def test_the_age_behind_a_crazyflie_s_filter_is_at_most_20_ms(delay_s: float, ag
     """It makes up for the rest by its gyroscope; the settings say so."""
     sensors = {"position_delay_s": delay_s, "estimator": "crazyflie"}
     drone = changed(GENERIC, sensors=sensors)
-    assert settings_for(drone).observer.age_s == age_s
+    assert settings_for(drone).observer.measurement_age_s == age_s
     assert ("by its gyroscope" in controller_text(drone, "x")) == (delay_s > 0.02)
 
 
@@ -226,7 +226,7 @@ def test_the_true_state_has_a_quick_observer() -> None:
     """Without noise and age, whether the file says it or an option."""
     true = settings_for(GENERIC.with_sensors("true")).observer
     assert (true.position_noise, true.velocity_noise, true.disturbance_noise) == (0.001, 0.02, 3.0)
-    assert true.age_s == 0.0
+    assert true.measurement_age_s == 0.0
     said = VehicleFile.model_validate(GENERIC.model_dump() | {"sensors": {"kind": "true"}})
     assert settings_for(said).observer == true
     assert GENERIC.with_sensors("mocap") == GENERIC
@@ -246,7 +246,7 @@ def test_a_flow_deck_has_a_noise_of_its_own() -> None:
         captured.disturbance_noise,
     )
     assert deck.position_noise > 10 * captured.position_noise
-    assert deck.age_s == 0.01
+    assert deck.measurement_age_s == 0.01
 
 
 @pytest.mark.parametrize("ratio", [1.2, 2.6, 11.0])

@@ -50,7 +50,7 @@ def observer_constants(settings: Sections) -> ObserverConstants:
         disturbance_limit_m_step2=float(Fraction(observer.disturbance_limit_m_s2) * period_s**2),
         velocity_limit_m_step=float(Fraction(settings.ranges.velocity_m_s) * period_s),
         drag_1_step=float(Fraction(settings.model.drag_1_s) * period_s),
-        age_steps=float(Fraction(observer.age_s) / period_s),
+        age_steps=float(Fraction(observer.measurement_age_s) / period_s),
         outage_steps=round(observer.outage_s / update_s),
         steps_per_s=1 / update_s,
         steps2_per_s2=1 / (update_s * update_s),

@@ -106,7 +106,7 @@ def _learn(
     """
     settings, height = controller.settings, controller.settings.height
     assert height is not None
-    period_s, age_s = settings.horizon.update_period_s, settings.observer.age_s
+    period_s, age_s = settings.horizon.update_period_s, settings.observer.measurement_age_s
     delayed_share = 1.0 - math.exp(-period_s / height.delay_s) if height.delay_s else 1.0
     lagged_share = 1.0 - math.exp(-period_s / height.lag_s)
     delayed_m_s2 = thrust_m_s2 = hover_thrust(settings)

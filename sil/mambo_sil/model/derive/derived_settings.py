@@ -225,7 +225,7 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         words = "Learns wind within tenths of a second"
         yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "As with motion capture")
-        yield Derived("observer", "age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
+        yield Derived("observer", "measurement_age_s", UPDATE_PERIOD_S, "A frame of the flow chip")
     elif isinstance(sensors, AutopilotSensors):
         yield from _estimated(sensors)
     elif drone.knows_sensors and isinstance(sensors, TrueState):
@@ -287,7 +287,7 @@ def _age(sensors: MocapSensors) -> Derived:
     if sensors.estimator is not None and age_s > LONGEST_GYROSCOPE_AGE_S:
         most_s = LONGEST_GYROSCOPE_AGE_S
         words += f"; at most {most_s:g}, since the estimator makes up for the rest by its gyroscope"
-    return Derived("observer", "age_s", _round(min(age_s, most_s)), words)
+    return Derived("observer", "measurement_age_s", _round(min(age_s, most_s)), words)
 
 
 def _disturbance_limit(drone: VehicleFile, tilt_rad: float) -> Derived:

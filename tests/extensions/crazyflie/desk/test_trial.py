@@ -24,7 +24,7 @@ def late(delay_s: float) -> VehicleFile:
 
 def aged(age_s: float) -> Settings:
     """Return the settings that `design crazyflie` writes, with another age of the state."""
-    return with_option(settings_for(CRAZYFLIE), "observer.age_s", age_s, "age_s")
+    return with_option(settings_for(CRAZYFLIE), "observer.measurement_age_s", age_s, "age_s")
 
 
 def test_the_settings_of_a_crazyflie_are_calm() -> None:
@@ -48,7 +48,7 @@ def test_late_cameras_are_worth_their_age_up_to_20_ms() -> None:
     """An eight is flown 1.3 times closer than with the age of the default, and calmly."""
     drone = late(0.04)
     settings = settings_for(drone)
-    assert settings.observer.age_s == 0.02
+    assert settings.observer.measurement_age_s == 0.02
     assert fly_trial(settings, drone).good
     assert not fly_trial(settings, late(0.15)).good
     cameras = FLIGHTS["eight"].sensors.model_copy(update={"camera_delay_ms": 40})
@@ -66,7 +66,7 @@ def test_that_age_leaves_half_of_the_gain() -> None:
     limits = settings.limits.model_copy(update={"braking_m_s2": 1.5})
     strong = settings.model_copy(update={"model": model, "limits": limits})
     assert fly_trial(strong, late(0.025)).good
-    older = strong.observer.model_copy(update={"age_s": 0.0225})
+    older = strong.observer.model_copy(update={"measurement_age_s": 0.0225})
     assert not fly_trial(strong.model_copy(update={"observer": older}), late(0.025)).good
 
 
