@@ -98,7 +98,7 @@ def test_settings_come_from_a_file_or_a_preset(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(to_toml(ONE_NORM), "utf-8")
     one_norm = Controller.from_file(tmp_path / "mine.toml")
     assert one_norm.settings == ONE_NORM
-    with pytest.raises(ValueError, match="set_command needs cost"):
+    with pytest.raises(ValueError, match="set_command needs controller"):
         one_norm.set_command((0.0, 0.0))
     with pytest.raises(SourceNotFoundError, match="did you mean crazyflie"):
         Controller.from_preset("crazyfly")

@@ -67,7 +67,7 @@ def test_a_push_is_learnt_up_to_its_limit(scalar: str) -> None:
         here = DroneState(position_m, velocity_m_s, np.zeros((2, 3)))
         controller.step(here, TargetState(position_m, velocity_m_s))
     np.testing.assert_allclose(controller.disturbance_m_s2, [[limit_m_s2, 0.0], [0.0, 0.0]], atol=0.01)
-    with pytest.raises(ArgumentError, match="disturbance_m_s2 needs cost"):
+    with pytest.raises(ArgumentError, match="disturbance_m_s2 needs controller"):
         _ = Controller(ONE_NORM).disturbance_m_s2
 
 
@@ -170,7 +170,7 @@ def test_sensors_without_figures_are_refused_by_name() -> None:
 def test_what_does_not_fit_together_is_refused() -> None:
     """An age with a 1-norm, a height without a drone, x and y where x, y, z are needed."""
     with pytest.raises(
-        ArgumentError, match=r'measurement_age_s = 0\.0 has no use with cost\.norm = "1-norm"'
+        ArgumentError, match=r'measurement_age_s = 0\.0 has no use with controller\.method = "1-norm"'
     ):
         Controller.from_preset("mambo-1norm", measurement_age_s=0.0)
     limits: dict[str, Any] = {"floor_m": 1.0, "ceiling_m": 1.0, "climb_m_s": 1.0, "descent_m_s": 1.0}

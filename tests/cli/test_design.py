@@ -126,7 +126,7 @@ def test_a_file_somebody_worked_on_stays() -> None:
     assert said == "controller.toml: already exists; name another with -o, or overwrite it with --force\n"
     assert Path("controller.toml").read_text("utf-8") == "mine"
     run("design", "generic", "--force")
-    assert load("controller.toml").cost.norm == "quadratic"
+    assert load("controller.toml").controller.method == "quadratic"
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_without_a_compiler_the_file_is_written() -> None:
     """And it says that nothing was flown, of a Crazyflie its app neither."""
     _, said = run("design", "crazyflie-flown")
     assert "neither flown here nor on the desk, nor margins: no C compiler found" in unwrapped(said)
-    assert load("controller.toml").cost.norm == "quadratic"
+    assert load("controller.toml").controller.method == "quadratic"
     _, said = run("design", "generic", "--force")
     assert "neither flown nor margins: no C compiler found" in said
 

@@ -160,7 +160,7 @@ def test_flights_within_the_limits_keep_every_bit(base: str, scalar: str) -> Non
     wide = limited(base, scalar, speed_m_s=20.0, fence={"x_min_m": -900.0, "x_max_m": 900.0})
     ours, theirs = (method_of(settings).reference_controller(20) for settings in (wide, plain))
     target = np.column_stack([rng.normal(0, 5, (20, 2)), np.zeros((20, 2))])
-    aimed = target if plain.cost.norm == "1-norm" else told(target)
+    aimed = target if plain.controller.method == "1-norm" else told(target)
     for _ in range(40):
         state = np.column_stack([target + rng.normal(0, 0.15, (20, 4)), rng.normal(0, 0.1, (20, 3))])
         steps = [one.step(state, aimed, np.full(20, 9.8)) for one in (ours, theirs)]

@@ -37,7 +37,7 @@ CASES = {
     | {"cost.velocity_weight_s": 0.3, "model.roll_delay_s": 0.0, "model.pitch_delay_s": 0.0},
     "no integrator, 50 Hz, ramp": MAMBO_LOOPS
     | {
-        "cost.norm": "quadratic",
+        "controller.method": "quadratic",
         "horizon.update_period_s": 0.02,
         "horizon.ramp_s": 0.6,
         "model.roll_integral_1_s": 0.0,

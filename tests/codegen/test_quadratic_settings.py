@@ -45,9 +45,12 @@ def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
     ] | HEIGHT - ACCELERATION
     guarded = controller_toml.parse(f"{toml(QUADRATIC)}[height]\n[guard]\n", "slow.toml")
     assert {key for key in KEYS if guarded.uses(key)} == paths["quadratic"] | HEIGHT - ACCELERATION | GUARD
-    assert {"horizon.update_period_s", "model.roll_lag_s", "damping.roll_rate_feedback_s", "cost.norm"} <= (
-        paths["1-norm"] & paths["quadratic"]
-    )
+    assert {
+        "horizon.update_period_s",
+        "model.roll_lag_s",
+        "damping.roll_rate_feedback_s",
+        "controller.method",
+    } <= (paths["1-norm"] & paths["quadratic"])
     assert "optimizer" not in {path.split(".")[0] for path in paths["quadratic"]}
     assert "observer" not in {path.split(".")[0] for path in paths["1-norm"]}
 
@@ -63,7 +66,7 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
     for key in others:
         value = other_value(key)
         spelling = spell(value) if key.low is None else value
-        fault = f'{key.path} = {spelling} has no effect with cost.norm = "{norm}"; leave it out'
+        fault = f'{key.path} = {spelling} has no effect with controller.method = "{norm}"; leave it out'
         assert faults_of(toml({**base, key.path: value})) == [f"slow.toml: {fault}"]
         default = Settings().value(key.path)
         settings = controller_toml.parse(toml({**base, key.path: default}), "with the default")
@@ -91,8 +94,8 @@ def test_the_presence_of_a_section_gives_the_height() -> None:
     ("values", "fault"),
     [
         (
-            {"cost.norm": "1-norm", "height.lag_s": 0.05},
-            'cost.norm = "1-norm" must be "quadratic" with [height]',
+            {"controller.method": "1-norm", "height.lag_s": 0.05},
+            'controller.method = "1-norm" must be "quadratic" with [height]',
         ),
         (
             {"limits.fence.ceiling_m": 2.0},
@@ -125,7 +128,7 @@ def test_the_presence_of_a_section_gives_the_height() -> None:
 )
 def test_heights_at_odds_with_other_keys_are_refused(values: Values, fault: str) -> None:
     """Another norm, walls without or across, speeds that cannot be braked, a thrust out of range."""
-    base = QUADRATIC | ({} if values.get("cost.norm") else {"horizon.ramp_s": 0.4})
+    base = QUADRATIC | ({} if values.get("controller.method") else {"horizon.ramp_s": 0.4})
     assert faults_of(toml(base | values)) == [f"slow.toml: {fault}"]
 
 
@@ -140,16 +143,16 @@ def test_keys_without_effect_are_all_named() -> None:
     [
         (
             {"model.roll_lag_s": 0.0},
-            'model.roll_lag_s = 0.0 must be at least 0.001 with cost.norm = "quadratic"',
+            'model.roll_lag_s = 0.0 must be at least 0.001 with controller.method = "quadratic"',
         ),
         (
             {"model.roll_lag_s": 0.05, "damping.roll_rate_feedback_s": 0.05},
-            'model.roll_lag_s = 0.05 must be at least 0.051 with cost.norm = "quadratic" and '
+            'model.roll_lag_s = 0.05 must be at least 0.051 with controller.method = "quadratic" and '
             "damping.roll_rate_feedback_s = 0.05",
         ),
         (
             {"model.pitch_lag_s": 0.1, "damping.pitch_rate_feedback_s": 0.2},
-            'model.pitch_lag_s = 0.1 must be at least 0.201 with cost.norm = "quadratic" and '
+            'model.pitch_lag_s = 0.1 must be at least 0.201 with controller.method = "quadratic" and '
             "damping.pitch_rate_feedback_s = 0.2",
         ),
         (

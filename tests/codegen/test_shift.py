@@ -42,7 +42,7 @@ def fly(settings: Settings, jump: Jump, *, told: bool = True, moves: bool = True
     """
     method, period_s = method_of(settings), settings.horizon.update_period_s
     controller, random = method.reference_controller(), np.random.default_rng(0)
-    age_s = settings.observer.measurement_age_s if settings.cost.norm == "quadratic" else 0.0
+    age_s = settings.observer.measurement_age_s if settings.controller.method == "quadratic" else 0.0
     position, velocity, tilt, commands = START.copy(), np.zeros(3), np.zeros(2), []
     jumped, turn, pivot, offset = False, np.eye(3), START, np.zeros(3)
     for step in range(STEPS):

@@ -19,7 +19,7 @@ from tests.support.quadratic import settings_of, told
 
 LEVEL = settings_of(
     {
-        "cost.norm": "quadratic",
+        "controller.method": "quadratic",
         "model.roll_lag_s": 0.1,
         "model.pitch_lag_s": 0.1,
         "limits.tilt_rad": 0.5,

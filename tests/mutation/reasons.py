@@ -97,8 +97,8 @@ CONDITIONS: Final[dict[str, Callable[[Settings], bool]]] = {
         for way, change in (("up", 1), ("down", -1))
     },
     "has_room_for_thrust": has_room_for_thrust,
-    "is_searched": lambda settings: settings.cost.norm == "1-norm",
-    "is_solved": lambda settings: settings.cost.norm == "quadratic",
+    "is_searched": lambda settings: settings.controller.method == "1-norm",
+    "is_solved": lambda settings: settings.controller.method == "quadratic",
     "is_single_move": lambda settings: settings.horizon.control == 1,
     "is_slow": lambda settings: settings.horizon.update_period_s > 0.33,
 }

@@ -149,7 +149,7 @@ def tune(flights: OptionFlights) -> str:
 
 def _number(flights: OptionFlights) -> str:
     """Return the path of a number that the settings use."""
-    is_quadratic = flights.settings.cost.norm == "quadratic"
+    is_quadratic = flights.settings.controller.method == "quadratic"
     return "cost.response_time_s" if is_quadratic else "cost.tracking_weight"
 
 
@@ -212,7 +212,7 @@ def verify(_flights: OptionFlights) -> str:
 def margins(flights: OptionFlights) -> str:
     """Measure its margins; a 1-norm has none, which the command says."""
     found = command("margins", SETTINGS, "--vehicle", flights.name)
-    assert (found["axes"] is None) == (flights.settings.cost.norm == "1-norm")
+    assert (found["axes"] is None) == (flights.settings.controller.method == "1-norm")
     assert len(found["axes"] or "xy") == 2 + flights.method.has_height
     return "+"
 

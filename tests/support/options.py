@@ -62,7 +62,7 @@ Base = Values
 PAPER: Final[Base] = {}
 """The paper's controller: a 1-norm."""
 LEVEL: Final[Base] = {
-    "cost.norm": "quadratic",
+    "controller.method": "quadratic",
     "model.roll_lag_s": 0.28,
     "model.pitch_lag_s": 0.154,
     "model.roll_delay_s": 0.045,
@@ -70,7 +70,7 @@ LEVEL: Final[Base] = {
 }
 """A quadratic cost, for the Mambo."""
 SPACE: Final[Base] = {
-    "cost.norm": "quadratic",
+    "controller.method": "quadratic",
     "cost.response_time_s": 0.15,
     "model.roll_lag_s": 0.1347,
     "model.pitch_lag_s": 0.1347,
@@ -129,7 +129,7 @@ _LIMITS: Final[Values] = {
 OPTIONS: Final[dict[str, Option]] = {
     # The first row is in the quick tests.
     "height": Option(SPACE, {"height.lag_s": 0.072}, _SPACE),
-    "1-norm": Option(PAPER, {"cost.norm": "1-norm"}, _PAPER),
+    "1-norm": Option(PAPER, {"controller.method": "1-norm"}, _PAPER),
     "1-norm, tracked": Option(PAPER, {"target.acceleration": "tracked"}, _PAPER),
     "1-norm, limits": Option(PAPER, _LIMITS, _PAPER),
     "1-norm, lags": Option(PAPER, {"model.roll_lag_s": 0.28, "model.pitch_lag_s": 0.154}, _PAPER),
@@ -151,7 +151,7 @@ OPTIONS: Final[dict[str, Option]] = {
     ),
     "1-norm, float64": Option(PAPER, {"code.scalar": "float64"}, _PAPER),
     "1-norm, fixed": Option(PAPER, {"code.scalar": "fixed"}, _PAPER),
-    "quadratic": Option(LEVEL, {"cost.norm": "quadratic"}, _LEVEL),
+    "quadratic": Option(LEVEL, {"controller.method": "quadratic"}, _LEVEL),
     "predicted attitude": Option(LEVEL, {"model.start_attitude": "predicted"}, _LEVEL),
     "learnt gain": Option(LEVEL, {"observer.tilt_gain": "learnt"}, _LEVEL),
     "ramp": Option(LEVEL, {"horizon.ramp_s": 0.4}, _LEVEL),

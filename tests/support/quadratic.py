@@ -27,14 +27,14 @@ MAMBO_LOOPS: Final[Values] = {
     "model.pitch_integral_1_s": 0.5 / 0.65,
 }
 ONE_MOVE: Final[Values] = MAMBO_LOOPS | {
-    "cost.norm": "quadratic",
+    "controller.method": "quadratic",
     "cost.response_time_s": 0.01 ** (1 / 3),
     "damping.roll_rate_feedback_s": 0.05,
     "model.start_attitude": "predicted",
 }
 """One free move, for the Mambo."""
 TWO_MOVES: Final[Values] = {
-    "cost.norm": "quadratic",
+    "controller.method": "quadratic",
     "cost.response_time_s": 0.003 ** (1 / 3),
     "horizon.ramp_s": 0.4,
     "model.roll_lag_s": 0.1347,
@@ -248,7 +248,7 @@ def case_values(index: int) -> Values:
         "model.start_attitude": str(rng.choice(["measured", "predicted"])),
         "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),
         "model.drag_1_s": some(0.01, 5),
-        "cost.norm": "quadratic",
+        "controller.method": "quadratic",
         "cost.response_time_s": float(10.0 ** rng.uniform(-1.5, 0.2)),
         "cost.velocity_weight_s": some(0.01, 2),
         "observer.disturbance_limit_m_s2": float(rng.choice([0.0, 3.0, 20.0])),

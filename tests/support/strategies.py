@@ -20,7 +20,7 @@ Values = dict[str, Any]
 """Settings by their dotted paths."""
 
 LAGS: Values = {"model.roll_lag_s": 0.3, "model.pitch_lag_s": 0.3}
-QUADRATIC: Values = LAGS | {"cost.norm": "quadratic"}
+QUADRATIC: Values = LAGS | {"controller.method": "quadratic"}
 """The fewest values that make a controller with a quadratic cost."""
 
 LEAST_BRAKING_M_S2 = 0.126
@@ -83,7 +83,7 @@ def valid_values(draw: st.DrawFn) -> Values:
         key.path: draw(st.sampled_from(choices_of(key))) for key in CHOICES if key.path not in constrained
     }
     free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
-    drawn = constrained | choices | free | {"cost.norm": "1-norm"}
+    drawn = constrained | choices | free | {"controller.method": "1-norm"}
     return {path: drawn[path] for path in KEYS if Settings().uses(path)}
 
 
@@ -93,7 +93,7 @@ def quadratic_values(draw: st.DrawFn) -> Values:
 
     The ramp alone may make a loop unstable, which is refused: see `quadratic_settings`.
     """
-    values: Values = {"cost.norm": "quadratic"}
+    values: Values = {"controller.method": "quadratic"}
     period_s = draw(numbers("horizon.update_period_s"))
     gains = {angle: draw(numbers(f"model.{angle}_gain")) for angle in ("roll", "pitch")}
     per_tilt, gain = draw(numbers("model.acceleration_per_tilt")), min(gains.values())

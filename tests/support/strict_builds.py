@@ -44,7 +44,7 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     ffi = cffi.FFI()
     ffi.cdef(with_prefix(_DECLARATIONS, prefix))
     opened = ffi.dlopen(str(folder / "bundle.so"))
-    if settings.cost.norm == "quadratic":
+    if settings.controller.method == "quadratic":
         absent = {"_host_set_weights"}
     else:
         absent = {"_host_set_command", "_host_last_disturbance"}

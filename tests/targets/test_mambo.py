@@ -124,7 +124,7 @@ def build(settings: Settings, folder: Path, right: str = "", wrong: str = "") ->
     files = render_target(settings, TARGETS["mambo"], with_digest=False)
     assert not right or files[BLOCK].count(right) == 1, f"the template moved on: {right}"
     place(files | {BLOCK: files[BLOCK].replace(right, wrong) if right else files[BLOCK]}, folder)
-    numbers = (10 if settings.height else 7) if settings.cost.norm == "quadratic" else 4
+    numbers = (10 if settings.height else 7) if settings.controller.method == "quadratic" else 4
     references = f"-DREFERENCE_NUMBERS={numbers}"
     shell(
         *(compiler, *VENDOR_FLAGS, references, f"-I{STUBS}", f"-I{folder}/src"),

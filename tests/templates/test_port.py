@@ -31,7 +31,7 @@ def test_numbers_lie_where_the_table_has_them(name: str, tmp_path: Path) -> None
     settings = with_default_prefix(OPTIONS[name].settings)
     port, claims = method_of(settings).port, list[str]()
     taken = ["state", "target", "command", *["limits"] * ("limits" in port.parts)]
-    taken += ["estimate"] if settings.cost.norm == "quadratic" else ["weights"]
+    taken += ["estimate"] if settings.controller.method == "quadratic" else ["weights"]
     for record in taken:
         numbers = port.numbers(record)
         claims += [
@@ -40,7 +40,7 @@ def test_numbers_lie_where_the_table_has_them(name: str, tmp_path: Path) -> None
         ]
         size = len(numbers) if port.wholes(record) else len(port.reals(record))
         claims.append(f"sizeof(nmpc_{record}_t) == {size}U * sizeof(nmpc_real_t)")
-    if settings.cost.norm == "quadratic":
+    if settings.controller.method == "quadratic":
         places = list(kept_numbers(port, "controller"))
         claims += [
             f"offsetof(nmpc_t, {place}) == {column}U * sizeof(nmpc_real_t)"

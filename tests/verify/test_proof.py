@@ -170,7 +170,7 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     whole = (name, scalar) == ("mambo-1norm", "float32")
     result = check(its) if whole else proven.check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
-    promises = 5 if scalar == "fixed" else 11 if its.settings.cost.norm == "quadratic" else 8
+    promises = 5 if scalar == "fixed" else 11 if its.settings.controller.method == "quadratic" else 8
     assert result.figures["promises"] == result.figures["promises_proven"] == promises
     for proof in method_of(its.settings).proofs if whole else ():
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}

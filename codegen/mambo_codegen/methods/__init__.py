@@ -13,5 +13,5 @@ _METHODS: Final[dict[str, type[Method]]] = {"1-norm": OneNorm, "quadratic": Quad
 
 
 def method_of(settings: Sections) -> Method:
-    """Return the method that `cost.norm` names, with `settings`."""
-    return _METHODS[settings.cost.norm](settings)
+    """Return the method that `controller.method` names, with `settings`."""
+    return _METHODS[settings.controller.method](settings)

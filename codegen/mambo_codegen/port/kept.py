@@ -196,7 +196,7 @@ KEPT: Final[dict[str, Table]] = {
         "controller": ONE_NORM,
     },
 }
-"""What it keeps, by `cost.norm`."""
+"""What it keeps, by `controller.method`."""
 
 WORDS: Final = {
     "observer": "Estimates along x and y, by the observer of nmpc.c.",

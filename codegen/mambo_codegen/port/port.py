@@ -47,20 +47,20 @@ class StepNumber:
 class ControllerPort:
     """What one controller takes, gives and keeps.
 
-    norm:  its `cost.norm`.
-    parts: the parts that it has.
-    sizes: the constants of nmpc.h that are sizes.
-    names: what stands in braces in the words of rows.
+    method: its `controller.method`.
+    parts:  the parts that it has.
+    sizes:  the constants of nmpc.h that are sizes.
+    names:  what stands in braces in the words of rows.
     """
 
-    norm: str
+    method: str
     parts: frozenset[str]
     sizes: Mapping[str, int] = field(hash=False)
     names: Mapping[str, str] = field(hash=False)
 
     @cached_property
     def _table(self) -> Table:
-        table = TAKEN | KEPT[self.norm]
+        table = TAKEN | KEPT[self.method]
         return {name: tuple(row for row in rows if self.has(row)) for name, rows in table.items()}
 
     def has(self, row: PortRow) -> bool:
@@ -148,7 +148,7 @@ class ControllerPort:
             if row.kind in self._table:
                 found.add(row.kind)
                 inside += self.rows(row.kind)
-        return [(name, WORDS.get(name, "")) for name in KEPT[self.norm] if name in found]
+        return [(name, WORDS.get(name, "")) for name in KEPT[self.method] if name in found]
 
     @property
     def macros(self) -> list[tuple[str, str]]:

@@ -86,8 +86,8 @@ class OnlyWith:
     section: str
 
 
-ONE_NORM: Final = OnlyFor("cost.norm", "1-norm")
-QUADRATIC: Final = OnlyFor("cost.norm", "quadratic")
+ONE_NORM: Final = OnlyFor("controller.method", "1-norm")
+QUADRATIC: Final = OnlyFor("controller.method", "quadratic")
 LEARNT_GAIN: Final = OnlyFor("height.learnt", "gain")
 LEARNT_ACCELERATION: Final = OnlyFor("height.learnt", "acceleration")
 WITH_GUARD: Final = OnlyWith("guard")

@@ -35,10 +35,10 @@ class Settings(Sections):
 
     def _misplaced(self) -> list[Refusal]:
         """Refuse a section that needs another method."""
-        if self.cost.norm == "quadratic":
+        if self.controller.method == "quadratic":
             return []
         placed = [name for name in ("height", "guard") if getattr(self, name) is not None]
-        return [Refusal("cost", "norm", f'must be "quadratic" with [{name}]') for name in placed[:1]]
+        return [Refusal("controller", "method", f'must be "quadratic" with [{name}]') for name in placed[:1]]
 
     def _unused(self) -> Iterator[Refusal]:
         """Refuse every value that would have no effect, unless it is the default."""
@@ -54,8 +54,8 @@ class Settings(Sections):
         """The values that the C depends on, by section.
 
         Without those that a method leaves out if they are the defaults: [target], the limits of speed,
-        braking and place, height.thrust_gain, model.tilt, and with a 1-norm cost.norm, model.thrust and
-        [damping].
+        braking and place, height.thrust_gain, model.tilt, and with a 1-norm controller.method,
+        model.thrust and [damping].
         """
         values = self.used_values
         for path in method_of(self).unnamed:

@@ -30,6 +30,16 @@ from mambo_codegen.settings.optimizer_section import Optimizer
 from mambo_codegen.settings.optional_sections import Guard, Height
 
 
+class ControllerSection(SettingsSection):
+    """Which of the two controllers it is."""
+
+    method: Literal["1-norm", "quadratic"] = Field(
+        "1-norm",
+        description='"1-norm" sums absolute values, as the paper does (eq 12), and RPROP searches for a '
+        'small cost; "quadratic" sums squares, and its exact minimum is a matter of a few products.',
+    )
+
+
 class Horizon(SettingsSection):
     """How far the controller predicts, and how often it runs."""
 
@@ -215,12 +225,6 @@ class Target(SettingsSection):
 class Cost(SettingsSection):
     """The cost: distance from the target, and changes of the attitude command."""
 
-    norm: Literal["1-norm", "quadratic"] = Field(
-        "1-norm",
-        description='"1-norm" sums absolute values, as the paper does (eq 12), and RPROP searches for a '
-        'small cost; "quadratic" sums squares, and its exact minimum is a matter of a few products.',
-    )
-
     tracking_weight: Annotated[Number, ONE_NORM] = Field(
         2250.0,
         ge=0.001,
@@ -388,6 +392,9 @@ class Code(SettingsSection):
 class Sections(SettingsSection):
     """All sections; `Settings` adds the rule between them."""
 
+    controller: ControllerSection = Field(
+        ControllerSection(), description="Which of the two controllers it is."
+    )
     horizon: Horizon = Field(Horizon(), description="How far the controller predicts, and how often it runs.")
     model: Model = Field(Model(), description="The prediction model of the drone.")
     target: Target = Field(

@@ -48,7 +48,7 @@ DEFAULT_SEARCH: Final[dict[str, dict[str, dict[str, Any]]]] = {
         },
     },
 }
-"""The default search, by the norm of the base.
+"""The default search, by the method of the base.
 
 With a 1-norm the base has the longest horizons and the most iterations, so no trial takes more computation
 than it, and the tracking weight stays fixed, because only its ratio to the effort weight matters.
@@ -67,7 +67,7 @@ class TuningFlight(FlightSection):
 class TuneFile(FileSection):
     """The keys of tune.toml; a missing key has its value in the default study.
 
-    A missing search is the default one for the norm of the base.
+    A missing search is the default one for the method of the base.
     """
 
     seed: int = Field(1, ge=0, le=2**63 - 1)
@@ -146,7 +146,7 @@ def _tuning(file: TuneFile, folder: Path, source: str, vehicle: str | None) -> T
     """Load drone and base; check that every combination of the ranges' ends is valid and can be simulated."""
     file, drone = load_its_drone(file, folder, source, vehicle)
     base = load_settings(file.base, folder, f"{source}: base")
-    search = DEFAULT_SEARCH[base.cost.norm] if file.search is None else file.search
+    search = DEFAULT_SEARCH[base.controller.method] if file.search is None else file.search
     file = file.model_copy(update={"search": search})
     tuning = Tuning(file, base, _search(search, base, source), drone)
     demand_flyable(base, tuning.flight, tuning.draw_flights()[0], f"{source}: base")

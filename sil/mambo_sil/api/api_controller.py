@@ -76,8 +76,8 @@ class Controller:
         has_thrust = settings.height is not None or self._height is not None
         commands = "roll, pitch and thrust" if has_thrust else "roll and pitch"
         return (
-            f"Controller(settings {settings.short_digest}, {settings.cost.norm} cost: {commands} of {drones} "
-            f"every {settings.horizon.update_period_s:g} s)"
+            f"Controller(settings {settings.short_digest}, {settings.controller.method} cost: {commands} "
+            f"of {drones} every {settings.horizon.update_period_s:g} s)"
         )
 
     @classmethod
@@ -235,10 +235,8 @@ class Controller:
         such function, and for a thrust that has no use.
         """
         if self._method.setter != "set_command":
-            norm = self.settings.cost.norm
-            raise ArgumentError(
-                f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
-            )
+            method = spell(self.settings.controller.method)
+            raise ArgumentError(f'set_command needs controller.method = "quadratic", not {method}')
         if thrust_m_s2 is None and self._method.has_height:
             thrust_m_s2 = self._compiled.last_thrust_m_s2
         return self._compiled.set_command(self._commands(command_rad, thrust_m_s2))
@@ -284,7 +282,7 @@ class Controller:
         Raises ArgumentError for a 1-norm, which learns none.
         """
         if self._method.setter != "set_command":
-            raise ArgumentError('disturbance_m_s2 needs cost.norm = "quadratic"')
+            raise ArgumentError('disturbance_m_s2 needs controller.method = "quadratic"')
         return self._compiled.last_disturbance_m_s2
 
     def set_position_measured(self, is_measured: ArrayLike) -> NDArray[np.int64]:

@@ -195,8 +195,8 @@ def _axis(text: str, settings: "Settings") -> "Axis":
         near = near or difflib.get_close_matches(key, free, n=1, cutoff=0.0)
         raise InvalidSettingsError(
             (
-                f"--vary {echo(text)}: {echo(key)} is not a number that settings with cost.norm = "
-                f'"{settings.cost.norm}" use; did you mean {near[0]}?',
+                f"--vary {echo(text)}: {echo(key)} is not a number that settings with controller.method = "
+                f'"{settings.controller.method}" use; did you mean {near[0]}?',
             )
         )
     try:

@@ -221,10 +221,10 @@ GOOD = "limits.tilt_rad=0.2:0.3:2"
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (vary("limits.tilt=1:2:2"), "limits.tilt is not a number that settings with cost.norm"),
+        (vary("limits.tilt=1:2:2"), "limits.tilt is not a number that settings with controller.method"),
         (vary("limits.tilt=1:2:2"), "did you mean limits.tilt_rad?"),
         (vary("response_time_s=1:2:2"), "did you mean cost.response_time_s?"),
-        (vary("optimizer.iterations=1:2:2"), 'cost.norm = "quadratic" use; did you mean '),
+        (vary("optimizer.iterations=1:2:2"), 'controller.method = "quadratic" use; did you mean '),
         (vary("code.scalar=1:2:2"), "code.scalar is not a number"),
         *(
             (vary(f"limits.tilt_rad={span}"), "must be KEY=FIRST:LAST:COUNT with a COUNT in 1..100, such as")

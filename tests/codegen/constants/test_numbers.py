@@ -125,17 +125,17 @@ def stored(settings: Settings, scalar: str) -> Any:
         time_s, rattle_m_s = 0.01 * step, 0.01 * (step % 2)
         state = [0.4 + 0.3 * time_s, -0.2, 0.3, -0.4, 0.05, -0.03 + 0.1 * time_s, 0.7]
         target = [1.1 + 0.8 * time_s, 0.3, 0.8 + rattle_m_s, 0.2 - 0.3 * time_s + rattle_m_s]
-        target += [0.3, -0.2] * (settings.cost.norm == "quadratic")
+        target += [0.3, -0.2] * (settings.controller.method == "quadratic")
         target += [1.2 + 0.2 * time_s, 0.2 + 0.1 * time_s + rattle_m_s][:heights]
         target += [0.1] * (len(method.target) - len(target))
-        if settings.cost.norm == "quadratic":
+        if settings.controller.method == "quadratic":
             target[-1] = 2.0
         state += [1.0 + 0.15 * time_s, 0.15, 0.0] * (heights > 0)
         given = () if heights else ([9.9],)
         outcome = controller.step([state], [target], *given)
     assert outcome is not None
     assert outcome.status.tolist() == [0]
-    if settings.cost.norm == "quadratic":
+    if settings.controller.method == "quadratic":
         return outcome.stored[0]
     return method.numbers.to_si(controller.stored_limits, *method.limits_stored)[0]
 

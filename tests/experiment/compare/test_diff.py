@@ -75,7 +75,7 @@ def test_the_eight_is_that_of_fly_on_the_vehicle() -> None:
     assert summary["figures_a"]["law"] is summary["figures_a"]["observer"] is None
     values = {one["key"]: (one["a"], one["b"]) for one in summary["differences"]}
     assert values["cost.effort_weight"] == (1.0, None)
-    assert values["cost.norm"] == ("1-norm", "quadratic")
+    assert values["controller.method"] == ("1-norm", "quadratic")
 
 
 @pytest.mark.parametrize("settings", [MAMBO, SLOWER, preset("crazyflie")])

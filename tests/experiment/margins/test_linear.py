@@ -50,7 +50,7 @@ def test_linear_controller_commands_what_the_c_commands(name: str) -> None:
 def test_a_1_norm_is_no_linear_system() -> None:
     """Presets with a 1-norm have none; there are both kinds."""
     found = {name: has_linear_law(preset(name)) for name in names()}
-    assert found == {name: preset(name).cost.norm == "quadratic" for name in names()}
+    assert found == {name: preset(name).controller.method == "quadratic" for name in names()}
     assert {True, False} == set(found.values())
 
 

@@ -131,7 +131,7 @@ def test_log_blocks_fit_the_radio(
     kinds |= {f"nmpc.{name}": kind for kind, name in re.findall(r"^LOG_ADD\((\w+), (\w+), ", text, re.M)}
     for names in radio.LOGGED:
         assert sum(BYTES[kinds[name]] for name in names) <= LOG_BYTES
-    assert ("nmpc.targetKnown" in kinds) == (settings.cost.norm == "quadratic")
+    assert ("nmpc.targetKnown" in kinds) == (settings.controller.method == "quadratic")
     assert kinds.keys() >= {name for names in radio.LOGGED for name in names}
     count = len(radio.LOGGED)
     for rate, period_s in {"2M": 0.01, "1M": 0.01, "250K": 0.02}.items():

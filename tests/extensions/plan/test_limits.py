@@ -116,7 +116,7 @@ def test_uncertain_figures_count_at_their_worse_end() -> None:
     )
     settings = controller_toml.parse(
         "[model]\nroll_gain = 0.894\npitch_gain = 0.894\nroll_lag_s = 0.07\npitch_lag_s = 0.07\n"
-        'roll_delay_s = 0.052\npitch_delay_s = 0.052\n[cost]\nnorm = "quadratic"\n',
+        'roll_delay_s = 0.052\npitch_delay_s = 0.052\n[controller]\nmethod = "quadratic"\n',
         "test",
     )
     sure = figures_of(drone, settings, Vehicle.of(drone))

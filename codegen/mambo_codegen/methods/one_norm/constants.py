@@ -15,7 +15,7 @@ from mambo_codegen.numbers.representation import COMMAND, WEIGHT_LIMIT
 
 
 class OneNormConstants(Constants):
-    """What follows from settings with `cost.norm = "1-norm"`."""
+    """What follows from settings with `controller.method = "1-norm"`."""
 
     @property
     def step_s(self) -> float:

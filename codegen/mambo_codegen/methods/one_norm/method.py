@@ -50,7 +50,7 @@ class OneNorm(OneNormConstants, Method):
     )
     iterates: ClassVar[bool] = True
     unnamed: ClassVar[tuple[str, ...]] = (
-        *("cost.norm", "model.thrust", "damping", "target"),
+        *("controller.method", "model.thrust", "damping", "target"),
         *LATER_LIMITS,
     )
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = FLOAT_PROOFS

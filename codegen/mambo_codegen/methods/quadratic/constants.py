@@ -23,7 +23,7 @@ from mambo_codegen.port.row import NUMBER
 
 
 class QuadraticConstants(Constants):
-    """What follows from settings with `cost.norm = "quadratic"`."""
+    """What follows from settings with `controller.method = "quadratic"`."""
 
     @property
     def step_s(self) -> float:

@@ -130,7 +130,7 @@ class Constants(ABC):
     @cached_property
     def port(self) -> ControllerPort:
         """What the controller takes, gives and keeps."""
-        return ControllerPort(self.settings.cost.norm, self.parts, self.sizes, self.names)
+        return ControllerPort(self.settings.controller.method, self.parts, self.sizes, self.names)
 
     @property
     def state(self) -> tuple[str, ...]:

@@ -165,7 +165,7 @@ def limits_constants(settings: Sections, approach_1_s: float, tilted: TiltAccele
                 **_height_limits(settings),
             }
         ),
-        is_tracked=settings.cost.norm == "quadratic" or settings.target.acceleration == "tracked",
+        is_tracked=settings.controller.method == "quadratic" or settings.target.acceleration == "tracked",
     )
 
 

@@ -27,7 +27,7 @@ def lag_refusals(settings: Sections, *, needs_lag: bool) -> list[Refusal]:
         feedback_s = getattr(settings.damping, f"{angle}_rate_feedback_s")
         shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
         if lag_s < shortest_s and (needs_lag or (lag_s and feedback_s)):
-            reasons = [f'cost.norm = "{settings.cost.norm}"'] if needs_lag else []
+            reasons = [f'controller.method = "{settings.controller.method}"'] if needs_lag else []
             reasons += [f"damping.{angle}_rate_feedback_s = {feedback_s:g}"] if feedback_s else []
             least = f"at least {shortest_s:g}" if needs_lag else f"0 or at least {shortest_s:g}"
             rule = f"must be {least} with {' and '.join(reasons)}"

@@ -86,7 +86,7 @@ DIRT = b"\xa5"
 
 
 class CompiledController:
-    """n controllers in generated C, with the interface of the reference controller of their norm."""
+    """n controllers in generated C, with the interface of the reference controller of their method."""
 
     def __init__(self, settings: Settings, n: int = 1, library: Any = None) -> None:
         self.settings = settings

@@ -106,12 +106,12 @@ def derive(drone: VehicleFile, *, exact_share: float | None = None, firm: bool =
     times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
     tilt = _tilt_limit(drone, exact_share)
     return [
+        Derived("controller", "method", "quadratic", "The exact minimum of the cost, without a search"),
         *_horizon(drone),
         *attitude,
         Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
         Derived("model", "start_attitude", "predicted", "No quick loop through the measured attitude"),
         *([] if exact_share is None else [_exact_tilt(drone)]),
-        Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0, firm=firm),
         *(_firmly(_observer(drone)) if firm else _observer(drone)),
         _disturbance_limit(drone, float(tilt.value)),

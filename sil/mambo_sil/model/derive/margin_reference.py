@@ -13,7 +13,7 @@ def margin_reference(source: str, settings: Settings, drone: VehicleFile) -> Mar
     source: what `settings` are from, a preset or a file. Settings with a 1-norm have none.
     Raises BuildError, CacheError.
     """
-    if source in presets.names() or settings.cost.norm == "1-norm":
+    if source in presets.names() or settings.controller.method == "1-norm":
         return margins_of(settings, drone, f"preset {source}" if source in presets.names() else source)
     derived = controller_toml.parse(chosen_text(drone, drone.name), drone.name)
     return margins_of(derived, drone, f"`design` for {drone.name}")

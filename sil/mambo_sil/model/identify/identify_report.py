@@ -19,10 +19,10 @@ def model_text(summary: IdentifySummary) -> str:
     within = _half_widths(summary)
     lines = [
         *_heading(summary),
-        '# A controller.toml; or copy section [model] into one that has cost.norm = "quadratic".',
+        '# A controller.toml; or copy section [model] into one that has controller.method = "quadratic".',
         "",
-        "[cost]",
-        'norm = "quadratic"',
+        "[controller]",
+        'method = "quadratic"',
         "",
         "[model]",
     ]

@@ -119,7 +119,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     """
     inputs = place_changes(read_inputs(path, columns, settings), settings)
     there = inputs.is_logged
-    is_whole, is_quadratic, own = bool(there.all()), settings.cost.norm == "quadratic", settings
+    is_whole, is_quadratic, own = bool(there.all()), settings.controller.method == "quadratic", settings
     if not is_whole and is_quadratic and settings.code.scalar == "fixed":
         settings = with_option(settings, "code.scalar", "float64")  # slopes are differences of commands
     controller, state = CompiledController(settings), inputs.state

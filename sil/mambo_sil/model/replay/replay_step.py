@@ -41,7 +41,7 @@ def step(
     if inputs.levelled[k]:
         sent = np.zeros((n, 2))
         done = replace(done, command_rad=sent.astype(done.command_rad.dtype))
-    if settings.cost.norm == "quadratic" and (inputs.is_logged[k] or inputs.levelled[k]):
+    if settings.controller.method == "quadratic" and (inputs.is_logged[k] or inputs.levelled[k]):
         lacks_thrust = commands_thrust and sent.shape[1] == 2
         controller.set_command(np.column_stack([sent, done.thrust_m_s2]) if lacks_thrust else sent)
     return done

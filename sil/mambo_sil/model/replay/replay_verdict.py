@@ -98,7 +98,7 @@ class Evidence:
         errors = self.replay.input_errors
         if errors is None or not (errors.resolutions or self.replay.lost):
             return None
-        tells = TELLS if self.replay.settings.cost.norm == "quadratic" else TELLS_ONE_NORM
+        tells = TELLS if self.replay.settings.controller.method == "quadratic" else TELLS_ONE_NORM
         for one in self.axes:
             for trend in one.trends:
                 kind, most = ("gain", tells) if one.is_tilt else ("offset", TELLS_M_S2)
