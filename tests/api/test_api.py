@@ -74,7 +74,7 @@ def test_every_name_is_there() -> None:
 
 
 def test_a_step_has_the_bits_of_the_compiled_controller() -> None:
-    """Through reset and set_command, for each of n drones."""
+    """Through reset and report_command, for each of n drones."""
     ours, other = Controller.from_preset("crazyflie", 2), CompiledController(presets.load("crazyflie"), 2)
     state, target = np.zeros((2, 7)), np.zeros((2, 9))
     target[:, :2] = [1.0, 0.0], [0.3, -0.2]
@@ -84,7 +84,7 @@ def test_a_step_has_the_bits_of_the_compiled_controller() -> None:
             ours.step(LEVEL, AHEAD).command_rad.tobytes()
             == other.step(state, target, thrust).command_rad.tobytes()
         )
-    assert (ours.set_command((0.1, -0.1)) == other.set_command([[0.1, -0.1]] * 2)).all()
+    assert (ours.report_command((0.1, -0.1)) == other.report_command([[0.1, -0.1]] * 2)).all()
     assert (
         ours.step(LEVEL, AHEAD, 9.0).command_rad == other.step(state, target, thrust - 0.81).command_rad
     ).all()
@@ -98,8 +98,8 @@ def test_settings_come_from_a_file_or_a_preset(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(to_toml(ONE_NORM), "utf-8")
     one_norm = Controller.from_file(tmp_path / "mine.toml")
     assert one_norm.settings == ONE_NORM
-    with pytest.raises(ValueError, match="set_command needs controller"):
-        one_norm.set_command((0.0, 0.0))
+    with pytest.raises(ValueError, match="report_command needs controller"):
+        one_norm.report_command((0.0, 0.0))
     with pytest.raises(SourceNotFoundError, match="did you mean crazyflie"):
         Controller.from_preset("crazyfly")
     (tmp_path / "mine.toml").write_text("[horizon]\ncontrol = 11\n", "utf-8")
@@ -248,7 +248,7 @@ def test_wrong_arguments_of_a_step_are_refused_by_name() -> None:
     ):
         controller.step(LEVEL, AHEAD, [9.81, 9.81, 9.81])
     with pytest.raises(ArgumentError, match=r"command_rad: has shape \(1,\); it must be \(2,\) or \(2, 2\)"):
-        controller.set_command([0.1])
+        controller.report_command([0.1])
     with pytest.raises(ArgumentError, match="command_rad = None must be numbers"):
         controller.reset(None)  # type: ignore[arg-type]
 

@@ -25,7 +25,7 @@ STATE, GOAL = DroneState([0, 0, -1], [0, 0, 0], [0, 0, 0]), TargetState([0, 0, -
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str) -> None:
-    """Through reset, set_command and set_thrust; z points down, the height of the C up."""
+    """Through reset, report_command and report_thrust; z points down, the height of the C up."""
     settings = height_settings(scalar)
     ours, theirs = Controller(settings, 2), CompiledController(settings, 2)
     position, velocity, attitude, *aims = RNG.normal(0.0, 0.2, (7, 2, 3))
@@ -41,15 +41,15 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str) -> None:
             assert (found.command_rad == expected.command_rad).all()
             assert (found.thrust_m_s2 == expected.thrust_m_s2).all()
             assert (found.status == 0).all()
-        assert (ours.set_thrust([10.0, np.nan]) == theirs.set_thrust([10.0, np.nan])).all()
+        assert (ours.report_thrust([10.0, np.nan]) == theirs.report_thrust([10.0, np.nan])).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
         for thrusts in ([10.0, expected.thrust_m_s2[1]], [10.5, 9.0]):  # reported, commanded, reported
-            assert (ours.set_command((0.05, -0.1)) == 0).all()
-            theirs.set_command(np.column_stack([[[0.05, -0.1]] * 2, thrusts]))
+            assert (ours.report_command((0.05, -0.1)) == 0).all()
+            theirs.report_command(np.column_stack([[[0.05, -0.1]] * 2, thrusts]))
             assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
-            ours.set_thrust([10.5, 9.0])
-            theirs.set_thrust([10.5, 9.0])
-        assert (ours.set_command((0.1, 0.0), 11.0) == theirs.set_command([[0.1, 0.0, 11.0]] * 2)).all()
+            ours.report_thrust([10.5, 9.0])
+            theirs.report_thrust([10.5, 9.0])
+        assert (ours.report_command((0.1, 0.0), 11.0) == theirs.report_command([[0.1, 0.0, 11.0]] * 2)).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
         assert (ours.shift([0.1, 0.2, -0.3], [0.01, 0.0, 0.02], [0.1, np.nan]) == [0, 8]).all()
         theirs.shift([[0.1, 0.2, 0.3, 0.01, 0.0, -0.02, yaw_rad] for yaw_rad in (0.1, np.nan)])
@@ -116,7 +116,7 @@ def test_limits_of_the_height_are_arguments(tmp_path: Path) -> None:
         (lambda it: it.shift([0.1, 0.2, 0.3, 0.4]), r"position_change_m: has shape \(4,\); it must be"),
         (lambda it: it.shift([0.1, 0.2, 0.3], 0.1), r"velocity_change_m_s: has shape \(\)"),
         (lambda it: it.shift([0, 0, 0], None, [0, 1]), r"heading_change_rad: has shape \(2,\); it must be"),
-        (lambda it: it.set_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
+        (lambda it: it.report_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
         (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "grounded = 1 must be a truth value"),
         (lambda _: DroneState(REST, REST, REST, [True] * 3), r"grounded = .* or such of shape \(2,\)"),
     ],
@@ -131,8 +131,8 @@ def test_wrong_arguments_are_refused(call: Any, message: str) -> None:
 def test_what_needs_a_height_says_so() -> None:
     """And a known acceleration has three components."""
     level = Controller.from_preset("crazyflie")
-    with pytest.raises(ArgumentError, match=r"set_thrust needs settings with \[height\]"):
-        level.set_thrust(9.81)
+    with pytest.raises(ArgumentError, match=r"report_thrust needs settings with \[height\]"):
+        level.report_thrust(9.81)
     with pytest.raises(
         ArgumentError, match=r"thrust_m_s2 = 9\.0 must be left out: the settings have no \[hei"
     ):

@@ -51,7 +51,7 @@ def test_a_command_is_saturated_exactly_if_it_lies_at_the_limit(scalar: str) -> 
     found = step(used, 0.18, east(50.0))
     assert found.command_rad[0, 0] == pytest.approx(LIMIT_RAD - 0.1, rel=1e-3)
     assert not found.saturated[0]
-    used.set_command([[LIMIT_RAD, 0.0]])
+    used.report_command([[LIMIT_RAD, 0.0]])
     assert used.saturated[0]
     used.reset([[0.0, -LIMIT_RAD]])
     assert used.saturated[0]
@@ -96,14 +96,14 @@ def test_a_held_command_stays_in_the_axes_of_the_body() -> None:
 
 @pytest.mark.parametrize("scalar", ["float32", "float64", "fixed"])
 def test_the_command_of_the_step_may_be_set(scalar: str) -> None:
-    """`set_command` of what the step returned changes no bit, with rate feedback and at the tilt limit."""
+    """`report_command` of what the step returned changes no bit, with rate feedback and at the tilt limit."""
     used, other = controller(scalar), controller(scalar)
     rng = np.random.default_rng(3)
     for _ in range(50):
         roll_rad, target = rng.uniform(-0.1, 0.1), told(rng.uniform(-1.0, 1.0, (1, 4)))
         command_rad = step(used, roll_rad, target).command_rad
         assert step(other, roll_rad, target).command_rad.tolist() == command_rad.tolist()
-        assert used.set_command(command_rad)[0] == Status.OK
+        assert used.report_command(command_rad)[0] == Status.OK
         for field in fields(used.memory.attitude):
             numbers = (getattr(each.memory.attitude, field.name).tolist() for each in (used, other))
             assert next(numbers) == next(numbers)
@@ -115,6 +115,6 @@ def test_another_command_changes_the_model_by_the_difference() -> None:
     step(used, 0.0, east(0.2))
     command_rad = step(used, 0.02, east(0.2)).command_rad
     before = used.memory.attitude.command
-    used.set_command(command_rad - [[0.05, 0.02]])
+    used.report_command(command_rad - [[0.05, 0.02]])
     changed = used.memory.attitude.command - before
     assert changed[0] == pytest.approx(np.array([-0.05, 0.02]) * 9.81e-4)

@@ -198,13 +198,13 @@ def test_a_command_of_others_moves_the_model() -> None:
     used, undisturbed = (QuadraticController(Quadratic(settings)) for _ in range(2))
     for controller in (used, undisturbed):
         controller.step([[0.0] * 7], told([[0.0] * 4]), [HOVER])
-    assert used.set_command([[0.2, 0.1]])[0] == Status.OK
+    assert used.report_command([[0.2, 0.1]])[0] == Status.OK
     held = used.step([[np.nan] * 7], told([[np.nan] * 4]), [HOVER])
     assert np.array_equal(held.command_rad, [[0.2, 0.1]])
     assert not np.array_equal(
         held.stored, undisturbed.step([[np.nan] * 7], told([[np.nan] * 4]), [HOVER]).stored
     )
-    assert used.set_command([[np.nan, 0.1]])[0] == Status.BAD_COMMAND
+    assert used.report_command([[np.nan, 0.1]])[0] == Status.BAD_COMMAND
 
 
 @pytest.mark.long

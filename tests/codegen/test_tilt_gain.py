@@ -157,7 +157,7 @@ def test_a_command_that_was_sent_means_more_to_the_model_of_a_drone_that_tilts_m
     moved = []
     for gain in (1.0, 1.4):
         found = controller(LEVEL, gain)
-        found.set_command(sent)
+        found.report_command(sent)
         moved.append(found.memory.attitude.command)
     assert moved[1] == pytest.approx(1.4 * moved[0])
 

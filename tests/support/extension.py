@@ -85,7 +85,7 @@ typedef struct {
     nmpc_real_t position_m[2], velocity_m_s[2], disturbance_m_s2[2];
     int is_valid;
 } nmpc_estimate_t;
-nmpc_status_t nmpc_set_command(nmpc_t *, const nmpc_command_t *);
+nmpc_status_t nmpc_report_command(nmpc_t *, const nmpc_command_t *);
 int nmpc_is_saturated(const nmpc_t *);
 nmpc_status_t nmpc_last_estimate(const nmpc_t *, nmpc_estimate_t *);
 void observer_clear(nmpc_observer_t *);

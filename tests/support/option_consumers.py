@@ -51,7 +51,7 @@ def api(flights: OptionFlights, folder: Path) -> str:
     controller = Controller.from_file(written(flights, folder))
     for update in flights.updates:
         if flights.method.has_height and not np.isnan(update.thrust_m_s2).any():
-            controller.set_thrust(update.thrust_m_s2)
+            controller.report_thrust(update.thrust_m_s2)
         thrust = () if flights.method.has_height else (update.thrust_m_s2,)
         done = controller.step(*_records(update), *thrust)
         numbers = [*done.command_rad[0], *(() if done.thrust_m_s2 is None else done.thrust_m_s2)]

@@ -185,10 +185,10 @@ class OptionFlights:
         shift = (0.2, -0.1, 0.3, 0.1, 0.2, -0.1, 0.4) if has_height else (0.2, -0.1, 0.1, 0.2, 0.4)
         command = (0.1, -0.05, 9.0) if has_height else (0.1, -0.05)
         found: dict[int, list[tuple[str, Any]]] = {5: [("shift", shift)], 40: [("reset", command)]}
-        if self.method.setter == "set_command":
-            found[10] = [("set_command", command)]
+        if self.method.setter == "report_command":
+            found[10] = [("report_command", command)]
         if has_height:
-            found[15] = [("set_thrust", 8.0)]
+            found[15] = [("report_thrust", 8.0)]
         if self._other():
             found[SET_AT] = [self._other()]
         if self.settings.guard:

@@ -22,7 +22,7 @@ CONSUMERS: Final = (
     "fly",  # the C in the engine
     "wrapped",  # faults, held and late commands, limits or weights set in flight: in the engine, and in NumPy
     "campaign",
-    "told",  # reset, shift, set_command, set_thrust, set_limits, set_weights, set_position_measured
+    "told",  # all that is told between steps: reset, shift, report_command, set_limits, ...
     "api",  # Controller, from a file
     "height",  # Controller with an altitude loop
     "replay",

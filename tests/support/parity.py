@@ -111,9 +111,9 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
             if takes_weights:
                 found.setters.append(controller.set_weights(_weights(rng, len(command))))
         elif index % 7 == 5 and not takes_weights:
-            found.setters.append(controller.set_command(command))
+            found.setters.append(controller.report_command(command))
         if method.has_height and index % 11 == 10:
-            found.setters.append(controller.set_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
+            found.setters.append(controller.report_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
         if index % 17 == 4:
             found.setters.append(controller.shift(random_shifts(controller.settings, len(command), rng)))
         if index % 13 == 6 and method.guard is not None:

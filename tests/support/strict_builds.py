@@ -47,12 +47,12 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     if settings.controller.method == "quadratic":
         absent = {"_host_set_weights"}
     else:
-        absent = {"_host_set_command", "_host_last_disturbance"}
+        absent = {"_host_report_command", "_host_last_disturbance"}
     if method_of(settings).limiting is None:
         absent |= {"_host_set_limits"}
     if settings.guard is None:
         absent |= {"_host_set_position_measured"}
     if settings.height is None:
-        absent |= {"_host_set_thrust", "_host_last_thrust"}
+        absent |= {"_host_report_thrust", "_host_last_thrust"}
     names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name not in absent]
     return SimpleNamespace(**{f"nmpc{name}": getattr(opened, f"{prefix}{name}") for name in names})

@@ -191,7 +191,7 @@ def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
             if not begun:
                 begun = update == 120
                 reported_m_s2 = stock_n / mass_kg
-                alone.reset([[*present, reported_m_s2]]) if begun else alone.set_thrust([reported_m_s2])
+                alone.reset([[*present, reported_m_s2]]) if begun else alone.report_thrust([reported_m_s2])
             told = np.zeros(13)
             told[[0, 1, 2, 3, 6, 7]] = target[:6]
             expected = alone.step(state[np.newaxis], told[np.newaxis])

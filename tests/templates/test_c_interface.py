@@ -327,7 +327,7 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
 
     for step in range(steps):
         if step % 40 == 39:
-            used.set_command(rng.uniform(-3.25, 3.25, (n, 2)))
+            used.report_command(rng.uniform(-3.25, 3.25, (n, 2)))
         outcome = used.step(numbers(state), numbers(target), np.full(n, 9.81))
         assert np.all(np.abs(outcome.command_rad) <= tilt)
         assert np.all(np.isfinite(outcome.stored))

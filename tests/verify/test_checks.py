@@ -126,7 +126,7 @@ QUADRATIC_FAULTS: Final[dict[str, tuple[Check, Harm]]] = {
         FEW_RUNS,
         Harm(
             CONTROLLER,
-            r"(?s)(nmpc_set_command\(.*?)    if \(!is_good_command\(command\)\) \{\n",
+            r"(?s)(nmpc_report_command\(.*?)    if \(!is_good_command\(command\)\) \{\n",
             r"\1    if (0) {\n",
         ),
     ),

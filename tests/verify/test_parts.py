@@ -53,7 +53,7 @@ FAULTS = {
             "nmpc.c", r"(?s)NMPC_SHARED nmpc_real_t height_tilt.*?\{\n", r"\g<0>    roll_rad = pitch_rad;\n"
         ),
         "a refused thrust is set": Harm(
-            "nmpc.c", r"(?s)(nmpc_set_thrust\(.*?)        return NMPC_BAD_THRUST;\n", r"\1"
+            "nmpc.c", r"(?s)(nmpc_report_thrust\(.*?)        return NMPC_BAD_THRUST;\n", r"\1"
         ),
         "level without a controller is no thrust": Harm(
             "nmpc.c", r"command->thrust_m_s2 = NMPC_HOVER_M_S2;", "command->thrust_m_s2 = (nmpc_real_t)0;"

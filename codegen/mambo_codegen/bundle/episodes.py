@@ -102,7 +102,7 @@ def lost_inputs(method: Method) -> tuple[int, int]:
 
 def null_calls(method: Method) -> int:
     """Return how many calls with a null pointer the C makes."""
-    own = 3 if method.setter == "set_command" else 1
+    own = 3 if method.setter == "report_command" else 1
     return 9 + own + method.has_limits + method.has_height + (method.guard is not None)
 
 
@@ -276,7 +276,7 @@ class Episodes:
         if method.limiting is not None:
             calls |= dict.fromkeys((0, 8), ("set_limits", self._limits))
         if method.has_height:
-            calls |= dict.fromkeys((3, 11), ("set_thrust", lambda: self._command()[:, 2:]))
+            calls |= dict.fromkeys((3, 11), ("report_thrust", lambda: self._command()[:, 2:]))
         if method.guard is not None:
             measured = "set_position_measured", lambda: (self._draws.next() & 1)[:, None]
             calls |= dict.fromkeys((4, 12), measured)

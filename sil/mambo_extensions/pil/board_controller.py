@@ -67,7 +67,7 @@ class BoardInputs:
         if controller.settings.height is None:
             step: Step = controller.step(self.state, self.target, self.thrust_m_s2)
         else:
-            controller.set_thrust(self.thrust_m_s2)
+            controller.report_thrust(self.thrust_m_s2)
             step = controller.step(self.state, self.target)
         return step
 
@@ -78,7 +78,7 @@ class ReportedThrust:
     def __init__(self) -> None:
         self._reported: ArrayLike = np.array([np.nan])
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> None:
         """Tell which thrust over mass (1,) the drone got in place of the last command."""
         self._reported = thrust_m_s2
 

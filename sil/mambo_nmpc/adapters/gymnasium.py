@@ -142,7 +142,7 @@ class _Flights:
                 "NWU", np.column_stack([scaled, height_m]), np.column_stack([zeros, climb_m_s])
             )
             if has_height := self._controller.settings.height is not None:
-                self._controller.set_thrust(self._drones.report_thrust())
+                self._controller.report_thrust(self._drones.report_thrust())
             known_m_s2 = None if has_height else self._drones.thrust_m_s2
             outcome = self._controller.step(self._drones.state, target, known_m_s2)
             command_rad = outcome.command_rad

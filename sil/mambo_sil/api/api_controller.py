@@ -227,29 +227,31 @@ class Controller:
         self._heading.reset(chosen)
         return np.where(chosen, status, 0)
 
-    def set_command(self, command_rad: ArrayLike, thrust_m_s2: ArrayLike | None = None) -> NDArray[np.int64]:
+    def report_command(
+        self, command_rad: ArrayLike, thrust_m_s2: ArrayLike | None = None
+    ) -> NDArray[np.int64]:
         """Tell that `command_rad`, one pair for all or (..., 2), was sent in place of the last commands.
 
         With `[height]` in the settings `thrust_m_s2`, one value for all or (...), was sent beside it; without
         it the thrust is what it was. Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no
         such function, and for a thrust that has no use.
         """
-        if self._method.setter != "set_command":
+        if self._method.setter != "report_command":
             method = spell(self.settings.controller.method)
-            raise ArgumentError(f'set_command needs controller.method = "quadratic", not {method}')
+            raise ArgumentError(f'report_command needs controller.method = "quadratic", not {method}')
         if thrust_m_s2 is None and self._method.has_height:
             thrust_m_s2 = self._compiled.last_thrust_m_s2
-        return self._compiled.set_command(self._commands(command_rad, thrust_m_s2))
+        return self._compiled.report_command(self._commands(command_rad, thrust_m_s2))
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
         """Tell that the drones got another thrust over mass than the last step commanded, as a mixer caps it.
 
         One value for all or (...); NaN for a drone that got its command. Returns a status (n,), not 0 with
         NaN or out of range. Raises ArgumentError without `[height]` in the settings.
         """
         if not self._method.has_height:
-            raise ArgumentError("set_thrust needs settings with [height]")
-        return self._compiled.set_thrust(self._one_each("thrust_m_s2", thrust_m_s2))
+            raise ArgumentError("report_thrust needs settings with [height]")
+        return self._compiled.report_thrust(self._one_each("thrust_m_s2", thrust_m_s2))
 
     def shift(
         self,
@@ -281,7 +283,7 @@ class Controller:
         It ends at `observer.disturbance_limit_m_s2` on each axis: a stronger push moves the drone away.
         Raises ArgumentError for a 1-norm, which learns none.
         """
-        if self._method.setter != "set_command":
+        if self._method.setter != "report_command":
             raise ArgumentError('disturbance_m_s2 needs controller.method = "quadratic"')
         return self._compiled.last_disturbance_m_s2
 

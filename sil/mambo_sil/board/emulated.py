@@ -21,7 +21,7 @@ from mambo_sil.flight.controllers.compiled import DIRT, as_array, as_arrays, emp
 from mambo_sil.flight.controllers.controller_library import batch_source, with_default_prefix
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
-"""Functions of the emulated program that Python calls; with a height nmpc_batch_set_thrust, too."""
+"""Functions of the emulated program that Python calls; with a height nmpc_batch_report_thrust, too."""
 
 _MAX_WORK: Final = 2_000
 """Most prediction steps x moves x iterations in one call, so that it ends within its time limit."""
@@ -36,7 +36,7 @@ _MAX_PADDING: Final = 16
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
     """Build the program for an emulated core: the bundle of `settings` and a loop over n controllers."""
     files = render(with_default_prefix(settings), with_digest=False)
-    functions = GUEST if settings.height is None else (*GUEST, "nmpc_batch_set_thrust")
+    functions = GUEST if settings.height is None else (*GUEST, "nmpc_batch_report_thrust")
     return builder.guest(files, batch_source(), functions, folder)
 
 
@@ -108,12 +108,12 @@ class EmulatedController:
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
         return self._method.make_step(outcome)
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> None:
         """Tell that the drones got thrusts over mass (n,), with a height; one that is NaN changes nothing."""
         numbers = as_array(self._numbers, np.asarray(thrust_m_s2)[:, np.newaxis], THRUST, (self._n, 1))
         for batch in self._batches():
             self.machine.write(self._inputs[2], numbers[batch].tobytes())
-            self._run_batch(batch, "nmpc_batch_set_thrust", self._inputs[2])
+            self._run_batch(batch, "nmpc_batch_report_thrust", self._inputs[2])
 
     def save(self) -> bytes:
         """Return the instances as they are now."""

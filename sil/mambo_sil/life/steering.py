@@ -123,7 +123,7 @@ class Steering:
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
             self._step(_between(last, estimate, 1.0 - left / steps), self._goal(targets(left * period_s)))
-            self.controller.set_command(self._sent_rad, self._sent_m_s2)
+            self.controller.report_command(self._sent_rad, self._sent_m_s2)
         target = self._goal(targets(0.0))
         outcome = self._step(estimate, target)
         set_point = self._send(estimate, target, outcome, steps * period_s)
@@ -181,7 +181,7 @@ class Steering:
         share = more * thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
         thrust = min(max(share, LEAST_THRUST), MOST_THRUST)
         if thrust != share:
-            self.controller.set_thrust(thrust / more / self.hover_thrust * self.hover_m_s2)
+            self.controller.report_thrust(thrust / more / self.hover_thrust * self.hover_m_s2)
         self._sent_rad, self._sent_m_s2 = command_rad, thrust_m_s2
         self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
         self.is_accepted = int(outcome.status) == 0

@@ -177,7 +177,7 @@ class _Runs:
             ApiFunction.RESET: controller.reset,
             ApiFunction.SET_WEIGHTS: getattr(controller, method.setter),
             ApiFunction.SET_LIMITS: controller.set_limits,
-            ApiFunction.SET_THRUST: lambda values: controller.set_thrust(values[:, 0]),
+            ApiFunction.SET_THRUST: lambda values: controller.report_thrust(values[:, 0]),
             ApiFunction.SET_MEASURED: lambda values: controller.set_position_measured(values[:, 0] > 0),
             ApiFunction.SHIFT: controller.shift,
             ApiFunction.STEP: step,

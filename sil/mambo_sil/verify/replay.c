@@ -296,8 +296,8 @@ static int takes_the_ends(nmpc_t *self)
     other = state;
     other.height_m = 2.0f * position_m;
     is_good = is_good && (nmpc_float_step(self, &other, &target, &command) == NMPC_BAD_STATE)
-              && (nmpc_float_set_thrust(self, thrust_m_s2) == NMPC_OK)
-              && (nmpc_float_set_thrust(self, NAN) == NMPC_BAD_THRUST);
+              && (nmpc_float_report_thrust(self, thrust_m_s2) == NMPC_OK)
+              && (nmpc_float_report_thrust(self, NAN) == NMPC_BAD_THRUST);
 #endif
     return is_good;
 }
@@ -313,8 +313,8 @@ static int sets_alike(nmpc_t *self, nmpc_t *other)
     flown.pitch_rad = -0.125f;
     flown_numbers.roll_rad = NMPC_ANGLE(0.0625);
     flown_numbers.pitch_rad = NMPC_ANGLE(-0.125);
-    return (nmpc_float_set_command(self, NULL) == NMPC_NULL_POINTER)
-           && (nmpc_float_set_command(self, &flown) == nmpc_set_command(other, &flown_numbers));
+    return (nmpc_float_report_command(self, NULL) == NMPC_NULL_POINTER)
+           && (nmpc_float_report_command(self, &flown) == nmpc_report_command(other, &flown_numbers));
 }
 
 /* The estimate in floats is that in numbers, divided by powers of two. */
@@ -477,7 +477,7 @@ static int passes_floats(nmpc_t *self)
     }
     for (i = 0; i < 4; i++) {
 #ifdef NMPC_FUZZ_SET_THRUST
-        is_good = is_good && (nmpc_float_set_thrust(self, unheld[i]) == NMPC_BAD_THRUST);
+        is_good = is_good && (nmpc_float_report_thrust(self, unheld[i]) == NMPC_BAD_THRUST);
 #else
         is_good = is_good
                   && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found),

@@ -79,7 +79,7 @@ def test_a_command_that_is_set_is_cut_off_at_the_tilt_limit(scalar: str, height:
     angles = np.array([[3.2, -0.1], [0.1, -3.2], [3.3, 0.0], [0.0, 3.3]])
     commands = np.column_stack([angles, np.full(4, 12.0)]) if height else angles
     refused = [Status.OK, Status.OK, Status.BAD_COMMAND, Status.BAD_COMMAND]
-    assert controller.set_command(commands).tolist() == refused
+    assert controller.report_command(commands).tolist() == refused
     limit_rad = settings.limits.tilt_rad
     expected = np.array([[limit_rad, -0.1], [0.1, -limit_rad], [0.0, 0.0], [0.0, 0.0]])
     numbers = method_of(settings).numbers

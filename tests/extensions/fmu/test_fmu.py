@@ -257,7 +257,7 @@ def test_the_heading_turns_from_the_measured_one(version: str, unpacked: Callabl
 def test_the_delivered_thrust_is_reported_once_in_a_communication_step(
     version: str, unpacked: Callable[[str, str], Path]
 ) -> None:
-    """As by nmpc_set_thrust before its first period; 0 means as commanded, out of range changes nothing."""
+    """As by nmpc_report_thrust before its first period; 0 is as commanded, out of range changes nothing."""
     settings = SUBJECTS["height"]
     unit = Unit(unpacked("height", version), version, settings)
     alone, untold = CompiledController(settings), CompiledController(settings)
@@ -271,7 +271,7 @@ def test_the_delivered_thrust_is_reported_once_in_a_communication_step(
         unit.write(thrust_delivered=thrust_m_s2)
         unit.advance(periods * period_s)
         if thrust_m_s2:
-            alone.set_thrust([thrust_m_s2])
+            alone.report_thrust([thrust_m_s2])
         for _ in range(periods):
             commanded = alone.step(state, target).thrust_m_s2.tolist()
             otherwise = untold.step(state, target).thrust_m_s2.tolist()

@@ -120,7 +120,7 @@ def test_the_thrust_that_a_mixer_made_of_a_command_is_sent(scalar: str, tmp_path
                 state, target = draw.normal(0.0, 0.3, (1, 10)), draw.normal(0.0, 0.3, (1, 13))
                 state[0, 9], target[0, 12] = step % 2, step % 3
                 if reported and step == 10:
-                    controller.set_thrust([4.0])
+                    controller.report_thrust([4.0])
                 controller.step(state, target)
         assert (len(controller.replies), controller.different) == (20, [])
         replies.append([reply.bits for reply in controller.replies])

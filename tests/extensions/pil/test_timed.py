@@ -73,7 +73,7 @@ class Expected:
         self._held = BoardStep(np.zeros((1, 2)), np.array([NOT_CALLED]), hover)
         self._reported: ArrayLike = [np.nan]
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> None:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> None:
         """Keep it for the next step, with a height."""
         self._reported = thrust_m_s2
 
@@ -92,7 +92,7 @@ class Expected:
         if self.settings.height is None:
             step = self._compiled.step(measured, aim, thrust)
         else:
-            self._compiled.set_thrust(thrust)
+            self._compiled.report_thrust(thrust)
             step = self._compiled.step(measured, aim)
         if before in self.lost:
             return self._held

@@ -65,16 +65,16 @@ class QuadraticController:
         self.memory = choose(good, self.parts.restarted(given, memory.limits, memory.height_bounds), memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
-    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+    def report_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Tell the controllers that `command_rad` (n, 2) or (n, 3) was sent in place of the last command.
 
         Returns a status (n,) as `reset` does.
         """
         given, good = self._command(command_rad)
-        self.memory = choose(good, self.parts.set_command(self.memory, given), self.memory)
+        self.memory = choose(good, self.parts.report_command(self.memory, given), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
         """Tell the controllers that the drones got thrusts over mass (n,) in place of those commanded.
 
         Returns a status (n,); a thrust that is not finite, or out of range, changes nothing.

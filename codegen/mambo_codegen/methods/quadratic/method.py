@@ -62,7 +62,7 @@ class Quadratic(QuadraticConstants, Method):
         "heading": "set-points of a yaw loop",
         "float": "the same functions with floats",
     }
-    setter: ClassVar[str] = "set_command"
+    setter: ClassVar[str] = "report_command"
     digested: ClassVar[tuple[str, ...]] = ("missed", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = (

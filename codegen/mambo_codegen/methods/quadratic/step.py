@@ -185,7 +185,7 @@ class ControlStep:
             tilt_gain=unknown_gain(zeros, self.products.numbers.constant(1.0, "factor")),
         )
 
-    def set_command(self, memory: QuadraticMemory, command: Real) -> QuadraticMemory:
+    def report_command(self, memory: QuadraticMemory, command: Real) -> QuadraticMemory:
         """Return the memory after commands (n, 2), with a height (n, 3), were sent in place of the last."""
         height = self.height.set_command(memory.height, command[:, 2:])
         weight = self.height.command_weight(height)

@@ -128,9 +128,9 @@ class CountingController:
         self._model = CycleModel(image, core, flash) if modelled else None
         self.steps: list[CountedStep] = []
 
-    def set_thrust(self, thrust_m_s2: FloatArray) -> None:
+    def report_thrust(self, thrust_m_s2: FloatArray) -> None:
         """Tell a controller of the height what the drone got; it is not part of a step."""
-        self._emulated.set_thrust(thrust_m_s2)
+        self._emulated.report_thrust(thrust_m_s2)
 
     def step(self, state: FloatArray, target: FloatArray, thrust: FloatArray | None = None) -> OneNormStep:
         """Step once with state (1, k), target (1, m) and, without a height, thrust over mass (1,)."""

@@ -149,12 +149,12 @@ void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const
     }
 }
 
-void nmpc_batch_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2)
+void nmpc_batch_report_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2)
 {
     int i;
 
     for (i = 0; i < n; i++) {
-        (void)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
+        (void)nmpc_report_thrust(&controllers[i], thrust_m_s2[i]);
     }
 }
 #else

@@ -129,9 +129,9 @@ class CompiledController:
         """Set tracking and effort weight to `weights` (n, 2), of a 1-norm; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_set_weights, weights, WEIGHTS)
 
-    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+    def report_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Tell that `command_rad` (n, 2) or (n, 3) was sent, with a quadratic cost; returns a status (n,)."""
-        return self._set_each(self._library.nmpc_host_set_command, command_rad, self._method.command)
+        return self._set_each(self._library.nmpc_host_report_command, command_rad, self._method.command)
 
     def shift(self, change: ArrayLike) -> NDArray[np.int64]:
         """Tell that the frames have jumped by `change` (n, 5), with a height (n, 7); returns a status (n,).
@@ -140,13 +140,13 @@ class CompiledController:
         """
         return self._set_each(self._library.nmpc_host_shift, change, self._method.shift)
 
-    def set_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
+    def report_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
         """Tell that the drones got thrusts over mass (n,); returns a status (n,).
 
         Raises ValueError without a height in the settings.
         """
         self._demand_height()
-        return self._set_each(self._library.nmpc_host_set_thrust, np.asarray(thrust_m_s2)[:, None], THRUST)
+        return self._set_each(self._library.nmpc_host_report_thrust, np.asarray(thrust_m_s2)[:, None], THRUST)
 
     @property
     def last_thrust_m_s2(self) -> NDArray[np.float64]:

@@ -26,9 +26,9 @@ DECLARATIONS: Final = """
     unsigned long nmpc_batch_instance_bytes(void);
     void nmpc_host_reset(void *controllers, int n, const void *command, int *status);
     void nmpc_host_set_weights(void *controllers, int n, const void *weights, int *status);
-    void nmpc_host_set_command(void *controllers, int n, const void *command, int *status);
+    void nmpc_host_report_command(void *controllers, int n, const void *command, int *status);
     void nmpc_host_shift(void *controllers, int n, const void *change, int *status);
-    void nmpc_host_set_thrust(void *controllers, int n, const void *thrust, int *status);
+    void nmpc_host_report_thrust(void *controllers, int n, const void *thrust, int *status);
     void nmpc_host_last_thrust(const void *controllers, int n, void *thrust);
     void nmpc_host_last_disturbance(const void *controllers, int n, void *disturbance);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
@@ -41,9 +41,9 @@ DECLARATIONS: Final = """
 """
 """The functions that Python calls in a library: the glue, and one step of the self-test.
 
-nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command and nmpc_host_last_disturbance with a
+nmpc_host_set_weights is there with a 1-norm, nmpc_host_report_command and nmpc_host_last_disturbance with a
 quadratic cost,
-nmpc_host_set_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits with limits,
+nmpc_host_report_thrust and nmpc_host_last_thrust with a height, nmpc_host_set_limits with limits,
 nmpc_host_set_position_measured with a guard. `ffi` is made from them.
 """
 

@@ -33,12 +33,12 @@ void nmpc_host_reset(nmpc_t *controllers, int n, const nmpc_command_t *command, 
 }
 
 #ifdef NMPC_STORED_NUMBERS
-void nmpc_host_set_command(nmpc_t *controllers, int n, const nmpc_command_t *command, int *status)
+void nmpc_host_report_command(nmpc_t *controllers, int n, const nmpc_command_t *command, int *status)
 {
     int i;
 
     for (i = 0; i < n; i++) {
-        status[i] = (int)nmpc_set_command(&controllers[i], &command[i]);
+        status[i] = (int)nmpc_report_command(&controllers[i], &command[i]);
     }
 }
 #else
@@ -65,12 +65,12 @@ void nmpc_host_shift(nmpc_t *controllers, int n, const nmpc_real_t *change, int 
 }
 
 #ifdef NMPC_HAS_HEIGHT
-void nmpc_host_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2, int *status)
+void nmpc_host_report_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2, int *status)
 {
     int i;
 
     for (i = 0; i < n; i++) {
-        status[i] = (int)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
+        status[i] = (int)nmpc_report_thrust(&controllers[i], thrust_m_s2[i]);
     }
 }
 
@@ -187,7 +187,7 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     TARGET_WHOLES(WANT_WHOLE)
 #ifdef NMPC_HAS_HEIGHT
     if (thrust_acceleration_m_s2 == thrust_acceleration_m_s2) {
-        (void)nmpc_set_thrust((nmpc_t *)self, NUMBER(thrust_acceleration_m_s2, THRUST));
+        (void)nmpc_report_thrust((nmpc_t *)self, NUMBER(thrust_acceleration_m_s2, THRUST));
     }
     status = nmpc_step((nmpc_t *)self, &measured, &wanted, &given);
 #else

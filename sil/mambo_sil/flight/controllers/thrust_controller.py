@@ -77,7 +77,7 @@ class ThrustController(LoopController):
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Any:
         """Tell the controllers the thrusts that are no NaN, and return the next commands."""
         if not np.isnan(thrust_acceleration_m_s2).all():
-            self.controller.set_thrust(thrust_acceleration_m_s2)
+            self.controller.report_thrust(thrust_acceleration_m_s2)
         return self.controller.step(*self._own(state, target))
 
 

@@ -43,7 +43,7 @@ def step(
         done = replace(done, command_rad=sent.astype(done.command_rad.dtype))
     if settings.controller.method == "quadratic" and (inputs.is_logged[k] or inputs.levelled[k]):
         lacks_thrust = commands_thrust and sent.shape[1] == 2
-        controller.set_command(np.column_stack([sent, done.thrust_m_s2]) if lacks_thrust else sent)
+        controller.report_command(np.column_stack([sent, done.thrust_m_s2]) if lacks_thrust else sent)
     return done
 
 

@@ -81,7 +81,7 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
 }
 
 #if WITH_QUADRATIC
-nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command)
+nmpc_status_t nmpc_float_report_command(nmpc_t *self, const nmpc_float_command_t *command)
 {
     nmpc_command_t fixed_command;
 
@@ -90,13 +90,13 @@ nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *c
     }
 
     quantize_command(command, &fixed_command);
-    return nmpc_set_command(self, &fixed_command);
+    return nmpc_report_command(self, &fixed_command);
 }
 #if WITH_HEIGHT
 
-nmpc_status_t nmpc_float_set_thrust(nmpc_t *self, float thrust_m_s2)
+nmpc_status_t nmpc_float_report_thrust(nmpc_t *self, float thrust_m_s2)
 {
-    return nmpc_set_thrust(self, quantize(thrust_m_s2, NMPC_THRUST_SCALE));
+    return nmpc_report_thrust(self, quantize(thrust_m_s2, NMPC_THRUST_SCALE));
 }
 #endif
 

@@ -76,7 +76,7 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
     return NMPC_OK;
 }
 
-nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
+nmpc_status_t nmpc_report_command(nmpc_t *self, const nmpc_command_t *command)
 {
     nmpc_real_t given_rad[2];
 
@@ -102,7 +102,7 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
 }
 
 #if WITH_HEIGHT
-nmpc_status_t nmpc_set_thrust(nmpc_t *self, nmpc_real_t thrust_m_s2)
+nmpc_status_t nmpc_report_thrust(nmpc_t *self, nmpc_real_t thrust_m_s2)
 {
     if (self == NULL) {
         return NMPC_NULL_POINTER;
