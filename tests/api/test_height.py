@@ -51,8 +51,8 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str) -> None:
             theirs.report_thrust([10.5, 9.0])
         assert (ours.report_command((0.1, 0.0), 11.0) == theirs.report_command([[0.1, 0.0, 11.0]] * 2)).all()
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
-        assert (ours.shift([0.1, 0.2, -0.3], [0.01, 0.0, 0.02], [0.1, np.nan]) == [0, 8]).all()
-        theirs.shift([[0.1, 0.2, 0.3, 0.01, 0.0, -0.02, yaw_rad] for yaw_rad in (0.1, np.nan)])
+        assert (ours.frame_jumped([0.1, 0.2, -0.3], [0.01, 0.0, 0.02], [0.1, np.nan]) == [0, 8]).all()
+        theirs.frame_jumped([[0.1, 0.2, 0.3, 0.01, 0.0, -0.02, yaw_rad] for yaw_rad in (0.1, np.nan)])
         assert ours.__getstate__()["instances"] == theirs.instances.tobytes()
         assert (ours.reset((0.1, 0.0), thrust_m_s2=[9.0, 8.0]) == 0).all()
         theirs.reset([[0.1, 0.0, 9.0], [0.1, 0.0, 8.0]])
@@ -63,7 +63,7 @@ def test_the_heading_that_is_held_turns_with_the_frame() -> None:
     """A drone that keeps the heading of its first step keeps it in the body, too, when the frame turns."""
     ours = Controller(height_settings())
     assert ours.step(STATE, GOAL).yaw_rad == 0.0
-    assert ours.shift([0.0, 0.0, 0.0], heading_change_rad=0.5) == 0
+    assert ours.frame_jumped([0.0, 0.0, 0.0], heading_change_rad=0.5) == 0
     turned = DroneState([0, 0, -1], [0, 0, 0], [0, 0, 0.5])
     assert ours.step(turned, GOAL).yaw_rad == 0.5
 
@@ -112,10 +112,16 @@ def test_limits_of_the_height_are_arguments(tmp_path: Path) -> None:
         (lambda it: it.step(DroneState([0, 0], [0, 0], [0, 0, 0]), GOAL), "state: position_m has no z"),
         (lambda it: it.step(STATE, TargetState([0, 0, 0], [0, 0])), "target: velocity_m_s has no z"),
         (lambda it: it.step(STATE, GOAL, 9.81), r"thrust_acceleration_m_s2 = 9\.81 must be left out"),
-        (lambda it: it.shift([0.1, 0.2]), r"position_change_m: has no z"),
-        (lambda it: it.shift([0.1, 0.2, 0.3, 0.4]), r"position_change_m: has shape \(4,\); it must be"),
-        (lambda it: it.shift([0.1, 0.2, 0.3], 0.1), r"velocity_change_m_s: has shape \(\)"),
-        (lambda it: it.shift([0, 0, 0], None, [0, 1]), r"heading_change_rad: has shape \(2,\); it must be"),
+        (lambda it: it.frame_jumped([0.1, 0.2]), r"position_change_m: has no z"),
+        (
+            lambda it: it.frame_jumped([0.1, 0.2, 0.3, 0.4]),
+            r"position_change_m: has shape \(4,\); it must be",
+        ),
+        (lambda it: it.frame_jumped([0.1, 0.2, 0.3], 0.1), r"velocity_change_m_s: has shape \(\)"),
+        (
+            lambda it: it.frame_jumped([0, 0, 0], None, [0, 1]),
+            r"heading_change_rad: has shape \(2,\); it must be",
+        ),
         (lambda it: it.report_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
         (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "grounded = 1 must be a truth value"),
         (lambda _: DroneState(REST, REST, REST, [True] * 3), r"grounded = .* or such of shape \(2,\)"),

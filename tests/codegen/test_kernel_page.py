@@ -199,7 +199,7 @@ class Flight:
         """Let the frames jump, half of them without a turn."""
         change = self.rng.normal(0, 0.3, (DRONES, 2 * self.axes + 1))
         change[:, -1] = np.where(self.rng.random(DRONES) < 0.5, 3 * change[:, -1], 0.0)
-        assert (self.controller.shift(change) == 0).all()
+        assert (self.controller.frame_jumped(change) == 0).all()
         for pages, one in zip(self.pages, change, strict=True):
             for page, velocity in zip(pages, one[self.axes : -1], strict=True):
                 page.shift(float(velocity))

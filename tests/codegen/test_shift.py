@@ -59,7 +59,7 @@ def fly(settings: Settings, jump: Jump, *, told: bool = True, moves: bool = True
             offset = jump.velocity_m_s - (turn - np.eye(3)) @ velocity
             axes = 3 if method.has_height else 2
             change = [*jump.position_m[:axes], *jump.velocity_m_s[:axes], jump.heading_rad]
-            assert not told or controller.shift([change])[0] == Status.OK
+            assert not told or controller.frame_jumped([change])[0] == Status.OK
         if jumped:
             since_s = (step - JUMPS_AT) * period_s
             for vectors, later_s in ((measured, since_s), (target, since_s + age_s)):
@@ -173,15 +173,15 @@ def test_a_jump_that_is_no_jump_changes_no_number(name: str, scalar: str) -> Non
     for _ in range(5):
         _step(controller, method, state, [0.01, 0.02, 0.3], [rng.normal(0, 0.1, 3) for _ in range(3)])
     before = _numbers(controller)
-    assert controller.shift([np.zeros(columns)])[0] == Status.OK
+    assert controller.frame_jumped([np.zeros(columns)])[0] == Status.OK
     assert _numbers(controller) == before
     for column in range(columns):
         for bad in (np.nan, np.inf, -np.inf, 1.01 * most[column], -1.01 * most[column]):
             change = np.full(columns, 0.1)
             change[column] = bad
-            assert controller.shift([change])[0] == Status.BAD_SHIFT
+            assert controller.frame_jumped([change])[0] == Status.BAD_JUMP
             assert _numbers(controller) == before
-    assert controller.shift([most])[0] == Status.OK
+    assert controller.frame_jumped([most])[0] == Status.OK
 
 
 def _numbers(controller: Any) -> list[bytes]:

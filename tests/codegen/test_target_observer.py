@@ -233,7 +233,9 @@ def test_a_jump_of_the_frame_moves_the_fit_and_a_turn_turns_it() -> None:
         own_error = seen.motion.velocity_m_s[0] - velocity if step < 150 else np.zeros(2)
         assert controller.memory.target.velocity_m_s[0] - told == pytest.approx(own_error, abs=1e-6)
         if step in (99, 149):
-            assert controller.shift([[0, 0, *(change * (step == 99)), 0.7 * (step == 149)]]) == [Status.OK]
+            assert controller.frame_jumped([[0, 0, *(change * (step == 99)), 0.7 * (step == 149)]]) == [
+                Status.OK
+            ]
         found, own, turned = controller.memory.target, seen.motion, turn if step > 148 else np.eye(2)
         assert (fit_of(found) / units)[1:] == pytest.approx((fit_of(own) @ turned.T / units)[1:], abs=1e-4)
         fed, fed_own = (np.stack([x.acceleration_m_step2, x.jerk_m_step2_update]) for x in (found, own))

@@ -181,7 +181,7 @@ def test_on_the_floor_and_without_a_state_nothing_is_learnt() -> None:
     after = found.memory.tilt_gain
     assert after.gain.tolist() == gain.tolist()
     assert after.seen_quick_m_step2.tolist() == after.seen_slow_m_step2.tolist()
-    found.shift(np.array([[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5]]))
+    found.frame_jumped(np.array([[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.5]]))
     assert _numbers(found.memory.tilt_gain) == _numbers(after)
     found.reset(np.array([[0.0, 0.0, 9.81]]))
     assert found.memory.tilt_gain.gain.tolist() == [[1.0, 1.0]]

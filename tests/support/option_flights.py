@@ -184,7 +184,7 @@ class OptionFlights:
         has_height = self.method.has_height
         shift = (0.2, -0.1, 0.3, 0.1, 0.2, -0.1, 0.4) if has_height else (0.2, -0.1, 0.1, 0.2, 0.4)
         command = (0.1, -0.05, 9.0) if has_height else (0.1, -0.05)
-        found: dict[int, list[tuple[str, Any]]] = {5: [("shift", shift)], 40: [("reset", command)]}
+        found: dict[int, list[tuple[str, Any]]] = {5: [("frame_jumped", shift)], 40: [("reset", command)]}
         if self.method.setter == "report_command":
             found[10] = [("report_command", command)]
         if has_height:

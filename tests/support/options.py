@@ -22,7 +22,7 @@ CONSUMERS: Final = (
     "fly",  # the C in the engine
     "wrapped",  # faults, held and late commands, limits or weights set in flight: in the engine, and in NumPy
     "campaign",
-    "told",  # all that is told between steps: reset, shift, report_command, set_limits, ...
+    "told",  # all that is told between steps: reset, frame_jumped, report_command, set_limits, ...
     "api",  # Controller, from a file
     "height",  # Controller with an altitude loop
     "replay",

@@ -115,7 +115,9 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
         if method.has_height and index % 11 == 10:
             found.setters.append(controller.report_thrust(rng.choice([np.nan, 1e9, 3.0, 9.0], len(command))))
         if index % 17 == 4:
-            found.setters.append(controller.shift(random_shifts(controller.settings, len(command), rng)))
+            found.setters.append(
+                controller.frame_jumped(random_shifts(controller.settings, len(command), rng))
+            )
         if index % 13 == 6 and method.guard is not None:
             found.setters.append(controller.set_position_measured(rng.random(len(command)) < 0.5))
         if index % 9 == 8 and method.limiting is not None:

@@ -269,8 +269,8 @@ class Episodes:
         method = self._method
         setter = method.setter, self._weights if method.weight_limits else self._command
         calls: dict[int, tuple[str, Callable[[], Real]]] = {
-            1: ("shift", lambda: self._shift(turns=False)),
-            9: ("shift", lambda: self._shift(turns=True)),
+            1: ("frame_jumped", lambda: self._shift(turns=False)),
+            9: ("frame_jumped", lambda: self._shift(turns=True)),
             5: ("reset", self._command),
         } | dict.fromkeys((2, 10), setter)
         if method.limiting is not None:

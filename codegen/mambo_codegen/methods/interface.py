@@ -55,7 +55,7 @@ class ReferenceController(Protocol):
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Forget the past, and hold `command_rad` (n, 2), with [height] (n, 3): the thrust over mass too."""
 
-    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+    def frame_jumped(self, change: ArrayLike) -> NDArray[np.int64]:
         """Move what is known with jumps of the frame (n, 5): x, y (m), vx, vy (m/s), heading (rad).
 
         With [height] (n, 7): x, y, height, vx, vy, climb, heading.

@@ -59,9 +59,9 @@ STANDARD_NAMES = frozenset(
 """Prefixes that would hide a C library header (stdio.h) or redefine one of its or POSIX's types (pid_t)."""
 
 _OWN = """
-    attitude axis call change_m climb_m displacement_m fold height innovation_m limits mean_m measured_m
-    observer predictor run tiny tracker velocity_m
+    attitude call change_m climb_m displacement_m fold height innovation_m limits mean_m measured_m
+    predictor run tiny velocity_m
 """
 OWN_NAMES = frozenset(_OWN.split())
 """With one of these the name of a public function is that of another function or a variable of the C, as
-`observer_shift` is."""
+`limits_init` is."""

@@ -253,7 +253,7 @@ class Controller:
             raise ArgumentError("report_thrust needs settings with [height]")
         return self._compiled.report_thrust(self._one_each("thrust_m_s2", thrust_m_s2))
 
-    def shift(
+    def frame_jumped(
         self,
         position_change_m: ArrayLike,
         velocity_change_m_s: ArrayLike | None = None,
@@ -272,7 +272,7 @@ class Controller:
         if velocity_change_m_s is not None:
             velocity = self._changes("velocity_change_m_s", velocity_change_m_s)
         heading = self._one_each("heading_change_rad", heading_change_rad)
-        status = self._compiled.shift(np.column_stack([position, velocity, heading]))
+        status = self._compiled.frame_jumped(np.column_stack([position, velocity, heading]))
         self._heading.shift(np.where(status == 0, heading, 0.0))
         return status
 

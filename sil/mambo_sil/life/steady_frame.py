@@ -1,8 +1,8 @@
 """What a flight does when the estimator of the autopilot moves its frame by a jump.
 
 An estimator that learns that it was wrong moves position, velocity or heading at once; the drone has not
-moved. So the controller is told of the jump (`nmpc_shift`), and the target moves with the frame, by an offset
-that begins as the jump and then fades,
+moved. So the controller is told of the jump (`nmpc_frame_jumped`), and the target moves with the frame, by an
+offset that begins as the jump and then fades,
 
     offset''' = -3 w offset'' - 3 w^2 offset' - w^3 offset,
 

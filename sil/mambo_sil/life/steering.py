@@ -135,7 +135,7 @@ class Steering:
         jump = self.frame.follow(estimate)
         if jump is None:
             return
-        self.controller.shift(jump.position_m, jump.velocity_m_s, jump.heading_rad)
+        self.controller.frame_jumped(jump.position_m, jump.velocity_m_s, jump.heading_rad)
         self.lean.turn(jump.heading_rad)
         self._jump = jump if self._jump is None else _sum(self._jump, jump)
         if self._last is not None:

@@ -179,7 +179,7 @@ class _Runs:
             ApiFunction.SET_LIMITS: controller.set_limits,
             ApiFunction.SET_THRUST: lambda values: controller.report_thrust(values[:, 0]),
             ApiFunction.SET_MEASURED: lambda values: controller.set_position_measured(values[:, 0] > 0),
-            ApiFunction.SHIFT: controller.shift,
+            ApiFunction.SHIFT: controller.frame_jumped,
             ApiFunction.STEP: step,
         }
         status = np.zeros(len(now), np.int64)

@@ -367,19 +367,19 @@ static int shifts_alike(nmpc_t *self, nmpc_t *other, int sixteenths)
     const float heading_rad = 0.0625f * (float)sixteenths;
     const nmpc_real_t position[3] = { NMPC_POSITION(0.5), NMPC_POSITION(-0.25), NMPC_POSITION(0.125) };
     const nmpc_real_t velocity[3] = { NMPC_VELOCITY(0.0078125), NMPC_VELOCITY(-0.015625), NMPC_VELOCITY(0.25) };
-    int is_good = (nmpc_float_shift(self, NULL, velocity_m_s, heading_rad) == NMPC_NULL_POINTER)
-                  && (nmpc_float_shift(self, position_m, NULL, heading_rad) == NMPC_NULL_POINTER);
+    int is_good = (nmpc_float_frame_jumped(self, NULL, velocity_m_s, heading_rad) == NMPC_NULL_POINTER)
+                  && (nmpc_float_frame_jumped(self, position_m, NULL, heading_rad) == NMPC_NULL_POINTER);
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         float far[3] = { 0.0f, 0.0f, 0.0f };
 
         far[axis] = 1e9f;
-        is_good = is_good && (nmpc_float_shift(self, far, velocity_m_s, heading_rad) == NMPC_BAD_SHIFT)
-                  && (nmpc_float_shift(self, position_m, far, heading_rad) == NMPC_BAD_SHIFT);
+        is_good = is_good && (nmpc_float_frame_jumped(self, far, velocity_m_s, heading_rad) == NMPC_BAD_JUMP)
+                  && (nmpc_float_frame_jumped(self, position_m, far, heading_rad) == NMPC_BAD_JUMP);
     }
-    return is_good && (nmpc_float_shift(self, position_m, velocity_m_s, heading_rad) == NMPC_OK)
-           && (nmpc_shift(other, position, velocity, NMPC_YAW(0.0625) * sixteenths) == NMPC_OK);
+    return is_good && (nmpc_float_frame_jumped(self, position_m, velocity_m_s, heading_rad) == NMPC_OK)
+           && (nmpc_frame_jumped(other, position, velocity, NMPC_YAW(0.0625) * sixteenths) == NMPC_OK);
 }
 
 /* A heading in floats is that in numbers. */

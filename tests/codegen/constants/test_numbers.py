@@ -98,8 +98,8 @@ def test_a_jump_of_the_frame_is_taken_up_to_the_ranges(scalar: str, height: bool
     largest = np.diag([REACH_M] * axes + [FAST_M_S] * axes + [TURN_RAD])
     method: Any = method_of(settings_with(scalar, height=height))
     controller = method.reference_controller(len(largest))
-    for factor, status in ((0.999, Status.OK), (1.001, Status.BAD_SHIFT)):
-        assert controller.shift(factor * largest).tolist() == [status] * len(largest)
+    for factor, status in ((0.999, Status.OK), (1.001, Status.BAD_JUMP)):
+        assert controller.frame_jumped(factor * largest).tolist() == [status] * len(largest)
 
 
 LIMITED = {"limits.speed_m_s": 1.5, "limits.fence.x_min_m": -1.0, "limits.fence.x_max_m": 2.0}

@@ -127,7 +127,7 @@ class OneNormController:
         self.memory = choose(good, self._held(clamp(given, self._tilt_limit())), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
-    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+    def frame_jumped(self, change: ArrayLike) -> NDArray[np.int64]:
         """Tell the controllers that their frames have jumped: `change` (n, 5).
 
         The columns are changes of x and y (m), of the velocities (m/s), and of the heading (rad). Returns a
@@ -141,7 +141,7 @@ class OneNormController:
             motion = choose(jump.heading_rad != 0, turned, motion)
         limits = self._limits.shift(memory.limits, jump.velocity_m_s)
         self.memory = choose(good, replace(memory, target=motion, limits=limits), memory)
-        return np.where(good, Status.OK, Status.BAD_SHIFT)
+        return np.where(good, Status.OK, Status.BAD_JUMP)
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t.

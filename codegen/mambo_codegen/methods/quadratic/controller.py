@@ -115,7 +115,7 @@ class QuadraticController:
         self.memory = replace(memory, target=target, height=height)
         return np.full(len(found), Status.OK)
 
-    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+    def frame_jumped(self, change: ArrayLike) -> NDArray[np.int64]:
         """Tell the controllers that their frames have jumped: `change` (n, 5), with a height (n, 7).
 
         The columns are changes of x and y (m), with a height of the height, up, too, as many of the
@@ -124,7 +124,7 @@ class QuadraticController:
         """
         jump, good = self._inputs.shift(change)
         self.memory = choose(good, self.parts.shift(self.memory, jump), self.memory)
-        return np.where(good, Status.OK, Status.BAD_SHIFT)
+        return np.where(good, Status.OK, Status.BAD_JUMP)
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; k is 7, or 11 with a height.

@@ -149,7 +149,7 @@ class Constants(ABC):
 
     @property
     def shift(self) -> tuple[str, ...]:
-        """The quantity of each number that nmpc_shift reads, in their order."""
+        """The quantity of each number that nmpc_frame_jumped reads, in their order."""
         return self.port.shift
 
     @cached_property

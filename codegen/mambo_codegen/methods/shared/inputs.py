@@ -31,7 +31,7 @@ class Status(IntEnum):
     BAD_WEIGHT = 5
     BAD_COMMAND = 6
     BAD_LIMITS = 7
-    BAD_SHIFT = 8
+    BAD_JUMP = 8
 
 
 @dataclass(frozen=True)

@@ -133,12 +133,12 @@ class CompiledController:
         """Tell that `command_rad` (n, 2) or (n, 3) was sent, with a quadratic cost; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_report_command, command_rad, self._method.command)
 
-    def shift(self, change: ArrayLike) -> NDArray[np.int64]:
+    def frame_jumped(self, change: ArrayLike) -> NDArray[np.int64]:
         """Tell that the frames have jumped by `change` (n, 5), with a height (n, 7); returns a status (n,).
 
-        The columns are those of `ReferenceController.shift`.
+        The columns are those of `ReferenceController.frame_jumped`.
         """
-        return self._set_each(self._library.nmpc_host_shift, change, self._method.shift)
+        return self._set_each(self._library.nmpc_host_frame_jumped, change, self._method.shift)
 
     def report_thrust(self, thrust_m_s2: ArrayLike) -> NDArray[np.int64]:
         """Tell that the drones got thrusts over mass (n,); returns a status (n,).

@@ -27,7 +27,7 @@ DECLARATIONS: Final = """
     void nmpc_host_reset(void *controllers, int n, const void *command, int *status);
     void nmpc_host_set_weights(void *controllers, int n, const void *weights, int *status);
     void nmpc_host_report_command(void *controllers, int n, const void *command, int *status);
-    void nmpc_host_shift(void *controllers, int n, const void *change, int *status);
+    void nmpc_host_frame_jumped(void *controllers, int n, const void *change, int *status);
     void nmpc_host_report_thrust(void *controllers, int n, const void *thrust, int *status);
     void nmpc_host_last_thrust(const void *controllers, int n, void *thrust);
     void nmpc_host_last_disturbance(const void *controllers, int n, void *disturbance);

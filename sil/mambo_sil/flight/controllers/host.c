@@ -53,14 +53,14 @@ void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *wei
 #endif
 
 /* Changes of the position, of the velocity and of the heading, one after the other. */
-void nmpc_host_shift(nmpc_t *controllers, int n, const nmpc_real_t *change, int *status)
+void nmpc_host_frame_jumped(nmpc_t *controllers, int n, const nmpc_real_t *change, int *status)
 {
     int i;
 
     for (i = 0; i < n; i++) {
         const nmpc_real_t *const one = &change[i * ((2 * AXES) + 1)];
 
-        status[i] = (int)nmpc_shift(&controllers[i], one, &one[AXES], one[2 * AXES]);
+        status[i] = (int)nmpc_frame_jumped(&controllers[i], one, &one[AXES], one[2 * AXES]);
     }
 }
 

@@ -93,7 +93,7 @@ class LoggedInputs:
     start_m_s2: FloatArray
     """Thrust over mass (k,) at which it does."""
     shift: FloatArray
-    """Jumps of the frame before each update (k, 7), as `ReferenceController.shift` takes them."""
+    """Jumps of the frame before each update (k, 7), as `ReferenceController.frame_jumped` takes them."""
     levelled: NDArray[np.bool_]
     """Whether its caller flew level instead (k,)."""
     begins: NDArray[np.bool_]

@@ -32,11 +32,11 @@ def step(
     commands_thrust = settings.height is not None
     if inputs.jump[k].any():
         change = inputs.jump[k] * _UPWARDS if commands_thrust else inputs.jump[k][_LEVEL]
-        controller.shift(np.repeat(change[np.newaxis], n, axis=0))
+        controller.frame_jumped(np.repeat(change[np.newaxis], n, axis=0))
     target, sent = others or (np.repeat(one[k : k + 1], n, axis=0) for one in (inputs.target, inputs.command))
     target = np.column_stack([target, np.repeat(inputs.known[k : k + 1], n, axis=0)])
     if inputs.shift[k].any():
-        controller.shift(np.repeat(inputs.shift[k : k + 1], n, axis=0))
+        controller.frame_jumped(np.repeat(inputs.shift[k : k + 1], n, axis=0))
     done = controller.step(states, target, None if commands_thrust else np.repeat(inputs.thrust_m_s2[k], n))
     if inputs.levelled[k]:
         sent = np.zeros((n, 2))

@@ -157,14 +157,14 @@ nmpc_status_t nmpc_float_set_limits(nmpc_t *self, const nmpc_float_limits_t *lim
 #endif
 
 #if WITH_HEIGHT
-nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[3], const float velocity_change_m_s[3],
-                               float heading_change_rad)
+nmpc_status_t nmpc_float_frame_jumped(nmpc_t *self, const float position_change_m[3],
+                                      const float velocity_change_m_s[3], float heading_change_rad)
 #elif WITH_SHIFT
-nmpc_status_t nmpc_float_shift(nmpc_t *self, const float position_change_m[2], const float velocity_change_m_s[2],
-                               float heading_change_rad)
+nmpc_status_t nmpc_float_frame_jumped(nmpc_t *self, const float position_change_m[2],
+                                      const float velocity_change_m_s[2], float heading_change_rad)
 #else
-nmpc_status_t nmpc_float_shift(const nmpc_t *self, const float position_change_m[2], const float velocity_change_m_s[2],
-                               float heading_change_rad)
+nmpc_status_t nmpc_float_frame_jumped(const nmpc_t *self, const float position_change_m[2],
+                                      const float velocity_change_m_s[2], float heading_change_rad)
 #endif
 {
     nmpc_real_t fixed_position_m[NMPC_AXES];
@@ -179,7 +179,7 @@ nmpc_status_t nmpc_float_shift(const nmpc_t *self, const float position_change_m
         fixed_position_m[axis] = quantize(position_change_m[axis], NMPC_POSITION_SCALE);
         fixed_velocity_m_s[axis] = quantize(velocity_change_m_s[axis], NMPC_VELOCITY_SCALE);
     }
-    return nmpc_shift(self, fixed_position_m, fixed_velocity_m_s, quantize(heading_change_rad, NMPC_YAW_SCALE));
+    return nmpc_frame_jumped(self, fixed_position_m, fixed_velocity_m_s, quantize(heading_change_rad, NMPC_YAW_SCALE));
 }
 
 float nmpc_float_slew_heading(float previous_rad, float wanted_rad, float most_change_rad)

@@ -192,11 +192,11 @@ int nmpc_is_saturated(const nmpc_t *self)
 }
 
 #if WITH_SHIFT
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], const nmpc_real_t velocity_change_m_s[2],
-                         nmpc_real_t heading_change_rad)
+nmpc_status_t nmpc_frame_jumped(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                                const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
 #else
-nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m[2],
-                         const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
+nmpc_status_t nmpc_frame_jumped(const nmpc_t *self, const nmpc_real_t position_change_m[2],
+                                const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
 #endif
 {
     if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {
@@ -204,7 +204,7 @@ nmpc_status_t nmpc_shift(const nmpc_t *self, const nmpc_real_t position_change_m
     }
     if ((is_good_point(position_change_m, velocity_change_m_s) == 0)
         || (within(heading_change_rad, NMPC_YAW_RANGE_RAD) == 0)) {
-        return NMPC_BAD_SHIFT;
+        return NMPC_BAD_JUMP;
     }
 
 #if WITH_TRACKER

@@ -255,11 +255,11 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
 }
 
 #if WITH_HEIGHT
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[3], const nmpc_real_t velocity_change_m_s[3],
-                         nmpc_real_t heading_change_rad)
+nmpc_status_t nmpc_frame_jumped(nmpc_t *self, const nmpc_real_t position_change_m[3],
+                                const nmpc_real_t velocity_change_m_s[3], nmpc_real_t heading_change_rad)
 #else
-nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], const nmpc_real_t velocity_change_m_s[2],
-                         nmpc_real_t heading_change_rad)
+nmpc_status_t nmpc_frame_jumped(nmpc_t *self, const nmpc_real_t position_change_m[2],
+                                const nmpc_real_t velocity_change_m_s[2], nmpc_real_t heading_change_rad)
 #endif
 {
     if ((self == NULL) || (position_change_m == NULL) || (velocity_change_m_s == NULL)) {
@@ -271,7 +271,7 @@ nmpc_status_t nmpc_shift(nmpc_t *self, const nmpc_real_t position_change_m[2], c
         || (within(velocity_change_m_s[2], NMPC_VELOCITY_RANGE_M_S) == 0)
 #endif
         || (within(heading_change_rad, NMPC_YAW_RANGE_RAD) == 0)) {
-        return NMPC_BAD_SHIFT;
+        return NMPC_BAD_JUMP;
     }
 
     observer_shift(&self->observer, position_change_m, velocity_change_m_s);
