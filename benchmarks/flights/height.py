@@ -97,7 +97,7 @@ class AppTakeOff:
         height_m, climb_m_s = (target[:, columns.TARGET[name]][:, 0] for name in ("height_m", "climb_m_s"))
         given_m = np.where(self._is_up | (climb_m_s <= 0.0), height_m, np.maximum(height_m, APP_LIFT_M))
         state, target = state.copy(), target.copy()
-        state[:, columns.STATE["grounded"].start], target[:, columns.TARGET["height_m"].start] = (
+        state[:, columns.STATE["on_ground"].start], target[:, columns.TARGET["height_m"].start] = (
             ~self._is_up,
             given_m,
         )

@@ -29,14 +29,15 @@ def test_a_step_has_the_bits_of_the_compiled_controller(scalar: str) -> None:
     settings = height_settings(scalar)
     ours, theirs = Controller(settings, 2), CompiledController(settings, 2)
     position, velocity, attitude, *aims = RNG.normal(0.0, 0.2, (7, 2, 3))
-    for grounded in (np.array([False, True]), np.zeros(2, np.bool_)):
+    for on_ground in (np.array([False, True]), np.zeros(2, np.bool_)):
         state = [position[:, :2], velocity[:, :2], attitude, -position[:, 2:], -velocity[:, 2:]]
         aimed = [*(aim[:, :2] for aim in aims[:3]), *(-aim[:, 2:] for aim in aims[:3])]
         target = [*aimed, aims[3][:, :2], -aims[3][:, 2:], np.full(2, 2.0)]
         for _ in range(3):
-            expected = theirs.step(np.column_stack([*state, grounded]), np.column_stack(target))
+            expected = theirs.step(np.column_stack([*state, on_ground]), np.column_stack(target))
             found = ours.step(
-                DroneState(position, velocity, attitude, grounded), TargetState(*aims[:3], ahead_m_s2=aims[3])
+                DroneState(position, velocity, attitude, on_ground),
+                TargetState(*aims[:3], ahead_m_s2=aims[3]),
             )
             assert (found.command_rad == expected.command_rad).all()
             assert (found.thrust_m_s2 == expected.thrust_m_s2).all()
@@ -123,8 +124,8 @@ def test_limits_of_the_height_are_arguments(tmp_path: Path) -> None:
             r"heading_change_rad: has shape \(2,\); it must be",
         ),
         (lambda it: it.report_thrust([9.0, 9.0]), r"thrust_m_s2: has shape \(2,\); it must be"),
-        (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "grounded = 1 must be a truth value"),
-        (lambda _: DroneState(REST, REST, REST, [True] * 3), r"grounded = .* or such of shape \(2,\)"),
+        (lambda _: DroneState([0, 0, 0], [0, 0, 0], [0, 0, 0], 1), "on_ground = 1 must be a truth value"),
+        (lambda _: DroneState(REST, REST, REST, [True] * 3), r"on_ground = .* or such of shape \(2,\)"),
     ],
 )
 def test_wrong_arguments_are_refused(call: Any, message: str) -> None:
@@ -190,7 +191,7 @@ def hold(height: AltitudeName, off_m: float, steps: int = 220, **how: Any) -> No
     pilot = Controller.from_preset("crazyflie", 2, vehicle="crazyflie", height=height, measurement_age_s=0.0)
     low = ALOFT_M + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, off_m]])
     climb = np.array([0.0, 0.0, how.get("climb_m_s", 0.0)])
-    state = DroneState(low, np.zeros((2, 3)) - climb, np.zeros((2, 3)), how.get("grounded", False))
+    state = DroneState(low, np.zeros((2, 3)) - climb, np.zeros((2, 3)), how.get("on_ground", False))
     for _ in range(steps):
         pilot.step(state, TargetState(ALOFT_M, np.zeros((2, 3)) - climb))
 
@@ -215,7 +216,7 @@ def test_a_drone_that_stays_low_is_named_once(off_m: float, words: str) -> None:
         ("feedforward", 1.0, 500, {}),  # motors that are not armed
         ("feedforward", 0.055, 190, {}),  # less than 2 s
         ("feedforward", 0.055, 500, {"climb_m_s": 0.2}),
-        ("feedforward", 0.055, 500, {"grounded": True}),
+        ("feedforward", 0.055, 500, {"on_ground": True}),
     ],
 )
 def test_nothing_is_said_elsewhere(

@@ -135,10 +135,10 @@ def test_the_floor_is_reported_while_it_carries_the_drone() -> None:
     )
     flight, recorder = flight_of([scenario], PERIOD_S), Recorder.around(height_settings())
     trace = loop.fly(flight, recorder)
-    grounded = np.array(recorder.states)[:, 0, 9]
-    np.testing.assert_array_equal(grounded, trace.position_m[:, 0, 2] >= 0.0)
-    assert grounded[0] == grounded[-1] == 1.0
-    assert not grounded[(trace.time_s > 2.0) & (trace.time_s < 7.0)].any()
+    on_ground = np.array(recorder.states)[:, 0, 9]
+    np.testing.assert_array_equal(on_ground, trace.position_m[:, 0, 2] >= 0.0)
+    assert on_ground[0] == on_ground[-1] == 1.0
+    assert not on_ground[(trace.time_s > 2.0) & (trace.time_s < 7.0)].any()
     assert trace.thrust_acceleration_m_s2[0, 0] == pytest.approx(2.9)
 
 

@@ -41,7 +41,7 @@ LEARNING = {
 CORNERS |= {"learnt gain": LEARNING["learnt gain"]}
 FAULTS = {
     "height": {
-        "the floor is not felt": Harm("nmpc.c", r"\(state->grounded != 0\)", "(state->grounded > 1)"),
+        "the floor is not felt": Harm("nmpc.c", r"\(state->on_ground != 0\)", "(state->on_ground > 1)"),
         "least and most thrust are one": Harm(
             "nmpc.c", r"NMPC_THRUST_MAX_M_STEP2 \* share", "NMPC_THRUST_MIN_M_STEP2 * share"
         ),

@@ -59,13 +59,13 @@ STATE: Final = (
         told=(("climb", "measured velocity upwards"),),
     ),
     PortRow(
-        "grounded",
+        "on_ground",
         "whole",
         "1 while the drone touches the floor, else 0",
         when=_HEIGHT,
         kind=WHOLE,
         draw=CHANCE,
-        told=(("grounded", "1 while the drone touches the floor, else 0"),),
+        told=(("on_ground", "1 while the drone touches the floor, else 0"),),
     ),
 )
 

@@ -443,7 +443,7 @@ _STATE: Final[Mapping[str, Callable[[DroneState], list[FloatArray]]]] = {
     "yaw_rad": lambda state: _columns(state.attitude_rad, count=3)[2:],
     "height_m": lambda state: _heights(state.position_m),
     "climb_m_s": lambda state: _heights(state.velocity_m_s),
-    "grounded": lambda state: [state.grounded.reshape(-1).astype(np.float64)],
+    "on_ground": lambda state: [state.on_ground.reshape(-1).astype(np.float64)],
 }
 _TARGET: Final[Mapping[str, Callable[[Any], list[FloatArray]]]] = {
     "position_m": lambda target: _columns(target.position_m),

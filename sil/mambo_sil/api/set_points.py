@@ -72,7 +72,7 @@ class HeightHint:
         if self._said:
             return
         off_m = (state.position_m[..., 2] - target.position_m[..., 2]).reshape(-1)
-        rests = (np.abs(state.velocity_m_s[..., 2]).reshape(-1) < REST_M_S) & ~state.grounded.reshape(-1)
+        rests = (np.abs(state.velocity_m_s[..., 2]).reshape(-1) < REST_M_S) & ~state.on_ground.reshape(-1)
         rests &= np.abs(target.velocity_m_s[..., 2]).reshape(-1) < REST_M_S
         rests &= (np.abs(off_m) > OFF_M) & (np.abs(off_m) < LOST_M)
         self._rest_s = np.where(rests, self._rest_s + self._update_period_s, 0.0)

@@ -276,9 +276,9 @@ def fly(
                 stock = not has_thrust and not open_loop
                 thrust_n = altitude.thrust_n(wanted, seen) if stock else take_off_n
             if tick == 0:
-                grounded = landing & (true.position_m[2] >= 0.0)
+                on_ground = landing & (true.position_m[2] >= 0.0)
                 reported_m_s2 = delivery.report() if has_thrust else thrust_n / mass_kg
-                caller.call(update, true, seen, grounded, reported_m_s2)
+                caller.call(update, true, seen, on_ground, reported_m_s2)
                 if open_loop:
                     trace.thrust_acceleration_m_s2[update] = thrust_n / mass_kg
             command = wire.carry(caller.command)
@@ -385,7 +385,7 @@ def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) ->
     return kind(time_s=times_s, target=targets, status=np.empty(shape[::-1], np.int64).T, **arrays)
 
 
-def _measured(seen: Seen, grounded: NDArray[np.bool_]) -> dict[str, FloatArray]:
+def _measured(seen: Seen, on_ground: NDArray[np.bool_]) -> dict[str, FloatArray]:
     """Return the numbers of states by member (count, n)."""
     return {
         "position_m": seen.position_m[:2],
@@ -395,7 +395,7 @@ def _measured(seen: Seen, grounded: NDArray[np.bool_]) -> dict[str, FloatArray]:
         "yaw_rad": seen.euler_rad[2:],
         "height_m": -seen.position_m[2:],
         "climb_m_s": -seen.velocity_m_s[2:],
-        "grounded": grounded[np.newaxis].astype(np.float64),
+        "on_ground": on_ground[np.newaxis].astype(np.float64),
     }
 
 
@@ -418,15 +418,15 @@ class _Caller:
         self.command = first
 
     def call(
-        self, update: int, true: Seen, seen: Seen, grounded: NDArray[np.bool_], thrust_m_s2: FloatArray
+        self, update: int, true: Seen, seen: Seen, on_ground: NDArray[np.bool_], thrust_m_s2: FloatArray
     ) -> None:
         """Call the controller with the state `seen` and the thrust (n,), and record the update.
 
         A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
         trace, has_thrust = self._trace, len(self.command) > LEVEL.command
-        measured = np.zeros((len(grounded), self._columns))
-        for member, rows in _measured(seen, grounded).items():
+        measured = np.zeros((len(on_ground), self._columns))
+        for member, rows in _measured(seen, on_ground).items():
             if STATE[member].stop <= measured.shape[1]:
                 measured[:, STATE[member]] = rows.T
         dropped = self._drops.next()

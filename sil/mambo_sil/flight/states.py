@@ -35,7 +35,7 @@ class DroneState:
     """Along the same axes (..., 2) or (..., 3)."""
     attitude_rad: FloatArray
     """Roll (right side down), pitch (nose up), yaw (clockwise from above) (..., 3)."""
-    grounded: NDArray[np.bool_]
+    on_ground: NDArray[np.bool_]
     """Whether the drone touches the floor (...); read with `[height]` in the settings only."""
     rates_rad_s: FloatArray | None = None
     """About the axes of the body, forward, right, down (..., 3); read where `sensors.lever_m` of the vehicle
@@ -46,7 +46,7 @@ class DroneState:
         position_m: ArrayLike,
         velocity_m_s: ArrayLike,
         attitude_rad: ArrayLike,
-        grounded: ArrayLike = False,
+        on_ground: ArrayLike = False,
         *,
         rates_rad_s: ArrayLike | None = None,
     ) -> None:
@@ -55,10 +55,10 @@ class DroneState:
         object.__setattr__(self, "position_m", position)
         object.__setattr__(self, "velocity_m_s", _vectors("velocity_m_s", velocity_m_s, batch))
         object.__setattr__(self, "attitude_rad", of_shape("attitude_rad", attitude_rad, (*batch, 3)))
-        contact = np.asarray(grounded)
+        contact = np.asarray(on_ground)
         good = contact.dtype == np.bool_ and contact.shape in ((), batch)
-        require(good, "grounded", grounded, f"be a truth value, or such of shape {batch}")
-        object.__setattr__(self, "grounded", np.broadcast_to(contact, batch))
+        require(good, "on_ground", on_ground, f"be a truth value, or such of shape {batch}")
+        object.__setattr__(self, "on_ground", np.broadcast_to(contact, batch))
         rates = None if rates_rad_s is None else of_shape("rates_rad_s", rates_rad_s, (*batch, 3))
         object.__setattr__(self, "rates_rad_s", rates)
 
@@ -69,7 +69,7 @@ class DroneState:
         position_m: ArrayLike,
         velocity_m_s: ArrayLike,
         attitude_rad: ArrayLike,
-        grounded: ArrayLike = False,
+        on_ground: ArrayLike = False,
         *,
         rates_rad_s: ArrayLike | None = None,
     ) -> Self:
@@ -78,7 +78,7 @@ class DroneState:
             vectors_to_ned(frame, position_m, "position_m"),
             vectors_to_ned(frame, velocity_m_s, "velocity_m_s"),
             attitude_to_ned(frame, attitude_rad),
-            grounded,
+            on_ground,
             rates_rad_s=None if rates_rad_s is None else body_to_ned(frame, rates_rad_s),
         )
 
@@ -104,7 +104,7 @@ class DroneState:
             for moved in (centre.position_m, centre.velocity_m_s)
         )
         return type(self)(
-            position_m, velocity_m_s, self.attitude_rad, self.grounded, rates_rad_s=self.rates_rad_s
+            position_m, velocity_m_s, self.attitude_rad, self.on_ground, rates_rad_s=self.rates_rad_s
         )
 
     def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:

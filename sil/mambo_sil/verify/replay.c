@@ -443,12 +443,12 @@ static int passes_floats(nmpc_t *self)
 #ifdef NMPC_FUZZ_SET_THRUST
     state.height_m = 0.5f;
     state.climb_m_s = -0.25f;
-    state.grounded = 1;
+    state.on_ground = 1;
     target.height_m = 1.0f;
     target.climb_m_s = 0.125f;
     state_numbers.height_m = NMPC_POSITION(0.5);
     state_numbers.climb_m_s = NMPC_VELOCITY(-0.25);
-    state_numbers.grounded = 1;
+    state_numbers.on_ground = 1;
     target_numbers.height_m = NMPC_POSITION(1.0);
     target_numbers.climb_m_s = NMPC_VELOCITY(0.125);
 #endif

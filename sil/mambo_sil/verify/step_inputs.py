@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
 _DRAWN = {
-    *("position_m", "velocity_m_s", "roll_rad", "pitch_rad", "yaw_rad", "height_m", "climb_m_s", "grounded"),
+    *("position_m", "velocity_m_s", "roll_rad", "pitch_rad", "yaw_rad", "height_m", "climb_m_s", "on_ground"),
     *("acceleration_m_s2", "climb_acceleration_m_s2"),
 }
 """Members that are drawn to suit each other."""
@@ -158,8 +158,8 @@ def _heights(settings: Settings, scale: Array, rng: np.random.Generator) -> tupl
     for values in (own, goal):
         row, column = rng.integers(n), rng.integers(2)
         values[row, column] = rng.choice([*NOT_IN_RANGE, limits[column], -limits[column], -0.0])
-    grounded = rng.choice([0.0, 1.0], (n, 1), p=[0.8, 0.2])
-    return np.concatenate([own, grounded], axis=1), goal
+    on_ground = rng.choice([0.0, 1.0], (n, 1), p=[0.8, 0.2])
+    return np.concatenate([own, on_ground], axis=1), goal
 
 
 def _accelerations(

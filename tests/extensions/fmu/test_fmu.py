@@ -35,7 +35,7 @@ from tests.support.tools import require, require_module
 
 VERSIONS: Final = ("2", "3")
 STATUS, SATURATED = [100], [101]
-MEASURED = ("x", "y", "vx", "vy", "roll", "pitch", "yaw", "height", "climb", "grounded")
+MEASURED = ("x", "y", "vx", "vy", "roll", "pitch", "yaw", "height", "climb", "on_ground")
 COMMANDED = ("roll_command", "pitch_command")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 SUBJECTS = {

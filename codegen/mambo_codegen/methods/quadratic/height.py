@@ -73,12 +73,12 @@ class HeightBounds:
 class Lift:
     """What a step knows of the height of n controllers.
 
-    on_ground: (n,) whether the drone lies on the floor.
+    lies_on_floor: (n,) whether the drone lies on the floor.
     weight:    (n,) by how much more the measured tilt counts than in hover; None if no more.
     """
 
     state: HeightState
-    on_ground: Rows
+    lies_on_floor: Rows
     weight: Real | None
 
 
@@ -199,8 +199,8 @@ class HeightAxis:
         self, state: HeightState, measured: Real, share: Real, has_state: Rows, none_yet: Rows
     ) -> Lift:
         """Let the model answer the last command, and correct the estimates; arguments as of `measure`."""
-        state, on_ground = self.measure(self.advance(state), measured, share, has_state, none_yet)
-        return Lift(state, on_ground, self.weight(self.lift(state, state.thrust)))
+        state, lies_on_floor = self.measure(self.advance(state), measured, share, has_state, none_yet)
+        return Lift(state, lies_on_floor, self.weight(self.lift(state, state.thrust)))
 
     def command_weight(self, state: HeightState) -> Real:
         """Return by how much more tilts (n,) count with the last command than in hover."""
@@ -220,16 +220,16 @@ class HeightAxis:
 
         share (n,) of the thrust acts vertically. Returns also which drones (n,) lie on the floor.
         """
-        on_ground = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
+        lies_on_floor = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
         step = self._products.speed_product(measured[:, 1])
         first = has_state & none_yet
         started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
         lying = replace(started, velocity_m_step=np.zeros_like(step))
         found = choose(none_yet, started, self._correct(state, measured, step))
-        corrected = choose(has_state, choose(on_ground, lying, found), state)
+        corrected = choose(has_state, choose(lies_on_floor, lying, found), state)
         delivered = self._vertical(share, state.thrust_m_s2)
         steady = replace(corrected, thrust=delivered, lagged=delivered, command=delivered)
-        return replace(choose(first, steady, corrected), share=share), on_ground
+        return replace(choose(first, steady, corrected), share=share), lies_on_floor
 
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds
@@ -275,9 +275,9 @@ class HeightAxis:
         command = self._vertical(state.share, thrust)
         return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
-    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
+    def predict(self, state: HeightState, lies_on_floor: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
-        acceleration = np.where(on_ground, 0, self._acceleration(state))
+        acceleration = np.where(lies_on_floor, 0, self._acceleration(state))
         height_m, velocity = self._axis.predict((state.height_m, state.velocity_m_step), acceleration)
         return replace(state, height_m=height_m, velocity_m_step=velocity)
 
@@ -360,15 +360,15 @@ class HeightAxis:
         by = self._axis.innovate(motion, (measured[:, 0], step), self._acceleration(state))
         height_m, velocity = self._axis.correct(motion, gains, by)
         corrected = replace(state, height_m=height_m, velocity_m_step=velocity)
-        grounded = measured[:, 2] != 0
+        on_ground = measured[:, 2] != 0
         if self._found.learns_gain:
             change = products.gain_correction(gains[2][0], by[0], gains[2][1], by[1])
-            learnt = state.gain + np.where(grounded & (change > 0), 0, change)
+            learnt = state.gain + np.where(on_ground & (change > 0), 0, change)
             least, most = self._one - self._learnt_limit, self._one + self._learnt_limit
             return replace(corrected, gain=confine(learnt, least, most))
         if self._found.learns_acceleration:
             change = products.disturbance_correction(gains[2][0], by[0], gains[2][1], by[1])
-            change = np.where(grounded & (change > 0), 0, change)
+            change = np.where(on_ground & (change > 0), 0, change)
             learnt = clamp(state.disturbance_m_step2 + change, self._learnt_limit)
             return replace(corrected, disturbance_m_step2=learnt)
         return corrected

@@ -68,9 +68,9 @@ class NoHeight:
         del target, measured, bounds
         return state, np.zeros_like(follows)
 
-    def predict(self, state: HeightState, on_ground: Rows) -> HeightState:
+    def predict(self, state: HeightState, lies_on_floor: Rows) -> HeightState:
         """Return zeros."""
-        del on_ground
+        del lies_on_floor
         return state
 
     def shift(self, state: HeightState, jump: FrameShift) -> HeightState:

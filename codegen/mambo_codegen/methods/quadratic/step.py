@@ -492,7 +492,7 @@ class ControlStep:
             tilt_rad=np.where(inputs.has_state[:, None], inputs.state[:, 4:6], memory.tilt_rad),
             command_rad=commanded.command_rad,
             missed=aim.missed,
-            height=self.height.predict(aim.height, seen.lift.on_ground),
+            height=self.height.predict(aim.height, seen.lift.lies_on_floor),
             height_bounds=memory.height_bounds,
             budget_rad=commanded.budget_rad,
             is_coarse=memory.is_coarse,

@@ -232,7 +232,7 @@ _TARGET: Final = _places(
 _OF_DRONE: Final = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
 _OF_TARGET: Final = np.array([1.0, 1.0, -1.0] * 4)
 """Signs that make up into down."""
-_GROUNDED, _KNOWN = STATE["grounded"].start, TARGET["known"].start
+_ON_GROUND, _KNOWN = STATE["on_ground"].start, TARGET["known"].start
 
 
 def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetState]:
@@ -244,7 +244,7 @@ def _seen(state: FloatArray, target: FloatArray) -> tuple[DroneState, TargetStat
             position_m=drone[:3],
             velocity_m_s=drone[3:6],
             attitude_rad=drone[6:],
-            grounded=state[_GROUNDED] != 0.0,
+            on_ground=state[_ON_GROUND] != 0.0,
         ),
         unchecked(
             TargetState,

@@ -12,7 +12,7 @@ NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
     step->feedback_rad[1] = (nmpc_real_t)0;
 #endif
 #if WITH_HEIGHT
-    step->on_ground = 0;
+    step->lies_on_floor = 0;
 #endif
 #if WITH_THRUST_VECTOR
     step->by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST;
@@ -31,7 +31,7 @@ NMPC_INLINE void step_predict(nmpc_t *self, nmpc_step_t *step)
 {
     observer_predict(&step->observer, step->world_m_step2);
 #if WITH_HEIGHT
-    height_predict(&self->height, step->on_ground);
+    height_predict(&self->height, step->lies_on_floor);
 #endif
     self->observer = step->observer;
     self->missed = (unsigned char)step->missed;

@@ -113,7 +113,7 @@ NMPC_INLINE nmpc_real_t height_acceleration(const nmpc_height_t *height)
 
 /* Correct the estimates by a measured state, whose climb is `climb_m_step`; `acceleration_m_step2` is a + d. */
 NMPC_INLINE void height_correct(nmpc_height_t *height, const nmpc_state_t *state, nmpc_real_t climb_m_step,
-                                nmpc_real_t acceleration_m_step2, int on_ground)
+                                nmpc_real_t acceleration_m_step2, int lies_on_floor)
 {
     nmpc_real_t n[2];
 #if WITH_THRUST_GAIN or WITH_LIFT
@@ -128,11 +128,11 @@ NMPC_INLINE void height_correct(nmpc_height_t *height, const nmpc_state_t *state
     change = disturbance_correction(height_gains[2][0], n[0], height_gains[2][1], n[1]);
 #endif
 #if WITH_THRUST_GAIN or WITH_LIFT
-    if ((state->grounded != 0) && ((on_ground != 0) || (change > (nmpc_real_t)0))) {
+    if ((state->on_ground != 0) && ((lies_on_floor != 0) || (change > (nmpc_real_t)0))) {
         change = (nmpc_real_t)0;
     }
 #else
-    (void)on_ground;
+    (void)lies_on_floor;
 #endif
 #if WITH_THRUST_GAIN
     height->gain = confine(height->gain + change, NMPC_GAIN_MIN, NMPC_GAIN_MAX);
@@ -147,7 +147,7 @@ NMPC_INLINE int height_measure(nmpc_height_t *height, const nmpc_state_t *state,
 {
     const nmpc_real_t climb_m_step = speed_product(NMPC_UPDATE_STEP_S, state->climb_m_s);
     const nmpc_real_t acceleration_m_step2 = height_acceleration(height);
-    const int on_ground = (state->grounded != 0) && (acceleration_m_step2 <= (nmpc_real_t)0);
+    const int lies_on_floor = (state->on_ground != 0) && (acceleration_m_step2 <= (nmpc_real_t)0);
 
     if (is_first != 0) {
         height->height_m = state->height_m;
@@ -156,13 +156,13 @@ NMPC_INLINE int height_measure(nmpc_height_t *height, const nmpc_state_t *state,
         height->thrust_m_step2 = height->command_m_step2;
         height->lagged_m_step2 = height->command_m_step2;
     } else {
-        height_correct(height, state, climb_m_step, acceleration_m_step2, on_ground);
+        height_correct(height, state, climb_m_step, acceleration_m_step2, lies_on_floor);
     }
-    if (on_ground != 0) {
+    if (lies_on_floor != 0) {
         height->height_m = state->height_m;
         height->velocity_m_step = (nmpc_real_t)0;
     }
-    return on_ground;
+    return lies_on_floor;
 }
 
 /* Take the target of this control step into the estimate of its motion. */
@@ -191,10 +191,10 @@ NMPC_INLINE void height_clear_target(nmpc_height_t *height)
 }
 
 /* Predict the estimates at the next control step; a drone that lies on the floor stays there. */
-NMPC_INLINE void height_predict(nmpc_height_t *height, int on_ground)
+NMPC_INLINE void height_predict(nmpc_height_t *height, int lies_on_floor)
 {
     axis_predict(&height->height_m, &height->velocity_m_step,
-                 (on_ground != 0) ? (nmpc_real_t)0 : height_acceleration(height));
+                 (lies_on_floor != 0) ? (nmpc_real_t)0 : height_acceleration(height));
 }
 
 /* The thrust was `thrust_m_s2` in place of the last command. */

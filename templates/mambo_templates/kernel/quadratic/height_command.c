@@ -107,7 +107,7 @@ NMPC_INLINE int height_aim(nmpc_t *self, const nmpc_state_t *state, const nmpc_t
     nmpc_real_t command_m_step2 = height_minimize(errors, to_move(least_m_step2), to_move(most_m_step2));
     nmpc_real_t thrust_m_step2;
 
-    if ((state != NULL) && (state->grounded != 0) && ((goal_m - state->height_m) <= NMPC_FLOOR_MARGIN_M)) {
+    if ((state != NULL) && (state->on_ground != 0) && ((goal_m - state->height_m) <= NMPC_FLOOR_MARGIN_M)) {
         command_m_step2 = least_m_step2;
     }
     thrust_m_step2 = factor_product(NMPC_GRAVITY_M_STEP2 + command_m_step2, thrust_inverse(share));

@@ -46,7 +46,7 @@ NMPC_INLINE void measure_heading(nmpc_t *self, nmpc_step_t *step)
 NMPC_INLINE void measure_height(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {
-        step->on_ground = height_measure(&self->height, step->state, has_estimate(self) == 0);
+        step->lies_on_floor = height_measure(&self->height, step->state, has_estimate(self) == 0);
     }
 }
 
@@ -84,7 +84,7 @@ NMPC_INLINE void learn_tilt_gain(nmpc_t *self, nmpc_step_t *step)
         int restarts = (has_estimate(self) == 0);
 
 #if WITH_HEIGHT
-        restarts = (restarts != 0) || (step->state->grounded != 0);
+        restarts = (restarts != 0) || (step->state->on_ground != 0);
 #endif
         if (restarts != 0) {
             tilt_gain_restart(&self->tilt_gain, &self->attitude, tilt_m_step2);

@@ -34,7 +34,7 @@ typedef struct {
     /* The acceleration of a tilt over that in hover, with the next thrust; 1 over it; 1 on the floor, else 0. */
     nmpc_real_t weight;
     nmpc_real_t inverse;
-    int on_ground;
+    int lies_on_floor;
     /* 1 if a limit of the height acts, else 0. */
     int limit_active;
 #endif
