@@ -330,4 +330,4 @@ def test_an_outage_ends_in_level_attitude() -> None:
     commands = [controller.step(np.full((2, 7), np.nan), target, np.full(2, 9.81)) for _ in range(600)]
     assert np.max(np.abs(commands[60].command_rad)) > 0.05, "it brakes"
     assert np.all(commands[-1].command_rad == 0)
-    assert np.all(controller.memory.missed == 52)
+    assert np.all(controller.memory.steps_blind == 52)

@@ -169,7 +169,7 @@ def test_in_a_short_outage_the_controller_flies_on() -> None:
     outcomes = fly(controller, drone, 80, lambda step, state: state * np.nan if 30 <= step < 70 else state)
     commands = np.array([outcome.command_rad[0] for outcome in outcomes])
     assert np.all(np.any(np.diff(commands[29:70], axis=0) != 0, axis=1))
-    assert [int(outcome.missed[0]) for outcome in outcomes[29:71]] == [0, *range(1, 41), 0]
+    assert [int(outcome.steps_blind[0]) for outcome in outcomes[29:71]] == [0, *range(1, 41), 0]
     seen, lost = outcomes[29].stored[0, :2], outcomes[69].stored[0, :2]
     found = outcomes[70].stored[0, :2]
     assert np.linalg.norm(lost - found) < 0.1 * np.linalg.norm(seen - found)
@@ -185,7 +185,7 @@ def test_after_a_long_outage_the_estimate_starts_anew() -> None:
     commands = np.array([outcome.command_rad[0] for outcome in outcomes])
     assert np.all(np.any(np.diff(commands[29:40], axis=0) != 0, axis=1))
     assert np.all(commands[-1] == 0)
-    assert int(outcomes[-1].missed[0]) == 12
+    assert int(outcomes[-1].steps_blind[0]) == 12
     elsewhere = [40.0, -30.0, 2.0, 1.0, 0.0, 0.0, 0.0]
     found = controller.step([elsewhere], told([[0.0] * 4]), [HOVER]).stored[0]
     assert found[2:4] == pytest.approx(np.array(elsewhere[2:4]) * period_s, rel=0.05)

@@ -165,7 +165,7 @@ def test_a_command_that_was_sent_means_more_to_the_model_of_a_drone_that_tilts_m
 def test_on_the_floor_and_without_a_state_nothing_is_learnt() -> None:
     """The means of a drone on the floor start anew, those of one without a state stay; a reset forgets."""
     found = controller(HIGH, 1.2)
-    found.memory = replace(found.memory, missed=np.zeros(1, np.int64))
+    found.memory = replace(found.memory, steps_blind=np.zeros(1, np.int64))
     seen = np.zeros((1, 10))
     seen[:, 4], target = 0.3, np.zeros((1, len(Quadratic(HIGH).target)))
     for _ in range(50):

@@ -70,12 +70,12 @@ QUADRATIC_FAULTS = {
     "the target accelerates the other way": ("error[2][axis] = error[2][axis] - self->tracker.", "error[2][axis] = error[2][axis] + self->tracker."),
     "the limits change places": ("most_m_step2 = self->bounds.command_m_step2[axis];", "most_m_step2 = self->bounds.command_m_step2[1 - axis];"),
     "one step less of outage": ("#define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)", "#define NMPC_NO_ESTIMATE NMPC_OUTAGE_STEPS"),
-    "rates over a gap": ("if (self->missed == 0U) {", "if (self->missed != NMPC_NO_ESTIMATE) {"),
+    "rates over a gap": ("if (self->steps_blind == 0U) {", "if (self->steps_blind != NMPC_NO_ESTIMATE) {"),
     "no turn of the model": ("            attitude_turn(&self->attitude, sine, cosine, step->target != NULL);\n", "            self->attitude.sine = sine;\n            self->attitude.cosine = cosine;\n"),
     "a turn of the model after an outage": ("            self->attitude.sine = sine;\n            self->attitude.cosine = cosine;\n", "            attitude_turn(&self->attitude, sine, cosine, step->target != NULL);\n"),
     "a held command turns": ("sine, cosine, step->target != NULL)", "sine, cosine, 1)"),
     "a new command does not turn": ("sine, cosine, step->target != NULL)", "sine, cosine, 0)"),
-    "a held command has rate feedback": ("    const int is_fed = (self->missed == 0U);", "    const int is_fed = 0;"),
+    "a held command has rate feedback": ("    const int is_fed = (self->steps_blind == 0U);", "    const int is_fed = 0;"),
     "measured attitude": ("state[axis][4] = attitude->tilt_m_step2[axis];", "state[axis][4] = step->tilt_m_step2[axis];"),
     "no prediction in an outage": ("    observer_predict(&step->observer, step->world_m_step2);\n", "    if (step->state != NULL) { observer_predict(&step->observer, step->world_m_step2); }\n"),
     "a bad thrust allows a command": (
@@ -85,7 +85,7 @@ QUADRATIC_FAULTS = {
     "a command of others leaves the model": ("    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);\n", ""),
     "a command of others has no rate feedback": ("    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);\n", "    attitude_set_command(&self->attitude, roll_rad, pitch_rad);\n"),
     "a change of pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_change_rad)", "(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_change_rad)"),
-    "a reset keeps the estimate": ("    self->missed = NMPC_NO_ESTIMATE;\n", ""),
+    "a reset keeps the estimate": ("    self->steps_blind = NMPC_NO_ESTIMATE;\n", ""),
     "a reset keeps the target": ("    observer_clear(&self->observer);\n    tracker_clear(self);\n", "    observer_clear(&self->observer);\n"),
     "no clamp of feedback": ("    step->command_rad[1] = limited_angle(self, step->command_rad[1]);\n", ""),
     "saturated to the right only": ("self->command_rad[0] <= attitude_roll(-right_m_step2)", "0"),
@@ -113,10 +113,10 @@ QUADRATIC_FAULTS = {
     "the model answers nothing": ("    attitude_advance(&self->attitude);\n", ""),
     "the model does not know its command": ("        attitude->command_m_step2[axis] = move_m_step2;\n", ""),
     "a command without feedback": ("    step->command_rad[1] = step->command_rad[1] + step->feedback_rad[1];\n", ""),
-    "an outage is not counted": ("        step->missed = (unsigned int)self->missed + 1U;\n", "        step->missed = self->missed;\n"),
-    "an outage has an aim": ("(step->missed < NMPC_NO_ESTIMATE) ? step->target : NULL", "step->target"),
+    "an outage is not counted": ("        step->steps_blind = (unsigned int)self->steps_blind + 1U;\n", "        step->steps_blind = self->steps_blind;\n"),
+    "an outage has an aim": ("(step->steps_blind < NMPC_NO_ESTIMATE) ? step->target : NULL", "step->target"),
     "the estimates are not stored": ("    self->observer = step->observer;\n", ""),
-    "the outage is not stored": ("    self->missed = (unsigned char)step->missed;\n", ""),
+    "the outage is not stored": ("    self->steps_blind = (unsigned char)step->steps_blind;\n", ""),
 }  # fmt: skip
 
 

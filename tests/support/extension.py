@@ -78,7 +78,7 @@ typedef struct {
     nmpc_attitude_t attitude;
     TRACKER_MEMBERS
     nmpc_real_t command_rad[2];
-    unsigned char missed;
+    unsigned char steps_blind;
     ...;
 } nmpc_t;
 typedef struct {

@@ -47,7 +47,7 @@ def test_numbers_lie_where_the_table_has_them(name: str, tmp_path: Path) -> None
             for column, place in enumerate(places)
         ]
         claims += [f"NMPC_STORED_NUMBERS == {len(places)}", "sizeof(nmpc_t) == NMPC_INSTANCE_BYTES"]
-        claims.append(f"offsetof(nmpc_t, missed) == {len(places)}U * sizeof(nmpc_real_t)")
+        claims.append(f"offsetof(nmpc_t, steps_blind) == {len(places)}U * sizeof(nmpc_real_t)")
     (tmp_path / "nmpc.h").write_text(render(settings, with_digest=False)["nmpc.h"])
     asserted = [f"typedef char claim_{k}[({claim}) ? 1 : -1];" for k, claim in enumerate(claims)]
     text = '#include <stddef.h>\n#include "nmpc.h"\n' + "\n".join(asserted) + "\n"

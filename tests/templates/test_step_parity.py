@@ -72,12 +72,12 @@ def test_the_inputs_reach_what_is_to_be_compared() -> None:
     settings = quadratic_case(1, "float64")
     found = run(QuadraticController(Quadratic(settings), 200), inputs_of_steps(settings, 200, 60, 1), 1)
     most = Quadratic(settings).observer.outage_steps + 1
-    missed = np.array([step.missed for step in found.steps])
+    steps_blind = np.array([step.steps_blind for step in found.steps])
     statuses = np.array([*found.setters, *(step.status for step in found.steps)])
     assert set(np.unique(statuses)) == {0, 2, 3, 4, 6, 7, 8}
-    assert (missed == most).any()
-    assert ((missed[:-1] > 1) & (missed[:-1] < most) & (missed[1:] == 0)).any()
-    assert ((missed[:-1] == most) & (missed[1:] == 0)).any()
+    assert (steps_blind == most).any()
+    assert ((steps_blind[:-1] > 1) & (steps_blind[:-1] < most) & (steps_blind[1:] == 0)).any()
+    assert ((steps_blind[:-1] == most) & (steps_blind[1:] == 0)).any()
     share = np.mean([step.saturated for step in found.steps])
     assert 0.05 < share < 0.98
 

@@ -52,7 +52,7 @@ def test_the_cases_have_limits_of_every_kind_and_long_outages() -> None:
     limited = np.concatenate(cases(LIMITED)[1])
     assert set(limited["active"]) >= {0, 1, 2, 5, 6}
     assert set(limited["saturated"]) == {0, 1}
-    assert set(limited["missed"]) >= set(range(52))
+    assert set(limited["steps_blind"]) >= set(range(52))
 
 
 @pytest.mark.first_is_quick

@@ -97,7 +97,7 @@ QUADRATIC: Final = (
     PortRow("tilt_rad", "angle", "roll and pitch of the last good state", "NMPC_ANGLES", ("feedback",)),
     PortRow("budget_rad", "angle", "b of roll and pitch", "NMPC_ANGLES", ("guard",)),
     PortRow("command_rad", "angle", "the last command", "NMPC_ANGLES"),
-    PortRow("missed", words="control steps since the last good state", kind=BYTE),
+    PortRow("steps_blind", words="control steps since the last good state", kind=BYTE),
     PortRow("has_target", words="1 once there was a target", kind=BYTE),
     PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
     PortRow("is_coarse", words="1 while no position is measured", when=("guard",), kind=BYTE),
@@ -169,7 +169,7 @@ ONE_NORM: Final = (
     PortRow("has_tilt", words="1 once tilt_rad is measured", when=("feedback",), kind=BYTE),
     PortRow("has_target", words="1 once there was a target", when=("tracker",), kind=BYTE),
     PortRow(
-        "missed",
+        "steps_blind",
         words="control steps since the last good state, at most NMPC_OUTAGE_STEPS",
         when=("limits",),
         kind=BYTE,

@@ -80,7 +80,7 @@ static void nmpc_replay_write(const void *values, size_t bytes)
 /* Write what a call leaves in the controller and in `command`. */
 static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_command_t *command)
 {
-    const int32_t numbers[3] = { status, (int32_t)self->missed, (int32_t)nmpc_is_saturated(self) };
+    const int32_t numbers[3] = { status, (int32_t)self->steps_blind, (int32_t)nmpc_is_saturated(self) };
 
     nmpc_replay_write(numbers, sizeof(numbers));
     nmpc_replay_write(command, sizeof(*command));
@@ -108,7 +108,7 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
     nmpc_replay_write(self->plan_rad, sizeof(self->plan_rad));
 #ifdef NMPC_LIMIT_SPEED
     {
-        const int32_t left[2] = { (int32_t)self->missed, (int32_t)(nmpc_limits_active(self) & ~NMPC_LIMIT_TILT) };
+        const int32_t left[2] = { (int32_t)self->steps_blind, (int32_t)(nmpc_limits_active(self) & ~NMPC_LIMIT_TILT) };
 
         nmpc_replay_write(&self->bounds, sizeof(self->bounds));
         nmpc_replay_write(left, sizeof(left));

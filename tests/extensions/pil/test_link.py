@@ -266,7 +266,7 @@ def test_a_board_that_does_not_answer_is_told(faults: Faults, message: str, elf:
         ),
         (
             "pil.c",
-            ("    ended =", "    self->controller.missed ^= 1U;\n    ended ="),
+            ("    ended =", "    self->controller.steps_blind ^= 1U;\n    ended ="),
             "21 OF 21 STEPS HAVE OTHER BITS THAN ON THIS MACHINE, FIRST STEP 0",
         ),
         (

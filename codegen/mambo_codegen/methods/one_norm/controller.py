@@ -25,7 +25,7 @@ class OneNormMemory:
 
     command_rad, the first moves of the last plan, is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost
     (n,), gradient (n, control, 2), iterations (n,), converged (n,). Without a tracker `target` stays unknown,
-    without limits `limits` zeros. missed (n,) counts control steps since the last good state with limits.
+    without limits `limits` zeros. steps_blind (n,) counts steps since the last good state with limits.
     sent_rad (n, 2) are the last commands, tilt_rad (n, 2) the angles of the last good step, has_tilt (n,)
     whether there was one.
     """
@@ -39,7 +39,7 @@ class OneNormMemory:
     converged: NDArray[np.bool_]
     target: TargetMotion
     limits: LimitsMemory
-    missed: NDArray[np.int64]
+    steps_blind: NDArray[np.int64]
     sent_rad: Real
     tilt_rad: Real
     has_tilt: NDArray[np.bool_]
@@ -57,7 +57,7 @@ class OneNormStep:
     iterations:  (n,) updates made.
     converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
     limits:      (n, k) all numbers of nmpc_bounds_t in their order; None without limits, as the next two.
-    missed:      (n,) control steps since the last good state.
+    steps_blind: (n,) control steps since the last good state.
     active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
 
     With fixed point the numbers are the integers of the C, converted exactly to SI units in float64.
@@ -71,7 +71,7 @@ class OneNormStep:
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     limits: Real | None = None
-    missed: NDArray[np.int64] | None = None
+    steps_blind: NDArray[np.int64] | None = None
     active: NDArray[np.int64] | None = None
 
 
@@ -111,7 +111,7 @@ class OneNormController:
             converged=np.zeros(n, np.bool_),
             target=unknown_motion(np.zeros((n, 2), computed)),
             limits=self._limits.memory(np.repeat(self._limits.defaults, n, axis=0)),
-            missed=np.zeros(n, np.int64),
+            steps_blind=np.zeros(n, np.int64),
             sent_rad=np.zeros((n, 2), computed),
             tilt_rad=np.zeros((n, 2), computed),
             has_tilt=np.zeros(n, np.bool_),
@@ -204,7 +204,7 @@ class OneNormController:
             converged=searched.converged,
             target=motion,
             limits=limits,
-            missed=np.zeros(len(states), np.int64),
+            steps_blind=np.zeros(len(states), np.int64),
             sent_rad=self._command(searched.moves_rad[:, 0], states[:, 4:6]),
             tilt_rad=states[:, 4:6],
             has_tilt=np.ones(len(states), np.bool_),
@@ -221,7 +221,7 @@ class OneNormController:
             iterations=new.iterations,
             converged=new.converged,
             limits=to_si(self.stored_limits, *self._constants.limits_stored) if has_limits else None,
-            missed=new.missed if has_limits else None,
+            steps_blind=new.steps_blind if has_limits else None,
             active=new.limits.active if has_limits else None,
         )
 
@@ -253,7 +253,7 @@ class OneNormController:
         memory = self.memory
         limits = {
             "limits": self.stored_limits,
-            "missed": memory.missed,
+            "steps_blind": memory.steps_blind,
             "active": memory.limits.active,
         }
         return {
@@ -288,20 +288,22 @@ class OneNormController:
             plan_rad=np.broadcast_to(command[:, None], self.memory.plan_rad.shape),
             target=unknown_motion(command),
             limits=forgotten_target(limits),
-            missed=np.zeros(n, np.int64),
+            steps_blind=np.zeros(n, np.int64),
             sent_rad=command,
             has_tilt=np.zeros(n, np.bool_),
         )
 
     def _after_outage(self, status: NDArray[np.int64], memory: OneNormMemory) -> OneNormMemory:
-        """Return the memory with one more missed state where it was bad; the command is level after many."""
+        """Return the memory with one more bad state where it was bad; the command is level after many."""
         if self._outage_steps is None:
             return memory
         bad = status == Status.BAD_STATE
-        missed = np.where(bad, np.minimum(memory.missed + 1, self._outage_steps), memory.missed)
-        memory = replace(memory, missed=missed)
-        level = replace(self._held(np.zeros_like(memory.sent_rad)), missed=missed)
-        return choose(bad & (missed == self._outage_steps), level, memory)
+        steps_blind = np.where(
+            bad, np.minimum(memory.steps_blind + 1, self._outage_steps), memory.steps_blind
+        )
+        memory = replace(memory, steps_blind=steps_blind)
+        level = replace(self._held(np.zeros_like(memory.sent_rad)), steps_blind=steps_blind)
+        return choose(bad & (steps_blind == self._outage_steps), level, memory)
 
     def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory

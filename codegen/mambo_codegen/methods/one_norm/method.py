@@ -41,7 +41,7 @@ class OneNorm(OneNormConstants, Method):
     }
     setter: ClassVar[str] = "set_weights"
     digested: ClassVar[tuple[str, ...]] = (
-        "missed",
+        "steps_blind",
         "iterations",
         "converged",
         "cost",
@@ -85,7 +85,7 @@ class OneNorm(OneNormConstants, Method):
     @property
     def _limits_results(self) -> tuple[StepResult, ...]:
         stored = self.limits_stored
-        return StepResult("limits", stored, (len(stored),)), StepResult("missed"), StepResult("active")
+        return StepResult("limits", stored, (len(stored),)), StepResult("steps_blind"), StepResult("active")
 
     @property
     def setter_quantities(self) -> tuple[str, ...]:

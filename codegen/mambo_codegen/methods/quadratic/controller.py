@@ -25,7 +25,7 @@ class QuadraticStep:
 
     status:      (n,) a `Status` each.
     command_rad: (n, 2) roll and pitch commands, in rad.
-    missed:      (n,) control steps since the last good state.
+    steps_blind: (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
     stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
     active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
@@ -34,7 +34,7 @@ class QuadraticStep:
 
     status: NDArray[np.int64]
     command_rad: Real
-    missed: NDArray[np.int64]
+    steps_blind: NDArray[np.int64]
     saturated: NDArray[np.bool_]
     stored: Real
     active: NDArray[np.int64] | None = None
@@ -160,7 +160,7 @@ class QuadraticController:
         return QuadraticStep(
             status=self._inputs.status(has_state, has_target, has_thrust),
             command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
-            missed=memory.missed,
+            steps_blind=memory.steps_blind,
             saturated=self.saturated,
             stored=self._numbers.to_si(self.stored, *self._constants.stored),
             active=memory.limits.active,
@@ -190,7 +190,7 @@ class QuadraticController:
         """What the last call left, in the numbers of the C."""
         memory = self.memory
         return {
-            "missed": memory.missed,
+            "steps_blind": memory.steps_blind,
             "saturated": self.saturated,
             "command_rad": memory.command_rad,
             **({"thrust_m_s2": memory.height.thrust_m_s2} if self._constants.has_height else {}),
@@ -211,7 +211,7 @@ class QuadraticController:
         if self.parts.tilt_budget is not None:
             plane = plane & np.tile(self.parts.tilt_budget.is_enough, 4)
         is_free = self.parts.observer.is_free(memory.estimate)
-        coarse = memory.is_coarse & (memory.missed == 0) & is_free
+        coarse = memory.is_coarse & (memory.steps_blind == 0) & is_free
         return np.column_stack([plane, np.broadcast_to(height, (len(plane), height.shape[1])), coarse])
 
     @property

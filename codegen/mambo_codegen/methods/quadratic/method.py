@@ -63,7 +63,7 @@ class Quadratic(QuadraticConstants, Method):
         "float": "the same functions with floats",
     }
     setter: ClassVar[str] = "report_command"
-    digested: ClassVar[tuple[str, ...]] = ("missed", "stored")
+    digested: ClassVar[tuple[str, ...]] = ("steps_blind", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = (
         "target",
@@ -107,7 +107,7 @@ class Quadratic(QuadraticConstants, Method):
         return (
             StepResult("status"),
             StepResult("command_rad", ("angle",), (2,)),
-            StepResult("missed"),
+            StepResult("steps_blind"),
             StepResult("saturated", count_type=np.bool_),
             StepResult("stored", self.stored, (len(self.stored),)),
             StepResult("active"),

@@ -35,7 +35,7 @@ REST_M_S: Final = 0.02
 class QuadraticMemory:
     """State of n controllers between two steps.
 
-    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state.
+    tilt_rad and command_rad are (n, 2), steps_blind (n,) counts control steps since the last good state.
     height_bounds are zeros without a height, as are, without a guard, budget_rad (n, 2), how much the
     commands may vary, and is_coarse (n,), whether no position is measured.
     """
@@ -46,7 +46,7 @@ class QuadraticMemory:
     limits: LimitsMemory
     tilt_rad: Real
     command_rad: Real
-    missed: NDArray[np.int64]
+    steps_blind: NDArray[np.int64]
     height: HeightState
     height_bounds: HeightBounds
     budget_rad: Real
@@ -74,7 +74,7 @@ class _Observed:
     lift:   the height, and what it makes of a tilt.
     tilt:   (n, 2) acceleration of the tilt, right and forward; world: the same along x and y.
     feedback_rad: (n, 2) what rate feedback adds to the commands.
-    missed: (n,) as in the memory.
+    steps_blind: (n,) as in the memory.
     """
 
     attitude: AttitudeState
@@ -84,7 +84,7 @@ class _Observed:
     world: Real
     estimate: Estimate
     feedback_rad: Real
-    missed: NDArray[np.int64]
+    steps_blind: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _Aim:
     target: (n, 4 or more) less the height's columns, and within the limits.
     weight: (n,) by how much more tilts count with the next thrust than in hover; None if no more.
     limit_active: (n,) whether a limit of the height acts.
-    missed: (n,) as in the memory.
+    steps_blind: (n,) as in the memory.
     has_command: (n,) whether there is a new command.
     rests:  (n,) whether the model has come to rest after an outage.
     """
@@ -105,7 +105,7 @@ class _Aim:
     height: HeightState
     weight: Real | None
     limit_active: Rows
-    missed: NDArray[np.int64]
+    steps_blind: NDArray[np.int64]
     has_command: Rows
     rests: Rows
 
@@ -151,9 +151,9 @@ class ControlStep:
         )
         self._is_predicted = constants.settings.model.start_attitude == "predicted"
         self._no_estimate = constants.observer.outage_steps + 1
-        """`missed` while the model brakes after an outage."""
+        """`steps_blind` while the model brakes after an outage."""
         self.at_rest = self._no_estimate + 1
-        """`missed` before the first good state and when the model has come to rest."""
+        """`steps_blind` before the first good state and when the model has come to rest."""
         self._rest_m_step = constant(REST_M_S * constants.settings.horizon.update_period_s, "speed")
 
     def advance(self, memory: QuadraticMemory, inputs: CheckedInputs) -> QuadraticMemory:
@@ -177,7 +177,7 @@ class ControlStep:
             limits=replace(limits, active=np.zeros_like(limits.active)),
             tilt_rad=zeros,
             command_rad=command_rad,
-            missed=np.full(n, self.at_rest),
+            steps_blind=np.full(n, self.at_rest),
             height=height,
             height_bounds=height_bounds,
             budget_rad=np.full_like(command_rad, full),
@@ -206,7 +206,7 @@ class ControlStep:
 
     def has_estimate(self, memory: QuadraticMemory) -> NDArray[np.bool_]:
         """Return whether there is an estimate (n,): not before the first good state and after an outage."""
-        return memory.missed < self._no_estimate
+        return memory.steps_blind < self._no_estimate
 
     def shift(self, memory: QuadraticMemory, jump: FrameShift) -> QuadraticMemory:
         """Return the memory after jumps of the frame."""
@@ -234,7 +234,7 @@ class ControlStep:
 
     def _observe(self, memory: QuadraticMemory, inputs: CheckedInputs) -> _Observed:
         """Return where the drones are."""
-        none_yet = memory.missed >= self._no_estimate
+        none_yet = memory.steps_blind >= self._no_estimate
         attitude = self.model.advance(memory.attitude)
         share, slope = self._measure_direction(memory, inputs)
         attitude = self._measure_heading(attitude, inputs, none_yet)
@@ -245,8 +245,8 @@ class ControlStep:
         world = self.model.turn_to_world(attitude, tilt)
         estimate = self._correct_estimates(memory, inputs, none_yet, world)
         feedback_rad = self._measure_rates(memory, inputs)
-        missed = self._count_missed(memory.missed, inputs.has_state)
-        return _Observed(attitude, lift, tilt, tilt_gain, world, estimate, feedback_rad, missed)
+        steps_blind = self._count_blind(memory.steps_blind, inputs.has_state)
+        return _Observed(attitude, lift, tilt, tilt_gain, world, estimate, feedback_rad, steps_blind)
 
     def _measure_direction(self, memory: QuadraticMemory, inputs: CheckedInputs) -> tuple[Real, Real | None]:
         """Return the vertical share (n,) of the thrust, and its slopes (n, 2), None with small angles."""
@@ -307,17 +307,17 @@ class ControlStep:
         if self._feedback is None:
             return np.zeros_like(memory.tilt_rad)
         change = self.products.feedback_product(self._feedback, inputs.state[:, 4:6] - memory.tilt_rad)
-        known = inputs.has_state & (memory.missed == 0)
+        known = inputs.has_state & (memory.steps_blind == 0)
         return np.where(known[:, None], change, np.zeros_like(change))
 
-    def _count_missed(self, missed: NDArray[np.int64], has_state: Rows) -> NDArray[np.int64]:
+    def _count_blind(self, steps_blind: NDArray[np.int64], has_state: Rows) -> NDArray[np.int64]:
         """Return the control steps (n,) since the last good state."""
-        waited = np.minimum(missed + 1, np.maximum(missed, self._no_estimate))
+        waited = np.minimum(steps_blind + 1, np.maximum(steps_blind, self._no_estimate))
         return np.where(has_state, 0, waited)
 
     def _aim(self, memory: QuadraticMemory, inputs: CheckedInputs, seen: _Observed) -> _Aim:
         """Return what the next commands fly to; the height has its next thrust."""
-        follows = inputs.allows_command & (seen.missed < self._no_estimate)
+        follows = inputs.allows_command & (seen.steps_blind < self._no_estimate)
         level, upward = inputs.target[:, self._level], inputs.target[:, self._upward]
         height, limit_active = self.height.aim(
             seen.lift.state, upward, inputs.state[:, 7:10], follows, memory.height_bounds
@@ -328,7 +328,7 @@ class ControlStep:
         within = np.where(follows[:, None], within, level[:, : within.shape[1]])
         motion, target = self._track_target(memory, level, within, limits, follows)
         aim = _Aim(
-            target, motion, limits, height, weight, limit_active, seen.missed, follows, follows & False
+            target, motion, limits, height, weight, limit_active, seen.steps_blind, follows, follows & False
         )
         return self._end_outage(aim, seen.estimate)
 
@@ -347,7 +347,7 @@ class ControlStep:
 
     def _end_outage(self, aim: _Aim, estimate: Estimate) -> _Aim:
         """Brake by the model's velocity where an outage lasts too long, until the model is at rest."""
-        overdue = aim.missed == self._no_estimate
+        overdue = aim.steps_blind == self._no_estimate
         slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
         brakes, rests = overdue & ~slow, overdue & slow
         stopped = np.concatenate([estimate.position_m, np.zeros_like(aim.target[:, 2:])], axis=1)
@@ -358,7 +358,7 @@ class ControlStep:
             motion=choose(overdue, unknown_target(aim.motion.velocity_m_s), aim.motion),
             limits=replace(aim.limits, active=active),
             height=self.height.clear_target(aim.height, overdue),
-            missed=np.where(rests, self.at_rest, aim.missed),
+            steps_blind=np.where(rests, self.at_rest, aim.steps_blind),
             has_command=aim.has_command | brakes,
             rests=rests,
         )
@@ -464,7 +464,7 @@ class ControlStep:
             return memory.command_rad
         without = self._find_angles(memory, seen.attitude, aim)
         without = clamp(without, memory.limits.bounds.tilt_rad[:, None])
-        is_fed = (self._feedback != 0) & (memory.missed == 0)[:, None]
+        is_fed = (self._feedback != 0) & (memory.steps_blind == 0)[:, None]
         return np.where(is_fed, without, memory.command_rad)
 
     def _report_limits(self, before: LimitsMemory, aim: _Aim, by_thrust: Rows) -> LimitsMemory:
@@ -491,7 +491,7 @@ class ControlStep:
             limits=commanded.limits,
             tilt_rad=np.where(inputs.has_state[:, None], inputs.state[:, 4:6], memory.tilt_rad),
             command_rad=commanded.command_rad,
-            missed=aim.missed,
+            steps_blind=aim.steps_blind,
             height=self.height.predict(aim.height, seen.lift.lies_on_floor),
             height_bounds=memory.height_bounds,
             budget_rad=commanded.budget_rad,

@@ -56,7 +56,7 @@ typedef struct {
 #else
     nmpc_command_t *command;
 #endif
-    int *missed;
+    int *steps_blind;
     int *saturated;
     nmpc_real_t *stored;
 #ifdef NMPC_LIMIT_SPEED
@@ -72,7 +72,7 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
     const nmpc_real_t *stored = (const nmpc_real_t *)(const void *)self;
     int k;
 
-    outcome->missed[i] = (int)self->missed;
+    outcome->steps_blind[i] = (int)self->steps_blind;
     if (outcome->saturated != NULL) {
         outcome->saturated[i] = nmpc_is_saturated(self);
     }
@@ -95,7 +95,7 @@ typedef struct {
     int *converged;
 #ifdef NMPC_LIMIT_SPEED
     nmpc_bounds_t *limits;
-    int *missed;
+    int *steps_blind;
     int *active;
 #endif
 } nmpc_outcome_t;
@@ -113,7 +113,7 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
     }
 #ifdef NMPC_LIMIT_SPEED
     outcome->limits[i] = self->bounds;
-    outcome->missed[i] = (int)self->missed;
+    outcome->steps_blind[i] = (int)self->steps_blind;
     outcome->active[i] = (int)self->limited;
 #endif
 }

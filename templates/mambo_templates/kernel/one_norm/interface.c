@@ -25,7 +25,7 @@ void nmpc_init(nmpc_t *self)
 #if WITH_LIMITS
     limits_init(self);
     self->limited = 0U;
-    self->missed = 0U;
+    self->steps_blind = 0U;
 #endif
     self->weights.tracking = NMPC_TRACKING_WEIGHT;
     self->weights.effort = NMPC_EFFORT_WEIGHT;
@@ -89,7 +89,7 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
 
     hold(self, clamp(command->roll_rad, tilt_limit(self)), clamp(command->pitch_rad, tilt_limit(self)));
 #if WITH_LIMITS
-    self->missed = 0U;
+    self->steps_blind = 0U;
 #endif
     return NMPC_OK;
 }
@@ -112,10 +112,10 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights)
 /* Count a bad state; after NMPC_OUTAGE_STEPS of them in a row the command is level. */
 static void miss_state(nmpc_t *self)
 {
-    if (self->missed < NMPC_OUTAGE_STEPS) {
-        self->missed++;
+    if (self->steps_blind < NMPC_OUTAGE_STEPS) {
+        self->steps_blind++;
     }
-    if (self->missed == NMPC_OUTAGE_STEPS) {
+    if (self->steps_blind == NMPC_OUTAGE_STEPS) {
         hold(self, (nmpc_real_t)0, (nmpc_real_t)0);
     }
 }

@@ -43,7 +43,7 @@ static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t
 #endif
 
 #if WITH_LIMITS
-    self->missed = 0U;
+    self->steps_blind = 0U;
     if (limits_apply(self, state->position_m, target, &limited) != 0U) {
         aim = &limited;
     }

@@ -34,7 +34,7 @@ NMPC_INLINE void step_predict(nmpc_t *self, nmpc_step_t *step)
     height_predict(&self->height, step->lies_on_floor);
 #endif
     self->observer = step->observer;
-    self->missed = (unsigned char)step->missed;
+    self->steps_blind = (unsigned char)step->steps_blind;
 }
 
 /* Take a control step. A null `state` stands for one that is not good, a null `target` for inputs that allow no new

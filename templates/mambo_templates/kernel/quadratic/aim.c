@@ -71,7 +71,7 @@ NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
         attitude_set_command(&self->attitude, (nmpc_real_t)0, (nmpc_real_t)0);
 #endif
         self->limited = 0U;
-        step->missed = NMPC_AT_REST;
+        step->steps_blind = NMPC_AT_REST;
     } else {
         step->limited->position_m[0] = step->observer.position_m[0];
         step->limited->position_m[1] = step->observer.position_m[1];
@@ -83,11 +83,11 @@ NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 /* Choose what the next command flies to. */
 NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
 {
-    step->aim = (step->missed < NMPC_NO_ESTIMATE) ? step->target : NULL;
+    step->aim = (step->steps_blind < NMPC_NO_ESTIMATE) ? step->target : NULL;
 #if WITH_HEIGHT
     command_thrust(self, step);
 #endif
-    if (step->missed == NMPC_NO_ESTIMATE) {
+    if (step->steps_blind == NMPC_NO_ESTIMATE) {
         end_outage(self, step);
     } else if (step->aim != NULL) {
         const nmpc_target_t *const target = step->aim;

@@ -208,7 +208,7 @@ NMPC_INLINE void guard_commands(nmpc_t *self, nmpc_step_t *step)
  * an outage has none. */
 NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
 {
-    const int is_fed = (step->missed < NMPC_NO_ESTIMATE) && (self->missed == 0U);
+    const int is_fed = (step->steps_blind < NMPC_NO_ESTIMATE) && (self->steps_blind == 0U);
 
     if (is_fed != 0) {
         find_angles(self, step);

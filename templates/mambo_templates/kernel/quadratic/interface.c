@@ -18,7 +18,7 @@ static void restart(nmpc_t *self, const nmpc_command_t *command)
     self->budget_rad[1] = NMPC_TILT_BUDGET_RAD;
     self->is_coarse = 0U;
 #endif
-    self->missed = NMPC_AT_REST;
+    self->steps_blind = NMPC_AT_REST;
 #if WITH_HEIGHT
     height_reset(&self->height, command->thrust_m_s2, command->roll_rad, command->pitch_rad);
     attitude_reset(&self->attitude, command->roll_rad, command->pitch_rad,

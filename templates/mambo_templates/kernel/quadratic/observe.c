@@ -129,7 +129,7 @@ NMPC_INLINE void correct_estimates(nmpc_t *self, nmpc_step_t *step)
 NMPC_INLINE void measure_rates(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {
-        if (self->missed == 0U) {
+        if (self->steps_blind == 0U) {
 #if WITH_ROLL_FEEDBACK
             step->feedback_rad[0] =
                 feedback_product(NMPC_ROLL_FEEDBACK_STEPS, step->state->roll_rad - self->tilt_rad[0]);
@@ -149,11 +149,11 @@ NMPC_INLINE void measure_rates(nmpc_t *self, nmpc_step_t *step)
 NMPC_INLINE void count_missed(nmpc_t *self, nmpc_step_t *step)
 {
     if (step->state != NULL) {
-        step->missed = 0U;
-    } else if (self->missed < NMPC_NO_ESTIMATE) {
-        step->missed = (unsigned int)self->missed + 1U;
+        step->steps_blind = 0U;
+    } else if (self->steps_blind < NMPC_NO_ESTIMATE) {
+        step->steps_blind = (unsigned int)self->steps_blind + 1U;
     } else {
-        step->missed = self->missed;
+        step->steps_blind = self->steps_blind;
     }
 }
 

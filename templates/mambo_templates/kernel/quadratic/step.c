@@ -4,10 +4,10 @@
  * chapters that follow.
  */
 
-/* `missed` once good states have failed for longer than the outage that the estimate bridges: the drone brakes. */
+/* `steps_blind` once good states have failed for longer than the outage that the estimate bridges: the drone brakes. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
-/* `missed` before the first good state, and when the model has come to rest after an outage. */
+/* `steps_blind` before the first good state, and when the model has come to rest after an outage. */
 #define NMPC_AT_REST (NMPC_OUTAGE_STEPS + 2U)
 
 /* What the functions of a control step hand on to each other. */
@@ -16,7 +16,7 @@ typedef struct {
     const nmpc_target_t *target;  /* null if the inputs allow no new command */
     const nmpc_target_t *aim;     /* what the next command flies to; null if the last one holds */
     nmpc_observer_t observer;     /* a copy, which the compiler can keep in registers */
-    unsigned int missed;          /* control steps since the last good state */
+    unsigned int steps_blind;     /* control steps since the last good state */
     nmpc_real_t tilt_m_step2[2];  /* acceleration of the tilt, right and forward */
     nmpc_real_t world_m_step2[2]; /* the same along x and y */
     nmpc_real_t command_rad[2];   /* the angles that stand for the model's command */
@@ -50,5 +50,5 @@ typedef struct {
 /* Whether there was an estimate before this control step. */
 NMPC_INLINE int has_estimate(const nmpc_t *self)
 {
-    return self->missed < NMPC_NO_ESTIMATE;
+    return self->steps_blind < NMPC_NO_ESTIMATE;
 }
