@@ -146,8 +146,8 @@ def test_a_steep_climb_takes_tilt_away_and_says_so() -> None:
         target[0, [0, 6]] = 20.0, above_m
         for _ in range(30):
             step = controller.step(state, target)
-        assert step.active is not None
-        tilts.append((np.max(np.abs(step.command_rad)), int(step.active[0])))
+        assert step.active_limits is not None
+        tilts.append((np.max(np.abs(step.command_rad)), int(step.active_limits[0])))
     (level, _), (climbing, active) = tilts
     assert climbing < 0.6 * level
     assert active & ActiveLimit.THRUST
@@ -166,8 +166,8 @@ def test_a_move_is_as_long_in_every_direction_as_the_thrust_leaves(scalar: str) 
     target[:, 6] = 5.0
     for _ in range(40):
         step = controller.step(state, target)
-    assert step.active is not None
-    assert np.all(step.active & ActiveLimit.THRUST)
+    assert step.active_limits is not None
+    assert np.all(step.active_limits & ActiveLimit.THRUST)
     command = si(method, controller.memory.attitude.command, "acceleration")
     found = controller.parts.height.spare(controller.memory.height)
     assert found is not None

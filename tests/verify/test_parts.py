@@ -192,7 +192,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
         Status.BAD_WEIGHT,
         Status.NULL_POINTER,
     }
-    assert {16, 17} <= set(outcomes["active"])
+    assert {16, 17} <= set(outcomes["active_limits"])
     assert len(np.unique(outcomes["thrust_m_s2"])) > 200
 
 

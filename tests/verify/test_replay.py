@@ -50,7 +50,7 @@ def test_the_cases_have_outcomes_of_every_status(settings: Settings, untried: se
 def test_the_cases_have_limits_of_every_kind_and_long_outages() -> None:
     """Each limit acting, commands at their limit and within, and outages longer than the estimate."""
     limited = np.concatenate(cases(LIMITED)[1])
-    assert set(limited["active"]) >= {0, 1, 2, 5, 6}
+    assert set(limited["active_limits"]) >= {0, 1, 2, 5, 6}
     assert set(limited["saturated"]) == {0, 1}
     assert set(limited["steps_blind"]) >= set(range(52))
 

@@ -207,7 +207,7 @@ class _Run:
     def _fold_controller(self, left: Outcome) -> NDArray[Any]:
         """Fold in what a call has left, and return flags (n,): the limits that act, 8 for saturation."""
         saturated = left["saturated"]
-        active: NDArray[Any] = left.get("active", 0) + (8 * saturated)
+        active: NDArray[Any] = left.get("active_limits", 0) + (8 * saturated)
         self._fold(saturated)
         if self._method.has_limits:
             self._fold(active)

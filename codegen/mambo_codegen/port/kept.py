@@ -99,7 +99,7 @@ QUADRATIC: Final = (
     PortRow("command_rad", "angle", "the last command", "NMPC_ANGLES"),
     PortRow("steps_blind", words="control steps since the last good state", kind=BYTE),
     PortRow("has_target", words="1 once there was a target", kind=BYTE),
-    PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
+    PortRow("active_limits", words="the limits that act, but NMPC_LIMIT_TILT", kind=BYTE),
     PortRow("is_coarse", words="1 while no position is measured", when=("guard",), kind=BYTE),
 )
 
@@ -174,7 +174,7 @@ ONE_NORM: Final = (
         when=("limits",),
         kind=BYTE,
     ),
-    PortRow("limited", words="the limits that act, but NMPC_LIMIT_TILT", when=("limits",), kind=BYTE),
+    PortRow("active_limits", words="the limits that act, but NMPC_LIMIT_TILT", when=("limits",), kind=BYTE),
 )
 
 KEPT: Final[dict[str, Table]] = {

@@ -148,7 +148,7 @@ class _Flights:
             command_rad = outcome.command_rad
             if outcome.thrust_m_s2 is not None:
                 lift = np.asarray(outcome.thrust_m_s2, np.float64)
-            said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
+            said = {name: getattr(outcome, name) for name in ("status", "saturated", "active_limits")}
         flies = np.asarray(~np.isnan(command_rad).any(axis=1))
         self._drones.advance(np.where(flies[:, np.newaxis], command_rad, 0.0), lift)
         self.steps = self.steps + 1
@@ -208,7 +208,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
     reward:      minus the distance from the curve in m, and -10 for a crash, which ends the episode. An
                  attitude of NaN is a crash; a target of NaN is refused by the C, which holds its command.
     info:        distance_m, speed_m_s, the limits tilt_limit_rad, speed_limit_m_s and braking_limit_m_s2, and
-                 with "target" what the C says: status, saturated, active (`nmpc_limits_active`).
+                 with "target" what the C says: status, saturated, active_limits (`nmpc_limits_active`).
     """
 
     def __init__(self, **options: Unpack[EnvironmentOptions]) -> None:
@@ -272,7 +272,7 @@ class MamboNmpcVectorEnv(VectorEnvironment):  # type: ignore[misc] # as above
         return observation, reward, crashed, truncated, info
 
 
-_SAID: Final = ("status", "saturated", "active")
+_SAID: Final = ("status", "saturated", "active_limits")
 
 
 def _first(info: dict[str, Any]) -> dict[str, Any]:

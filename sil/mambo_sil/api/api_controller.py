@@ -44,7 +44,7 @@ from mambo_sil.model.derive.derived_flight import chosen_text
 LARGEST_N: Final = 1_000_000
 Lever = tuple[float, float, float]
 
-_RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active", "thrust_m_s2")
+_RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active_limits", "thrust_m_s2")
 """The results of a step in C that a program gets."""
 
 

@@ -207,7 +207,7 @@ class StepOutcome:
     saturated:   (...) whether a command lies at the tilt limit; None with a 1-norm.
     cost:        (...) of the plan; None with a quadratic cost, as the next.
     plan_rad:    (..., control, 2) the moves.
-    active:      (...) the limits that act (`mambo_codegen.methods.shared.limits.ActiveLimit`), if any.
+    active_limits: (...) the limits that act (`mambo_codegen.methods.shared.limits.ActiveLimit`), if any.
     thrust_m_s2: (...) thrust over mass; None without `[height]` in the settings and `height`, as the next.
     yaw_rad:     (...) heading.
     """
@@ -217,7 +217,7 @@ class StepOutcome:
     saturated: NDArray[np.bool_] | None = None
     cost: NDArray[Any] | None = None
     plan_rad: NDArray[Any] | None = None
-    active: NDArray[np.int64] | None = None
+    active_limits: NDArray[np.int64] | None = None
     thrust_m_s2: NDArray[Any] | None = None
     yaw_rad: FloatArray | None = None
 

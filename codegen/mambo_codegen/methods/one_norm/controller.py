@@ -58,7 +58,7 @@ class OneNormStep:
     converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
     limits:      (n, k) all numbers of nmpc_bounds_t in their order; None without limits, as the next two.
     steps_blind: (n,) control steps since the last good state.
-    active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
+    active_limits: (n,) the limits that act, as `ActiveLimit`, but TILT.
 
     With fixed point the numbers are the integers of the C, converted exactly to SI units in float64.
     """
@@ -72,7 +72,7 @@ class OneNormStep:
     converged: NDArray[np.bool_]
     limits: Real | None = None
     steps_blind: NDArray[np.int64] | None = None
-    active: NDArray[np.int64] | None = None
+    active_limits: NDArray[np.int64] | None = None
 
 
 class OneNormController:
@@ -222,7 +222,7 @@ class OneNormController:
             converged=new.converged,
             limits=to_si(self.stored_limits, *self._constants.limits_stored) if has_limits else None,
             steps_blind=new.steps_blind if has_limits else None,
-            active=new.limits.active if has_limits else None,
+            active_limits=new.limits.active if has_limits else None,
         )
 
     @property
@@ -254,7 +254,7 @@ class OneNormController:
         limits = {
             "limits": self.stored_limits,
             "steps_blind": memory.steps_blind,
-            "active": memory.limits.active,
+            "active_limits": memory.limits.active,
         }
         return {
             "iterations": memory.iterations,

@@ -85,7 +85,11 @@ class OneNorm(OneNormConstants, Method):
     @property
     def _limits_results(self) -> tuple[StepResult, ...]:
         stored = self.limits_stored
-        return StepResult("limits", stored, (len(stored),)), StepResult("steps_blind"), StepResult("active")
+        return (
+            StepResult("limits", stored, (len(stored),)),
+            StepResult("steps_blind"),
+            StepResult("active_limits"),
+        )
 
     @property
     def setter_quantities(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ class QuadraticStep:
     steps_blind: (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
     stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
-    active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
+    active_limits: (n,) the limits that act, as `ActiveLimit`, but TILT.
     thrust_m_s2: (n,) commanded thrust over mass; None without a height.
     """
 
@@ -37,7 +37,7 @@ class QuadraticStep:
     steps_blind: NDArray[np.int64]
     saturated: NDArray[np.bool_]
     stored: Real
-    active: NDArray[np.int64] | None = None
+    active_limits: NDArray[np.int64] | None = None
     thrust_m_s2: Real | None = None
 
 
@@ -163,7 +163,7 @@ class QuadraticController:
             steps_blind=memory.steps_blind,
             saturated=self.saturated,
             stored=self._numbers.to_si(self.stored, *self._constants.stored),
-            active=memory.limits.active,
+            active_limits=memory.limits.active,
             thrust_m_s2=thrust if self._constants.has_height else None,
         )
 
@@ -195,7 +195,7 @@ class QuadraticController:
             "command_rad": memory.command_rad,
             **({"thrust_m_s2": memory.height.thrust_m_s2} if self._constants.has_height else {}),
             "stored": self.stored,
-            "active": memory.limits.active,
+            "active_limits": memory.limits.active,
         }
 
     @property

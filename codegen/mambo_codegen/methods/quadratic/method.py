@@ -110,7 +110,7 @@ class Quadratic(QuadraticConstants, Method):
             StepResult("steps_blind"),
             StepResult("saturated", count_type=np.bool_),
             StepResult("stored", self.stored, (len(self.stored),)),
-            StepResult("active"),
+            StepResult("active_limits"),
             *((StepResult("thrust_m_s2", THRUST),) if self.has_height else ()),
         )
 

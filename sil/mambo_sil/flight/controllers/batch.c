@@ -60,7 +60,7 @@ typedef struct {
     int *saturated;
     nmpc_real_t *stored;
 #ifdef NMPC_LIMIT_SPEED
-    int *active;
+    int *active_limits;
 #endif
 #ifdef NMPC_HAS_HEIGHT
     nmpc_real_t *thrust_m_s2;
@@ -80,7 +80,7 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
         outcome->stored[(i * NMPC_STORED_NUMBERS) + k] = stored[k];
     }
 #ifdef NMPC_LIMIT_SPEED
-    outcome->active[i] = (int)self->limited;
+    outcome->active_limits[i] = (int)self->active_limits;
 #endif
 }
 #else
@@ -96,7 +96,7 @@ typedef struct {
 #ifdef NMPC_LIMIT_SPEED
     nmpc_bounds_t *limits;
     int *steps_blind;
-    int *active;
+    int *active_limits;
 #endif
 } nmpc_outcome_t;
 
@@ -114,7 +114,7 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
 #ifdef NMPC_LIMIT_SPEED
     outcome->limits[i] = self->bounds;
     outcome->steps_blind[i] = (int)self->steps_blind;
-    outcome->active[i] = (int)self->limited;
+    outcome->active_limits[i] = (int)self->active_limits;
 #endif
 }
 #endif

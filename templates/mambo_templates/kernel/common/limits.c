@@ -255,15 +255,15 @@ NMPC_SHARED unsigned int limits_act(const nmpc_bounds_t *bounds, nmpc_real_t fas
 NMPC_SHARED void limits_change(nmpc_t *self, unsigned int active, const nmpc_target_t *target)
 {
 #if WITH_HEIGHT
-    const unsigned int before = (unsigned int)self->limited % NMPC_LIMIT_HEIGHT;
+    const unsigned int before = (unsigned int)self->active_limits % NMPC_LIMIT_HEIGHT;
 #else
-    const unsigned int before = self->limited;
+    const unsigned int before = self->active_limits;
 #endif
 
     if ((before == NMPC_LIMIT_BRAKING) && (active == 0U) && (limits_are_slow(&self->bounds, target) != 0)) {
         tracker_clear(self);
     }
-    self->limited = (unsigned char)active;
+    self->active_limits = (unsigned char)active;
 }
 
 #endif
@@ -287,11 +287,11 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
         active = limits_act(bounds, fastest_m_s, is_clear, target, limited);
     }
 #if WITH_TRACKER
-    if (active != self->limited) {
+    if (active != self->active_limits) {
         limits_change(self, active, target);
     }
 #else
-    self->limited = (unsigned char)active;
+    self->active_limits = (unsigned char)active;
 #endif
     return active;
 }

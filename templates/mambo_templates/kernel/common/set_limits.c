@@ -172,7 +172,7 @@ nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits)
 
 unsigned int nmpc_limits_active(const nmpc_t *self)
 {
-    return (unsigned int)self->limited + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
+    return (unsigned int)self->active_limits + ((nmpc_is_saturated(self) != 0) ? NMPC_LIMIT_TILT : 0U);
 }
 #if WITH_TURNING
 

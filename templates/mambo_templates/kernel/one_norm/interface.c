@@ -24,7 +24,7 @@ void nmpc_init(nmpc_t *self)
 
 #if WITH_LIMITS
     limits_init(self);
-    self->limited = 0U;
+    self->active_limits = 0U;
     self->steps_blind = 0U;
 #endif
     self->weights.tracking = NMPC_TRACKING_WEIGHT;
@@ -67,7 +67,7 @@ static void hold(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     self->has_tilt = 0U;
 #endif
 #if WITH_LIMITS
-    self->limited = 0U;
+    self->active_limits = 0U;
     self->bounds.target_m_s[0] = (nmpc_real_t)0;
     self->bounds.target_m_s[1] = (nmpc_real_t)0;
     self->bounds.turn_m2_s2 = (nmpc_real_t)0;

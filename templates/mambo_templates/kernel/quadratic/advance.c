@@ -15,7 +15,7 @@ NMPC_INLINE void step_begin(nmpc_t *self, nmpc_step_t *step)
     step->lies_on_floor = 0;
 #endif
 #if WITH_THRUST_VECTOR
-    step->by_thrust = (unsigned int)self->limited & NMPC_LIMIT_THRUST;
+    step->by_thrust = (unsigned int)self->active_limits & NMPC_LIMIT_THRUST;
 #endif
     /* One by one: for an initialiser some compilers call memset. */
     step->limited->position_m[0] = (nmpc_real_t)0;

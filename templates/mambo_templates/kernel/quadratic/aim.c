@@ -21,9 +21,9 @@ NMPC_INLINE void limit_target(nmpc_t *self, nmpc_step_t *step)
     unsigned int active;
 
 #if WITH_HEIGHT
-    step->was_limited = (self->has_target != 0U) && (((unsigned int)self->limited % NMPC_LIMIT_HEIGHT) != 0U);
+    step->was_limited = (self->has_target != 0U) && (((unsigned int)self->active_limits % NMPC_LIMIT_HEIGHT) != 0U);
 #else
-    step->was_limited = (self->has_target != 0U) && (self->limited != 0U);
+    step->was_limited = (self->has_target != 0U) && (self->active_limits != 0U);
 #endif
     active = limits_apply(self, position_m, step->aim, step->limited);
     if (active != 0U) {
@@ -70,12 +70,12 @@ NMPC_INLINE void end_outage(nmpc_t *self, nmpc_step_t *step)
 #else
         attitude_set_command(&self->attitude, (nmpc_real_t)0, (nmpc_real_t)0);
 #endif
-        self->limited = 0U;
+        self->active_limits = 0U;
         step->steps_blind = NMPC_AT_REST;
     } else {
         step->limited->position_m[0] = step->observer.position_m[0];
         step->limited->position_m[1] = step->observer.position_m[1];
-        self->limited = (unsigned char)NMPC_LIMIT_BRAKING;
+        self->active_limits = (unsigned char)NMPC_LIMIT_BRAKING;
         step->aim = step->limited;
     }
 }

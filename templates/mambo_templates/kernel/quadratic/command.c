@@ -227,13 +227,13 @@ NMPC_INLINE void hold_command(nmpc_t *self, nmpc_step_t *step)
 NMPC_INLINE void report_limits(nmpc_t *self, nmpc_step_t *step)
 {
     /* Those of the target, whose bits are lower than that of the height. */
-    unsigned int active = (unsigned int)self->limited % NMPC_LIMIT_HEIGHT;
+    unsigned int active = (unsigned int)self->active_limits % NMPC_LIMIT_HEIGHT;
 
     active = active + ((step->limit_active != 0) ? NMPC_LIMIT_HEIGHT : 0U);
 #if WITH_THRUST_VECTOR
     active = active + step->by_thrust;
 #endif
-    self->limited = (unsigned char)active;
+    self->active_limits = (unsigned char)active;
 }
 
 #endif

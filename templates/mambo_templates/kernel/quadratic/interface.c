@@ -12,7 +12,7 @@ static void restart(nmpc_t *self, const nmpc_command_t *command)
     self->tilt_rad[0] = (nmpc_real_t)0;
     self->tilt_rad[1] = (nmpc_real_t)0;
 #endif
-    self->limited = 0U;
+    self->active_limits = 0U;
 #if WITH_GUARD
     self->budget_rad[0] = NMPC_TILT_BUDGET_RAD;
     self->budget_rad[1] = NMPC_TILT_BUDGET_RAD;
