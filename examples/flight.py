@@ -1,7 +1,7 @@
 """Fly the generated C of a Crazyflie on a circle, seen by cameras with noise, four times.
 
 $ python flight.py
-Flown(4 flights: rms error 0.37 cm in the median, 0.39 cm at most, 0 crashed)
+FlightResult(4 flights: rms error 0.37 cm in the median, 0.39 cm at most, 0 crashed)
 seed 0: rms error 0.38 cm, at most 0.6 cm
 seed 1: rms error 0.39 cm, at most 0.5 cm
 seed 2: rms error 0.37 cm, at most 0.5 cm

@@ -1,7 +1,7 @@
 """Fly a curve of your own: a rose with three petals, in a plane, with its acceleration.
 
 $ python own_curve.py
-Flown(rms error 0.18 cm)
+FlightResult(rms error 0.18 cm)
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Compare a law of your own with the generated C: the same drone, circle, cameras and wind.
 
 $ python own_law.py
-PID: Flown(rms error 8 cm)
-MPC: Flown(rms error 0.47 cm)
+PID: FlightResult(rms error 8 cm)
+MPC: FlightResult(rms error 0.47 cm)
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mambo_extensions.plan.points import PlanPoint
     from mambo_sil.api.api_controller import Controller
     from mambo_sil.api.campaigns import CampaignFlights, campaign, draw_vehicles
-    from mambo_sil.api.flights import Flown, fly
+    from mambo_sil.api.flights import FlightResult, fly
     from mambo_sil.api.options import ControllerOptions
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
@@ -30,7 +30,7 @@ __all__ = [
     "Controller",
     "ControllerOptions",
     "DroneState",
-    "Flown",
+    "FlightResult",
     "MamboNmpcError",
     "Pilot",
     "Plan",
@@ -52,7 +52,7 @@ _HOMES: Final = {
     "Controller": "mambo_sil.api.api_controller",
     "ControllerOptions": "mambo_sil.api.options",
     "DroneState": "mambo_sil.flight.states",
-    "Flown": "mambo_sil.api.flights",
+    "FlightResult": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
     "Pilot": "mambo_extensions.mavlink.pilot",
     "Plan": "mambo_extensions.plan.plans",

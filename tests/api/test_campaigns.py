@@ -141,7 +141,7 @@ def test_drawn_vehicles_are_those_of_a_campaign(both: CampaignFlights) -> None:
     assert np.asarray(drones.airframe.mass_kg).tolist() == both.table["mass_kg"][:3]
     found = fly(Controller.from_preset("crazyflie"), drones, "circle", duration_s=4.0, seeds=range(3))
     assert len(set(found.metrics.rms_error_m.tolist())) == 3
-    assert repr(found).startswith("Flown(3 flights: rms error ")
+    assert repr(found).startswith("FlightResult(3 flights: rms error ")
     assert re.fullmatch(r"Vehicle\(crazyflie: 0\.03\d* to 0\.03\d* kg, attitude cascade, .*\)", repr(drones))
     assert repr(CRAZYFLIE) == "Vehicle(crazyflie: 0.03 kg, attitude cascade, sensors mocap)"
     controller = Controller.from_vehicle("crazyflie", n=2)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_nmpc import ArgumentError, Controller, DroneState, Flown, TargetState, Vehicle, fly
+from mambo_nmpc import ArgumentError, Controller, DroneState, FlightResult, TargetState, Vehicle, fly
 from mambo_sil.flight.engine.engine_library import VARIABLE
 
 CRAZYFLIE = Vehicle.from_preset("crazyflie")
@@ -70,7 +70,7 @@ class Alone(Pd):
         raise TypeError("there is one of it")
 
 
-def flown(law: Any, curve: Any = "circle", **others: Any) -> Flown:
+def flown(law: Any, curve: Any = "circle", **others: Any) -> FlightResult:
     """Fly for 4 s."""
     return fly(law, CRAZYFLIE, curve, size_m=1.0, rate_rad_s=1.5, duration_s=4.0, **others)
 
@@ -228,6 +228,6 @@ def test_metrics_may_leave_out_the_start() -> None:
         flown(Pd(), measured_from_s=4.0)
     with pytest.warns(UserWarning, match="law.step"):
         some = flown(Breaking(lambda: None), seeds=(0, 1, 2), yaw_rad=np.array([0.0, 0.2, 0.2]))
-    assert repr(some).startswith("Flown(3 flights: rms error ")
+    assert repr(some).startswith("FlightResult(3 flights: rms error ")
     assert re.search(r"rms error [\d.]+ cm in the median", repr(some))
     assert repr(some).endswith(" at most, 1 crashed)")

@@ -40,7 +40,7 @@ from mambo_sil.experiment.margins.margins_record import (
     MarginsSummary,
 )
 from mambo_sil.experiment.margins.response_file import Curve, write_responses
-from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
+from mambo_sil.experiment.regress.flight_limits import Check, JudgedFlight
 from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedRow, SensedSummary
 from mambo_sil.experiment.table2.table2 import CASES, Claim, Table2Row, Table2Summary
@@ -240,10 +240,10 @@ def regress_folder(folder: Path) -> None:
     def check(now: float, then: float | None) -> Check:
         return Check("iae_m_s", now, 5.0, then, 5.0 if then is None else 2.2, now <= 2.2)
 
-    good = FlightResult(
+    good = JudgedFlight(
         "eight", "eight/yaw_rad=0", {"iae_m_s": 1.5, "saturated_share": 0.01}, [check(1.5, 2.0)], True, None
     )
-    lost = FlightResult(
+    lost = JudgedFlight(
         "circle",
         HOSTILE,
         {"iae_m_s": np.nan, "saturated_share": 0.5},

@@ -48,7 +48,7 @@ LARGEST_PUSH_M_S2: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Flown:
+class FlightResult:
     """n simulated flights.
 
     trace:   k samples of n flights, with units in the names of its arrays.
@@ -67,9 +67,9 @@ class Flown:
         rms_m = np.where(self.crashed, np.inf, self.metrics.rms_error_m)
         median_m, most_m = np.quantile(rms_m, (0.5, 1.0), method="inverted_cdf").tolist()
         if len(rms_m) == 1:
-            return f"Flown({'crashed' if self.crashed[0] else f'rms error {distance(most_m)}'})"
+            return f"FlightResult({'crashed' if self.crashed[0] else f'rms error {distance(most_m)}'})"
         shown = f"rms error {distance(median_m)} in the median, {distance(most_m)} at most"
-        return f"Flown({len(rms_m)} flights: {shown}, {int(self.crashed.sum())} crashed)"
+        return f"FlightResult({len(rms_m)} flights: {shown}, {int(self.crashed.sum())} crashed)"
 
 
 def fly(
@@ -88,12 +88,12 @@ def fly(
     wind_speed_m_s: PerFlight = 0.0,
     wind_direction_rad: PerFlight = 0.0,
     measured_from_s: float = 0.0,
-) -> Flown:
+) -> FlightResult:
     """Fly the settings of a controller, or a law of your own, on a vehicle, once for each seed.
 
     controller: each flight has a new one with its settings; or any object with the method `step` of `Law`,
                 copied for each flight. A law that raises, or returns what is no command, loses its flight
-                alone, with a warning that says why, and `Flown.failures`.
+                alone, with a warning that says why, and `FlightResult.failures`.
     trajectory: a curve of the command `fly` with half-width, radius, step or height `size_m` and angular
                 rate `rate_rad_s`, or an object with its methods `target` and `acceleration`, and `vertical`
                 if it has a height, which the altitude loop of the vehicle then follows. Its velocity is
@@ -137,13 +137,13 @@ def fly(
     )
     if isinstance(controller, Controller):
         trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
-        return Flown(trace, measure(trace, measured_from_s), detect_crashes(trace, vehicle.drone))
+        return FlightResult(trace, measure(trace, measured_from_s), detect_crashes(trace, vehicle.drone))
     laws = OwnLaws(controller, flight)
     trace = simulate.fly(flight, laws)
     for number, failure in laws.failures.items():
         warnings.warn(f"flight {number}, {failure}", UserNotice, stacklevel=2)
     crashed = detect_crashes(trace, vehicle.drone)
-    return Flown(trace, measure(trace, measured_from_s), crashed, laws.failures)
+    return FlightResult(trace, measure(trace, measured_from_s), crashed, laws.failures)
 
 
 def as_curve(trajectory: object, size_m: float, rate_rad_s: float, duration_s: float) -> Trajectory:

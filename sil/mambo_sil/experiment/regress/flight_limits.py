@@ -36,7 +36,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class FlightResult:
+class JudgedFlight:
     """One flight of a suite; `same_bits` is None unless its trace was compared with the recorded one."""
 
     group: str
@@ -54,7 +54,7 @@ class FlightResult:
         return found + (["the trace differs from the recorded one"] if self.same_bits is False else [])
 
 
-def judge_flight(suite: FlightSuite, number: int, row: Row, held: Recorded) -> FlightResult:
+def judge_flight(suite: FlightSuite, number: int, row: Row, held: Recorded) -> JudgedFlight:
     """Compare flight `number` of a suite with its bounds, and with the values recorded of it, if any."""
     flight = suite.flights[number]
     counts: dict[str, Number] = {name: int(row[name]) for name in (CRASHED, REFUSED)}
@@ -68,7 +68,7 @@ def judge_flight(suite: FlightSuite, number: int, row: Row, held: Recorded) -> F
     same_bits = row[DIGEST] == held[DIGEST] if suite.same_bits and held else None
     failed = same_bits is False or not all(check.holds for check in checks)
     record = f"{RECORDS}/{number:04}-{flight.group}.json" if failed else None
-    return FlightResult(flight.group, flight.name, metrics, checks, same_bits, record)
+    return JudgedFlight(flight.group, flight.name, metrics, checks, same_bits, record)
 
 
 def _check(
@@ -83,7 +83,7 @@ def _check(
     return Check(metric, now, bound, then, limit, now <= limit)
 
 
-def is_better(result: FlightResult, suite: FlightSuite) -> bool:
+def is_better(result: JudgedFlight, suite: FlightSuite) -> bool:
     """Return whether a metric of a flight is below its recorded value by more than its tolerance."""
     return any(
         check.then is not None and check.now < check.then * (1.0 - suite.tolerances[check.metric])

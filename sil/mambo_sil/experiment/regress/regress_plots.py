@@ -8,7 +8,7 @@ from typing import Final
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
+from mambo_sil.experiment.regress.flight_limits import Check, JudgedFlight
 from mambo_sil.results.metric_names import named
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
@@ -19,19 +19,19 @@ _SHOWN: Final = (1e-2, 1e2)
 _MOST_ROWS: Final = 60
 
 
-def draw_regress(flights: Sequence[FlightResult], stem: Path) -> tuple[Path, Path]:
+def draw_regress(flights: Sequence[JudgedFlight], stem: Path) -> tuple[Path, Path]:
     """Draw the picture of `limits_figure`; writes stem.png and stem.svg."""
     with style():
         return save(_limits_figure(flights), stem)
 
 
-def limits_panel(flights: Sequence[FlightResult]) -> Markup:
+def limits_panel(flights: Sequence[JudgedFlight]) -> Markup:
     """Return the same picture for a page."""
     with style():
         return inline(_limits_figure(flights), "Metrics of each flight as shares of their limits")
 
 
-def _limits_figure(flights: Sequence[FlightResult]) -> Figure:
+def _limits_figure(flights: Sequence[JudgedFlight]) -> Figure:
     """Return a row per group and metric with a dot per flight, at the metric divided by its limit."""
     rows = _rows(flights)
     figure = Figure(figsize=(PAGE_INCHES, 0.9 + 0.2 * max(len(rows), 1)), layout="constrained")
@@ -59,7 +59,7 @@ def _limits_figure(flights: Sequence[FlightResult]) -> Figure:
     return figure
 
 
-def _rows(flights: Sequence[FlightResult]) -> dict[str, list[Check]]:
+def _rows(flights: Sequence[JudgedFlight]) -> dict[str, list[Check]]:
     """Return the checks by group and metric; of more than `_MOST_ROWS` those closest to their limits."""
     rows: dict[str, list[Check]] = {}
     for flight in flights:

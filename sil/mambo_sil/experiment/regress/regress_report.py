@@ -16,7 +16,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATURATED, Row
 from mambo_sil.experiment.inputs import Entrant
 from mambo_sil.experiment.regress.baseline import Baseline
-from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
+from mambo_sil.experiment.regress.flight_limits import RECORDS, JudgedFlight, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.blocks import CommandResult, Commands, Facts, Picture, ResultTable, Sentence
@@ -51,11 +51,11 @@ class RegressSummary(ReportedSummary):
     """Settings digest of that file."""
     better: int
     """Flights with a metric that is better than recorded by more than its tolerance."""
-    flights: list[FlightResult]
+    flights: list[JudgedFlight]
     files: dict[str, str] = Field(default_factory=dict)
 
     @property
-    def failed(self) -> list[FlightResult]:
+    def failed(self) -> list[JudgedFlight]:
         """The flights that failed."""
         return [flight for flight in self.flights if flight.failures]
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from mambo_nmpc import Flown
+    from mambo_nmpc import FlightResult
 
 
 class Planned:
@@ -192,7 +192,7 @@ class SimulatedDrone:
         print(f"simulated on {self._name}, sensors {self._sensors}: {off}; {end}")
         return self._rows(flown)
 
-    def _rows(self, flown: "Flown") -> Rows:
+    def _rows(self, flown: "FlightResult") -> Rows:
         trace: Any = flown.trace
         seen = trace if self._sensors == "true" else trace.as_seen()
         aims = zip(
