@@ -160,7 +160,7 @@ class _Flights:
         """Return observations (n, 15) and info, of each an array (n,), with what the C said."""
         now = self._now()
         seen, true = (
-            [np.nan_to_num(part, nan=10.0 * LOST_M) for part in state.as_in_frame("NWU")]
+            [np.nan_to_num(part, nan=10.0 * LOST_M) for part in state.to_frame("NWU")]
             for state in (self._drones.state, self._drones.true_state)
         )
         parts = *seen, now.position_m - seen[0], now.velocity_m_s - seen[1]

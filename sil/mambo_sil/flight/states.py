@@ -107,7 +107,7 @@ class DroneState:
             position_m, velocity_m_s, self.attitude_rad, self.on_ground, rates_rad_s=self.rates_rad_s
         )
 
-    def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def to_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return position, velocity and attitude in another frame."""
         return (
             vectors_to_ned(frame, self.position_m),
