@@ -108,7 +108,7 @@ def test_flying_on_a_board_is_the_flight_of_this_machine(tmp_path: Path) -> None
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
-    "command", [["fly", "--on", "mega"], ["same-bits", "--board", "mega", "--steps", "100"]]
+    "command", [["fly", "--on", "mega"], ["check-bits", "--board", "mega", "--steps", "100"]]
 )
 def test_a_missing_emulator_is_named(
     command: list[str], tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
@@ -128,7 +128,7 @@ def test_a_missing_emulator_is_named(
         (["footprint", "--board", "teensy"], "did you mean teensy41?"),
         (["footprint", "mamba"], "did you mean mambo"),
         (["footprint", "--board", "odd.toml"], "odd.toml: title is missing; add it: the name of the board"),
-        (["same-bits", "--board", "mambo", "--board", "none"], "none is neither a board nor a file"),
+        (["check-bits", "--board", "mambo", "--board", "none"], "none is neither a board nor a file"),
     ],
 )
 def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str, tmp_path: Path) -> None:
@@ -163,12 +163,12 @@ def test_two_boards_are_measured_each_once() -> None:
 def test_same_bits_compares_and_says_what_did_not_run() -> None:
     """The reference alone, where there is no compiler: a digest, and a reason for everything else."""
     options = ["--board", "mega", "--board", "crazyflie", "--steps", "100"]
-    result = json.loads(run("same-bits", *options, "--json")[0])
+    result = json.loads(run("check-bits", *options, "--json")[0])
     assert (result["steps"], len(result["builds"])) == (100, 1 + 4 * 6)
     reference, *others = result["builds"]
     assert (reference["where"], len(reference["digest"])) == ("reference", 10)
     assert all(one["digest"] is None and one["reason"] for one in others)
-    text, _ = run("same-bits", *options)
+    text, _ = run("check-bits", *options)
     assert reference["digest"] in text
     assert "no compiler for Arduino Mega 2560 found" in text
     assert unwrapped(text).startswith(

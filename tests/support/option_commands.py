@@ -185,7 +185,7 @@ def board(flights: OptionFlights) -> str:
 def same_bits(_flights: OptionFlights) -> str:
     """Compare the self-test of a build with the reference."""
     board_builder("crazyflie")
-    command("same-bits", SETTINGS, "--board", "crazyflie", "--steps", "100")
+    command("check-bits", SETTINGS, "--board", "crazyflie", "--steps", "100")
     return "="
 
 
@@ -249,6 +249,6 @@ ALL: Final[dict[str, Callable[[OptionFlights], str]]] = {
     "sweep": sweep,
     "regress": regress,
     "footprint": footprint,
-    "same-bits": same_bits,
+    "check-bits": same_bits,
     "verify": verify,
 }

@@ -45,7 +45,7 @@ COMMANDS: Final = (
     "tune",
     "regress",
     "sweep",
-    "same-bits",
+    "check-bits",
     "footprint",
     "verify",
 )

@@ -12,11 +12,11 @@ import typer
 
 from mambo_extensions.mavlink.pilot_command import pilot
 from mambo_extensions.plan.plan_command import plan
-from mambo_sil.cli.board import footprint, same_bits, sweep
+from mambo_sil.cli.board import check_bits, footprint, sweep
 from mambo_sil.cli.command import Command, examples, root
 from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
 from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
-from mambo_sil.cli.generate import generate, identify_binary
+from mambo_sil.cli.generate import generate, which_controller
 from mambo_sil.cli.margins import margins
 from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
 from mambo_sil.cli.start import doctor, init, playground
@@ -34,7 +34,7 @@ PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
         "diff": diff,
         "margins": margins,
     },
-    "Generate": {"generate": generate, "identify-binary": identify_binary},
+    "Generate": {"generate": generate, "which-controller": which_controller},
     "Fly": {
         "fly": fly,
         "plan": plan,
@@ -43,7 +43,7 @@ PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
         "faults": faults,
         "replay": replay,
     },
-    "Board": {"footprint": footprint, "sweep": sweep, "same-bits": same_bits},
+    "Board": {"footprint": footprint, "sweep": sweep, "check-bits": check_bits},
     "Evidence": {"verify": verify, "regress": regress, "table2": table2, "report": report},
 }
 """Commands by name, in the panels and the order of the help."""
@@ -79,8 +79,8 @@ mambo-nmpc footprint
 mambo-nmpc footprint controller.toml --board crazyflie -o footprint
 mambo-nmpc footprint --board mega --board my-board.toml --json
 mambo-nmpc footprint controller.toml --port /dev/ttyACM0 -o measured
-mambo-nmpc same-bits mambo --board mambo --board crazyflie
-mambo-nmpc same-bits controller.toml --port /dev/ttyACM0
+mambo-nmpc check-bits mambo --board mambo --board crazyflie
+mambo-nmpc check-bits controller.toml --port /dev/ttyACM0
 mambo-nmpc sweep --vary cost.response_time_s=0.1:0.5:5 -o sweep
 mambo-nmpc sweep mambo-1norm --vary horizon.prediction=5:30:6 --vary optimizer.iterations=3:9:3 --fit
 mambo-nmpc vehicles
@@ -119,8 +119,8 @@ mambo-nmpc margins
 mambo-nmpc margins controller.toml --vehicle crazyflie --sensors mocap -o margins
 mambo-nmpc margins --campaign default --drones 300
 mambo-nmpc margins controller.toml --vehicle identified/vehicle.toml --uncertainty
-mambo-nmpc identify-binary firmware.elf
-mambo-nmpc identify-binary firmware.hex controller.toml controller-old
+mambo-nmpc which-controller firmware.elf
+mambo-nmpc which-controller firmware.hex controller.toml controller-old
 mambo-nmpc playground -o play.html
 mambo-nmpc playground pd controller.toml --vehicle crazyflie -o mine.html
 mambo-nmpc report flight

@@ -1,4 +1,4 @@
-"""The commands of the panel Board: footprint, sweep, same-bits."""
+"""The commands of the panel Board: footprint, sweep, check-bits."""
 
 import contextlib
 import difflib
@@ -218,7 +218,7 @@ def _axis(text: str, settings: "Settings") -> "Axis":
     return Axis(key, tuple(dict.fromkeys(values)))
 
 
-def same_bits(
+def check_bits(
     source: Source = "mambo",
     *,
     scalar: Scalar = None,

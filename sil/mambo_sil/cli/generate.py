@@ -1,4 +1,4 @@
-"""The commands of the panel Generate: generate, identify-binary."""
+"""The commands of the panel Generate: generate, which-controller."""
 
 import json
 from dataclasses import asdict
@@ -108,7 +108,7 @@ def _report_drifts(drifts: "tuple[Drift, ...]", output: Path, *, as_json: bool) 
     typer.echo(f"{name}: up to date", err=True)
 
 
-def identify_binary(
+def which_controller(
     image: Annotated[Path, typer.Argument(help="ELF, Intel HEX, UF2 or plain binary.", metavar="FILE")],
     sources: Annotated[
         list[str] | None,

@@ -1,4 +1,4 @@
-"""`identify-binary`: which controllers a firmware image holds."""
+"""`which-controller`: which controllers a firmware image holds."""
 
 import json
 from collections.abc import Callable
@@ -68,24 +68,26 @@ def test_presets_and_sources_are_named() -> None:
     Path("image").write_bytes(version(FIXED.digest) + b"\0" + version(OWN.digest))
     Path("mine").mkdir()
     Path("mine/controller.toml").write_text(to_toml(OWN), "utf-8")
-    said, _ = run("identify-binary", "image", "mine")
+    said, _ = run("which-controller", "image", "mine")
     assert said.splitlines() == [
         f"mambo-nmpc {__version__}, settings {FIXED.short_digest}: preset mambo --scalar fixed",
         f"mambo-nmpc {__version__}, settings {OWN.short_digest}: mine",
     ]
-    unknown = json.loads(run("identify-binary", "image", "--json")[0])["controllers"][1]
+    unknown = json.loads(run("which-controller", "image", "--json")[0])["controllers"][1]
     assert unknown == {"version": __version__, "digest": OWN.short_digest, "settings": []}
-    assert "of no preset or source named" in run("identify-binary", "image")[0]
+    assert "of no preset or source named" in run("which-controller", "image")[0]
 
 
 def test_an_image_without_the_settings_given_fails() -> None:
     """Whatever else it holds; a preset that nobody named is not missed."""
     Path("image").write_bytes(version(FIXED.digest))
-    assert run("identify-binary", "image", "mambo")[1] == ""
-    assert run("identify-binary", "image", "mambo", "crazyflie", code=1)[1] == (
+    assert run("which-controller", "image", "mambo")[1] == ""
+    assert run("which-controller", "image", "mambo", "crazyflie", code=1)[1] == (
         "image: does not hold the settings of crazyflie\n"
     )
-    assert json.loads(run("identify-binary", "image", "table1", "--json", code=1)[0])["missing"] == ["table1"]
+    assert json.loads(run("which-controller", "image", "table1", "--json", code=1)[0])["missing"] == [
+        "table1"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +105,7 @@ def test_a_text_that_looks_like_a_version_is_no_controller(text: str) -> None:
     """Another length of the digest, no version, or a sentence."""
     Path("image").write_bytes(text.encode() + b"\0code")
     assert held_controllers(Path("image")) == ()
-    run("identify-binary", "image", code=1)
+    run("which-controller", "image", code=1)
 
 
 def test_the_greeting_of_a_board_is_found() -> None:
@@ -122,7 +124,7 @@ def test_a_linked_controller_is_found_if_its_version_is_called(calls: bool) -> N
     firmware = builder_with("crazyflie").guest(
         render(MAMBO, with_digest=False), glue, ("run",), Path("build")
     )
-    said, _ = run("identify-binary", str(firmware), code=0 if calls else 1)
+    said, _ = run("which-controller", str(firmware), code=0 if calls else 1)
     assert said.endswith(": preset mambo\n") if calls else "nothing calls it" in said
 
 
@@ -138,13 +140,13 @@ def test_a_linked_controller_is_found_if_its_version_is_called(calls: bool) -> N
 def test_a_damaged_image_is_refused(content: bytes, said: str) -> None:
     """With its fault and what to do, not as one without a controller."""
     Path("image").write_bytes(content)
-    assert run("identify-binary", "image", code=2)[1] == said
+    assert run("which-controller", "image", code=2)[1] == said
 
 
 def test_a_folder_without_settings_is_refused() -> None:
     """With the file that is missing."""
     Path("image").write_bytes(version(MAMBO.digest))
     Path("empty").mkdir()
-    assert run("identify-binary", "image", "empty", code=2)[1] == (
+    assert run("which-controller", "image", "empty", code=2)[1] == (
         "empty: is a folder without controller.toml; name a settings file, or the folder of a bundle\n"
     )

@@ -149,10 +149,10 @@ def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
-    """By same-bits: that of the reference, and with wrong C another one, exit 1."""
+    """By check-bits: that of the reference, and with wrong C another one, exit 1."""
     elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
     with serial_line(elf) as line:
-        said, _ = run("same-bits", "--port", line.port, "--steps", "2000")
+        said, _ = run("check-bits", "--port", line.port, "--steps", "2000")
     answer, _, _, reference, board = said.splitlines()
     assert answer == "mambo: the bits of the reference in 1 of 1 builds, over 2000 self-test steps"
     assert reference.split() == ["reference", "NumPy", board.split()[-1]]
@@ -161,7 +161,7 @@ def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
     weigh_otherwise = edited("pil.c", "(int)number, get(body)", "(int)number + 1, get(body)")
     other = build_firmware(presets.preset("mambo"), "host", tmp_path / "other", weigh_otherwise)
     with serial_line(other) as line:
-        said, _ = run("same-bits", "--port", line.port, "--steps", "200", code=1)
+        said, _ = run("check-bits", "--port", line.port, "--steps", "200", code=1)
     assert said.startswith("mambo: OTHER BITS in 1 of 1 builds, over 200 self-test steps")
     assert said.count("DIFFERS") == 1
 

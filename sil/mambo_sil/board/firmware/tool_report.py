@@ -76,7 +76,7 @@ def _needs() -> list[Finding]:
         builder_of[_OR.join(board.compiler.candidates), board.compiler.packages].append(board.name)
     return [
         _need("compiler", _host_compiler(), "compiles the C for this machine: fly, table2", "gcc"),
-        _need("compiler", "clang", "second compiler: same-bits (except AVR), verify", "clang"),
+        _need("compiler", "clang", "second compiler: check-bits (except AVR), verify", "clang"),
         *(
             _need("compiler", tool, f"builds for {', '.join(names)}", *packages)
             for (tool, packages), names in builder_of.items()
