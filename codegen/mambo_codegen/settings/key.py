@@ -1,7 +1,7 @@
 """A key of a file of settings: what messages and comments say of it, from its JSON schema."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -42,12 +42,14 @@ def spell(value: object) -> str:
 class Form:
     """A kind of file with sections: descriptions of sections, and keys, both by dotted path.
 
-    `kinds` are the sections whose key `kind` decides which others they have.
+    `kinds` are the sections whose key `kind` decides which others they have; `renamed` are keys of before,
+    with what follows "is now" in a message.
     """
 
     sections: Mapping[str, str]
     keys: Mapping[str, Key]
     kinds: frozenset[str] = frozenset()
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
 
 def key_of(path: str, schema: dict[str, Any]) -> Key:

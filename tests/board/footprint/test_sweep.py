@@ -225,6 +225,7 @@ GOOD = "limits.tilt_rad=0.2:0.3:2"
         (vary("limits.tilt=1:2:2"), "did you mean limits.tilt_rad?"),
         (vary("response_time_s=1:2:2"), "did you mean cost.response_time_s?"),
         (vary("optimizer.iterations=1:2:2"), 'controller.method = "quadratic" use; did you mean '),
+        (vary("observer.age_s=0:0.1:2"), "observer.age_s is now observer.measurement_age_s"),
         (vary("code.scalar=1:2:2"), "code.scalar is not a number"),
         *(
             (vary(f"limits.tilt_rad={span}"), "must be KEY=FIRST:LAST:COUNT with a COUNT in 1..100, such as")

@@ -295,6 +295,7 @@ FAULTS = {
     'base = "mamba"': "base: mamba is neither a preset nor a file",
     "draws.mass_kg = -1": "draws.mass_kg = -1 must lie in 0.01..1",
     "search.cost.effort = 1": "search.cost.effort = 1 must name a number of a controller.toml",
+    "search.observer.age_s = 1": "search.observer.age_s = 1 is now observer.measurement_age_s",
     "search.code.prefix = 1": "search.code.prefix = 1 must name a number",
     "search.cost.effort_weight = 1": "search.cost.effort_weight = 1 must name a number of a controller.toml",
     "search.horizon.update_period_s = 0.01": "update_period_s = 0.01 must name a number",
