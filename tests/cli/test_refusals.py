@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mambo_sil.cli.command import RENAMED
 from tests.support.command import run, unwrapped
 
 COMMANDS = ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
@@ -16,6 +17,14 @@ def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
     said, talk = run(command, "-o", "", code=2)
     assert (said, "must not be empty" in talk) == ("", True)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_a_command_of_before_names_the_new_one(old: str, new: str) -> None:
+    """In one sentence, whatever follows it; and there is a command of that name."""
+    for more in ([], ["mambo", "-o", "out"], ["--help"]):
+        assert run(old, *more, code=2) == ("", f"mambo-nmpc {old} is now mambo-nmpc {new}\n")
+    assert f"mambo-nmpc {new}" in run(new, "--help")[0]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import traceback
-from typing import Annotated, Any, Never
+from typing import Annotated, Any, Final, Never
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -30,6 +30,9 @@ EXIT_CODES = (
     "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
     "130 interrupted; 141 the reader of the output closed it; 143 terminated."
 )
+
+RENAMED: Final = {"same-bits": "check-bits", "identify-binary": "which-controller"}
+"""Commands of version 0.3 that have another name now."""
 
 
 def _without_types(parameters: list[Any]) -> list[Any]:
@@ -65,7 +68,14 @@ class RootGroup(TyperGroup):
                 sys.exit(_exit_code(leaving.__context__))
             raise
 
-    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override] # as above
+        """Find the command that `args` begin with; one of before is told its new name."""
+        if args[0] in RENAMED:
+            typer.echo(f"mambo-nmpc {args[0]} is now mambo-nmpc {RENAMED[args[0]]}", err=True)
+            raise typer.Exit(BAD_INPUT)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # as above
         """Run a command; with `--debug` print the traceback of an error first."""
         signal.signal(signal.SIGTERM, _terminate)
         try:
