@@ -8,7 +8,7 @@
 
 #include "nmpc_self_test.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xFE3FBE2AUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -106,7 +106,7 @@ NMPC_SELF_TEST_SHARED unsigned long fold_controller(unsigned long digest, const 
     unsigned long folded = fold(digest, (unsigned long)nmpc_is_saturated(self));
 
     folded = fold(folded, (unsigned long)nmpc_limits_active(self));
-    folded = fold(folded, (unsigned long)self->missed);
+    folded = fold(folded, (unsigned long)self->steps_blind);
     return fold_reals(folded, stored_numbers(self), NMPC_STORED_NUMBERS);
 }
 
@@ -387,7 +387,7 @@ static nmpc_status_t call_shift(nmpc_t *scratch, unsigned long *stream, int turn
     }
     changes[4] = (turns != 0) ? draw(stream, NMPC_SELF_TEST_YAW_RAD) : (nmpc_real_t)0;
     spoil(stream, changes, 5U);
-    return nmpc_shift(scratch, changes, &changes[2], changes[4]);
+    return nmpc_frame_jumped(scratch, changes, &changes[2], changes[4]);
 }
 
 static void draw_command(unsigned long *stream, nmpc_command_t *command)
@@ -445,11 +445,11 @@ static unsigned long fold_nulls(unsigned long digest, nmpc_t *scratch, const nmp
     refused += (unsigned long)nmpc_step(scratch, &run->state, &run->target, run->thrust_m_s2, NULL);
     refused += (unsigned long)nmpc_reset(NULL, &command);
     refused += (unsigned long)nmpc_reset(scratch, NULL);
-    refused += (unsigned long)nmpc_shift(NULL, still, still, (nmpc_real_t)0);
-    refused += (unsigned long)nmpc_shift(scratch, NULL, still, (nmpc_real_t)0);
-    refused += (unsigned long)nmpc_shift(scratch, still, NULL, (nmpc_real_t)0);
-    refused += (unsigned long)nmpc_set_command(NULL, &command);
-    refused += (unsigned long)nmpc_set_command(scratch, NULL);
+    refused += (unsigned long)nmpc_frame_jumped(NULL, still, still, (nmpc_real_t)0);
+    refused += (unsigned long)nmpc_frame_jumped(scratch, NULL, still, (nmpc_real_t)0);
+    refused += (unsigned long)nmpc_frame_jumped(scratch, still, NULL, (nmpc_real_t)0);
+    refused += (unsigned long)nmpc_report_command(NULL, &command);
+    refused += (unsigned long)nmpc_report_command(scratch, NULL);
     refused += (unsigned long)nmpc_last_estimate(scratch, NULL);
     nmpc_default_limits(NULL);
     refused += (unsigned long)nmpc_set_limits(scratch, NULL);
@@ -474,7 +474,7 @@ static unsigned long call_others(nmpc_t *scratch, nmpc_self_test_run_t *run, int
     }
     if ((turn == 2U) || (turn == 10U)) {
         draw_command(stream, &command);
-        status = nmpc_set_command(scratch, &command);
+        status = nmpc_report_command(scratch, &command);
     }
     if ((turn == 0U) || (turn == 8U)) {
         status = call_set_limits(scratch, stream);

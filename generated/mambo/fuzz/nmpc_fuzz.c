@@ -20,7 +20,7 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xFE3FBE2AUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -49,7 +49,7 @@
         } \
     } while (0)
 
-/* One call, decoded: a step reads state, target and thrust, nmpc_reset() and nmpc_set_command() start. */
+/* One call, decoded: a step reads state, target and thrust, nmpc_reset() and nmpc_report_command() start. */
 typedef struct {
     unsigned int function;
     unsigned int nulls;
@@ -142,14 +142,14 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
         status = nmpc_reset(self, no_first ? 0 : &call->start);
         break;
     case NMPC_FUZZ_SET_COMMAND:
-        status = nmpc_set_command(self, no_first ? 0 : &call->start);
+        status = nmpc_report_command(self, no_first ? 0 : &call->start);
         break;
     case NMPC_FUZZ_SET_LIMITS:
         status = nmpc_set_limits(self, no_first ? 0 : &call->limits);
         break;
     case NMPC_FUZZ_SHIFT:
-        status = nmpc_shift(self, no_first ? 0 : call->position_change_m, no_second ? 0 : call->velocity_change_m_s,
-                            call->heading_change_rad);
+        status = nmpc_frame_jumped(self, no_first ? 0 : call->position_change_m,
+                                   no_second ? 0 : call->velocity_change_m_s, call->heading_change_rad);
         break;
     case NMPC_FUZZ_SLEW_HEADING:
         command->roll_rad = nmpc_slew_heading(call->headings_rad[0], call->headings_rad[1], call->headings_rad[2]);
@@ -290,7 +290,7 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
     case NMPC_FUZZ_SHIFT:
         pointers |= NMPC_FUZZ_NULL_SECOND;
         if (!nmpc_fuzz_is_good_shift(call)) {
-            status = NMPC_BAD_SHIFT;
+            status = NMPC_BAD_JUMP;
         }
         break;
     default:
@@ -354,7 +354,7 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     (void)memcpy(&before, self, sizeof(before));
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(self, call, &command) == promised);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(twin, &other, &twin_command) == promised);
-    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_SHIFT)
+    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_JUMP)
         || (promised == NMPC_BAD_LIMITS)) {
         NMPC_FUZZ_REQUIRE(memcmp(&before, self, sizeof(before)) == 0);
         if (is_step && ((call->nulls & NMPC_FUZZ_NULL_COMMAND) == 0U)) {
@@ -362,9 +362,9 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.pitch_rad, has_self ? last->pitch_rad : (nmpc_real_t)0));
         }
     } else if (is_step && ((promised == NMPC_BAD_TARGET) || (promised == NMPC_BAD_THRUST)
-                           || ((promised == NMPC_BAD_STATE) && (before.missed >= (NMPC_OUTAGE_STEPS + 2U))))) {
+                           || ((promised == NMPC_BAD_STATE) && (before.steps_blind >= (NMPC_OUTAGE_STEPS + 2U))))) {
         /* The last command, at first less its rate feedback. */
-        if (before.missed != 0U) {
+        if (before.steps_blind != 0U) {
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, last->roll_rad));
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.pitch_rad, last->pitch_rad));
         }
@@ -398,7 +398,7 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
         NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(stored, nmpc_fuzz_stored(twin)[k]));
         NMPC_FUZZ_REQUIRE((stored - stored) == (nmpc_real_t)0);
     }
-    NMPC_FUZZ_REQUIRE((self->missed == twin->missed) && (nmpc_is_saturated(self) == nmpc_is_saturated(twin)));
+    NMPC_FUZZ_REQUIRE((self->steps_blind == twin->steps_blind) && (nmpc_is_saturated(self) == nmpc_is_saturated(twin)));
     NMPC_FUZZ_REQUIRE(nmpc_limits_active(self) == nmpc_limits_active(twin));
     NMPC_FUZZ_REQUIRE(nmpc_step(self, 0, 0, (nmpc_real_t)0, &command) == NMPC_NULL_POINTER);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, last->roll_rad));

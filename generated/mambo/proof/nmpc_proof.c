@@ -6,19 +6,19 @@
  * the tilt limit.
  *
  * There are three proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
- * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_shift(), nmpc_set_command() and
- * nmpc_set_limits() refuse it and write nothing, and a step handles a state or a target with NaN as take_numbers()
- * shows it for one with an infinity: nothing reads it. turn_everywhere() proves for every heading what take_numbers()
- * assumes of sine and cosine.
+ * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_frame_jumped(), nmpc_report_command()
+ * and nmpc_set_limits() refuse it and write nothing, and a step handles a state or a target with NaN
+ * as take_numbers() shows it for one with an infinity: nothing reads it.
+ * turn_everywhere() proves for every heading what take_numbers() assumes of sine and cosine.
  *
- * Settings 7b7cdd8416d6357c. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its
+ * Settings 31da297514394eba. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its
  * type.
  */
 #include <stddef.h>
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00133F8CUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xFE3FBE2AUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -166,7 +166,7 @@ static void slew_heading(void)
 
 static void shift(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
-    (void)nmpc_shift(self, (any_int != 0) ? input : NULL, (any_int != 0) ? &input[AXES] : NULL, input[2 * AXES]);
+    (void)nmpc_frame_jumped(self, (any_int != 0) ? input : NULL, (any_int != 0) ? &input[AXES] : NULL, input[2 * AXES]);
 }
 
 static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
@@ -198,11 +198,11 @@ static void set_limits(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_set_limits(self, (any_int != 0) ? &limits : NULL);
 }
 
-static void set_command(nmpc_t *self, const nmpc_real_t input[INPUTS])
+static void report_command(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
 
-    (void)nmpc_set_command(self, (any_int != 0) ? &command : NULL);
+    (void)nmpc_report_command(self, (any_int != 0) ? &command : NULL);
 }
 
 static void read_results(const nmpc_t *self)
@@ -223,7 +223,7 @@ static void check(const nmpc_t *self)
     const nmpc_real_t *stored = (const nmpc_real_t *)(const void *)self;
     unsigned int i;
 
-    for (i = 0U; i < (offsetof(nmpc_t, missed) / sizeof(nmpc_real_t)); i++) {
+    for (i = 0U; i < (offsetof(nmpc_t, steps_blind) / sizeof(nmpc_real_t)); i++) {
         /*@ assert stored_number_is_finite: \is_finite(stored[i]); */
         (void)stored[i];
     }
@@ -299,11 +299,11 @@ void refuse_nan(void)
         if (which < 2) {
             status = nmpc_reset(self, &command);
             /*@ assert reset_refuses_nan: status != NMPC_OK; */
-            status = nmpc_set_command(self, &command);
-            /*@ assert set_command_refuses_nan: status != NMPC_OK; */
+            status = nmpc_report_command(self, &command);
+            /*@ assert report_command_refuses_nan: status != NMPC_OK; */
         }
         if (which <= (2 * AXES)) {
-            status = nmpc_shift(self, input, &input[AXES], input[2 * AXES]);
+            status = nmpc_frame_jumped(self, input, &input[AXES], input[2 * AXES]);
             /*@ assert shift_refuses_nan: status != NMPC_OK; */
         }
         if (which < 7) {
@@ -318,8 +318,8 @@ void refuse_nan(void)
 
         /* The same together with a null pointer. */
         (void)nmpc_reset(NULL, &command);
-        (void)nmpc_shift(NULL, input, &input[AXES], input[2 * AXES]);
-        (void)nmpc_set_command(NULL, &command);
+        (void)nmpc_frame_jumped(NULL, input, &input[AXES], input[2 * AXES]);
+        (void)nmpc_report_command(NULL, &command);
         (void)nmpc_step(NULL, &state, &target, input[11], &command);
         (void)nmpc_step(self, NULL, &target, input[11], &command);
         (void)nmpc_step(self, &state, NULL, input[11], &command);
