@@ -250,6 +250,15 @@ ITEMS: Final = (
         pictures={"fast-eight.png": "pictures/fast-eight.png"},
     ),
     Item(
+        name="bound",
+        commands=("python -m benchmarks.flights.bound",),
+        controllers=("design crazyflie",),
+        paths=(*_FLIGHT, "benchmarks/flights/bound.py", "benchmarks/flights/fast.py"),
+        read=read_printed,
+        tables={"bound": printed},
+        variable="BOUND",
+    ),
+    Item(
         name="laps",
         commands=(
             "python -m benchmarks.flights.laps",
