@@ -2,8 +2,8 @@
 
 A Crazyflie in still air, from rest at the beginning of the curve, 20 s. The bound knows the whole curve from
 the first control step and has no noise: a convex problem over all commands, with the attitude model and drag
-of the settings, the tilt limit along right and forward, and the largest thrust of level flight. Prints a table
-in Markdown. Wants cvxpy with Clarabel.
+of the settings, the tilt limit along right and forward, and the largest thrust of level flight. Prints a
+table in Markdown. Wants cvxpy with Clarabel.
 """
 
 import math
