@@ -35,8 +35,8 @@ WORDS: Final[dict[MeasureName, tuple[str, str]]] = {
     "iae_60_s_m_s": ("IAE of 60 s", "m s"),
     "command_rms_rad": ("command, root mean square", "rad"),
     "touch_m_s": ("fastest touch-down", "m/s"),
-    "told_s": ("told that the position is lost after", "s"),
-    "lost_s": ("told so before", "s"),
+    "told_s": ("loss of position reported after", "s"),
+    "lost_s": ("reported before the loss, for", "s"),
     "largest_x_m": ("largest x", "m"),
 }
 
