@@ -248,7 +248,7 @@ void take_numbers(void)
             reset(self, input);
             break;
         case 2:
-            set_command(self, input);
+            report_command(self, input);
             break;
         case 3:
             read_results(&controller);
