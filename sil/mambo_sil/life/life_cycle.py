@@ -337,7 +337,7 @@ class LifeCycle:
             self._finish(f"no flight: {fault}", good=False)
         else:
             self._place_m = estimate.position_m
-            self.delay_s = preflight.delay_s
+            self.delay_s = self.steering.prediction.delay_s = preflight.delay_s
             self.steering.hover_thrust = self.steering.mean_thrust = preflight.hover_thrust
             self._enter(Phase.ARMING)
         return []

@@ -13,6 +13,7 @@ from mambo_sil.errors import LinkError
 from mambo_sil.flight.frames import turned_tilt, wrapped
 from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 from mambo_sil.life.lean import Lean
+from mambo_sil.life.prediction import Prediction
 from mambo_sil.life.records import EstimatedState, SetAttitude
 from mambo_sil.life.steady_frame import FrameJump, SteadyFrame
 from mambo_sil.model.identify.signals import UPDATES
@@ -78,6 +79,7 @@ class Steering:
         self.frame = SteadyFrame()
         most_m_s2 = AT_LIMIT * controller.settings.observer.disturbance_limit_m_s2
         self.lean = Lean(controller.settings.model.drag_1_s, most_m_s2)
+        self.prediction = Prediction(controller.settings, controller.settings.height, self.hover_m_s2)
         self.take_overs = 0
         self._steps = 0
         self._record = record
@@ -95,6 +97,7 @@ class Steering:
         self._sent_rad = np.clip([roll_rad, pitch_rad], -most_rad, most_rad)
         self._sent_m_s2 = self.hover_m_s2
         self.controller.reset(self._sent_rad, thrust_m_s2=self._sent_m_s2)
+        self.prediction.begin(self._sent_rad)
         self.frame.begin(estimate)
         self.pushed_s = 0.0
         self._last = self._jump = None
@@ -119,7 +122,8 @@ class Steering:
         self._clock_s += steps * period_s
         self._follow_frame(estimate)
         self._steps += steps
-        estimate = self.lean.upright(estimate)
+        push_m_s2 = self.controller.disturbance_m_s2[0]
+        estimate = self.prediction.ahead(self.lean.upright(estimate), push_m_s2)
         last, self._last = self._last or estimate, estimate
         for left in range(steps - 1, 0, -1):
             self._step(_between(last, estimate, 1.0 - left / steps), self._goal(targets(left * period_s)))
@@ -180,8 +184,10 @@ class Steering:
         more = float(np.prod(np.cos(command_rad)) / np.prod(np.cos(leaning_rad)))
         share = more * thrust_m_s2 / self.hover_m_s2 * self.hover_thrust
         thrust = min(max(share, LEAST_THRUST), MOST_THRUST)
+        upright_m_s2 = thrust / more / self.hover_thrust * self.hover_m_s2
         if thrust != share:
-            self.controller.report_thrust(thrust / more / self.hover_thrust * self.hover_m_s2)
+            self.controller.report_thrust(upright_m_s2)
+        self.prediction.sent(estimate.time_s, command_rad, upright_m_s2, passed_s)
         self._sent_rad, self._sent_m_s2 = command_rad, thrust_m_s2
         self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
         self.is_accepted = int(outcome.status) == 0
