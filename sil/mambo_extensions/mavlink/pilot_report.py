@@ -43,7 +43,8 @@ COLUMNS: Final = (
     *("roll_command_rad", "pitch_command_rad", THRUST, THRUST_COMMAND, "status"),
     *(TAKE_OVERS, UPDATE, START_THRUST, JUMPS, *JUMP),
 )
-"""The target is the one that the controller got: off by what remains of the jumps of the estimator.
+"""What the controller got: the state ahead of the estimate by the delay of the link, from 10 ms each way on,
+and the target off by what remains of the jumps of the estimator.
 
 Roll and pitch, measured and commanded, are less the lean against the wind at a take-over.
 """

@@ -35,6 +35,7 @@ class Update:
     """One step of the controller: what it got, and what it commanded."""
 
     estimate: EstimatedState
+    """As the controller got it: ahead by the delay of the link."""
     target: TargetState
     """As the controller got it: off by the rest of the jumps of the estimator."""
     command_rad: tuple[float, float]
