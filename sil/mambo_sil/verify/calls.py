@@ -11,12 +11,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods import Method
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.methods.shared.inputs import Status, choose
 from mambo_codegen.numbers.representation import THRUST
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.step_inputs import StepRows
+from mambo_sil.verify.step_inputs import StepRows, method_of
 
 Tape = NDArray[Any]
 """A sequence of calls, an array of `call_type`."""
@@ -130,7 +130,20 @@ def tape_from(settings: Settings, content: bytes) -> Tape:
 
 
 def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
-    """Run all `tapes` at once, each on its own reference controller, and return the outcomes."""
+    """Run each tape on its own reference controller, and return the outcomes.
+
+    Tapes of alike lengths run at once; the few long ones run apart, so that the others end early.
+    """
+    lengths = np.array([len(tape) for tape in tapes], np.intp)
+    is_long = lengths > 2 * np.median(lengths) if len(tapes) else np.zeros(0, np.bool_)
+    found: dict[int, Outcomes] = {}
+    for indices in (np.flatnonzero(~is_long), np.flatnonzero(is_long)):
+        found |= zip(indices.tolist(), _run_at_once(settings, [tapes[at] for at in indices]), strict=True)
+    return [found[at] for at in range(len(tapes))]
+
+
+def _run_at_once(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
+    """Run tapes side by side; those that have ended make calls that are refused."""
     longest = max((len(tape) for tape in tapes), default=0)
     padded = np.zeros((len(tapes), longest), call_type(settings))
     padded["call"] = ApiFunction.RESET | (NULL_SELF << 2)
@@ -144,7 +157,7 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
 class _Runs:
     """n reference controllers; at each call, each of them may have another function called.
 
-    Every function is called for all controllers; those that it is not meant for keep their memory.
+    A function that is called for some is called for all; those that it is not meant for keep their memory.
     """
 
     def __init__(self, settings: Settings, n: int) -> None:
@@ -185,10 +198,11 @@ class _Runs:
         status = np.zeros(len(now), np.int64)
         with np.errstate(all="ignore"):
             for wanted in (one for one in runs if one in self._api):
-                before, is_meant = controller.memory, function == wanted
-                made = runs[wanted](self._si_values(now, wanted))
-                controller.memory = choose(is_meant & ~null, controller.memory, before)
-                status = np.where(is_meant, made, status)
+                before, is_made = controller.memory, (function == wanted) & ~null
+                if is_made.any():
+                    made = runs[wanted](self._si_values(now, wanted))
+                    controller.memory = choose(is_made, controller.memory, before)
+                    status = np.where(is_made, made, status)
             slewed = self._slewed(now)
         self._initialise((function == ApiFunction.INIT) & ~null)
 

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.tracker_constants import target_limit_m_s2
 from mambo_codegen.numbers.representation import (
     ATTITUDE_LIMIT_RAD,
@@ -30,6 +29,7 @@ from mambo_sil.verify.step_inputs import (
     around,
     completed,
     floating,
+    method_of,
     random_steps,
 )
 from mambo_sil.verify.target_cases import observed_motion, target_motion

@@ -2,12 +2,14 @@
 
 import itertools
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods import Method, method_of
+from mambo_codegen import methods
+from mambo_codegen.methods import Method
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import TARGET
@@ -28,6 +30,12 @@ VELOCITY = slice(2, 4)
 TILT = slice(4, 6)
 YAW = 6
 """Columns of the state; the target's come after it and begin with position and velocity too."""
+
+
+@lru_cache(maxsize=4)
+def method_of(settings: Settings) -> Method:
+    """Return the method of `settings`, whose constants are derived once for all cases."""
+    return methods.method_of(settings)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.tracker_constants import TrackerConstants
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.calls import ApiFunction, Tape, calls
-from mambo_sil.verify.step_inputs import VELOCITY, Array, StepRows, around
+from mambo_sil.verify.step_inputs import VELOCITY, Array, StepRows, around, method_of
 
 
 def target_motion(settings: Settings, tracker: TrackerConstants) -> Iterator[Tape]:
