@@ -9,10 +9,11 @@ from pydantic import ValidationError
 from mambo_codegen.errors import echo
 from mambo_codegen.toolchain import host_toolchain
 from mambo_extensions.crazyflie.desk import desk_library, events_file
-from mambo_extensions.crazyflie.desk.desk_events import broken, fly_events, measure
+from mambo_extensions.crazyflie.desk.desk_events import broken, fly_events, measure, passed
 from mambo_extensions.crazyflie.desk.desk_report import DESK_FILES, DeskSummary, draw_flight, write_trace
 from mambo_extensions.crazyflie.desk.events_file import EventsFile, SensorsSection
 from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, OtherFlight, Output, Runner
+from mambo_sil.cli.fly.one_flight import duration_of
 from mambo_sil.cli.options import load, show_result
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import CURVE_FORMS, CurveName
@@ -62,6 +63,7 @@ def fly_app(
             seed=conditions.seed,
             measures=measures,
             broken=broken(measures, file),
+            passed=passed(trace, file),
             console=trace.console,
         )
         summary.write(folder)
@@ -80,12 +82,12 @@ def _course(course: Course) -> EventsFile:
                 trajectory=name,
                 size_m=SIZE_M if course.size_m is None else course.size_m,
                 rate_rad_s=RATE_RAD_S if course.rate_rad_s is None else course.rate_rad_s,
-                duration_s=course.duration_s,
+                duration_s=duration_of(course),
             )
     if not is_curve_file(course.trajectory):
         raise FlightError(f"--trajectory {echo(course.trajectory)} must be {CURVE_FORMS}")
     flown, _ = load_curve(course.trajectory)
-    check_curve(echo(course.trajectory), flown, course.duration_s)
+    check_curve(echo(course.trajectory), flown, duration_of(course))
     height_m = float(vertical_of(flown, np.zeros(1))[0, 0])
     if not events_file.LEAST_HEIGHT_M <= height_m <= events_file.MOST_HEIGHT_M:
         raise FlightError(
@@ -95,7 +97,7 @@ def _course(course: Course) -> EventsFile:
     return _without_events(
         trajectory=course.trajectory,
         height_m=height_m,
-        duration_s=course.duration_s,
+        duration_s=duration_of(course),
         set_points={"acceleration": bool(known_of(flown))},
     )
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from mambo_sil.cli.fly.fly_options import Course, CurveChoice, CurveRate, CurveSize, CurveTime
+from mambo_sil.cli.fly.fly_options import Course, CurveChoice, CurveRate, CurveSize
 from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show_result
 from mambo_sil.cli.progress import Bar, progress_bar
 from mambo_sil.errors import PilotError
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mambo_sil.life.steering import Update
 
 HEIGHT_M: Final = 1.5
+DURATION_S: Final = 30.0
 
 
 def pilot(
@@ -43,7 +44,14 @@ def pilot(
     trajectory: CurveChoice = "gerono",
     size_m: CurveSize = None,
     rate_rad_s: CurveRate = None,
-    duration_s: CurveTime = 30.0,
+    duration_s: Annotated[
+        float | None,
+        typer.Option(
+            help=f"Time on the curve, in s; by default {DURATION_S:g}, or that of a plan, of a closed one "
+            "two laps.",
+            metavar="S",
+        ),
+    ] = None,
     height_m: Annotated[
         float | None,
         typer.Option(
@@ -68,12 +76,13 @@ def pilot(
     from mambo_extensions.mavlink.pilot import Pilot
     from mambo_extensions.mavlink.pilot_report import LOG, PICTURES, TRACE, PilotSummary, trace_of, write_log
     from mambo_sil.api.api_controller import Controller
-    from mambo_sil.cli.fly.one_flight import curve_of
+    from mambo_sil.cli.fly.one_flight import curve_of, duration_of
     from mambo_sil.flight.traces import write_npz
     from mambo_sil.flight.trajectories import is_spatial, vertical_of
 
     settings = load(source, scalar)
-    curve = curve_of(Course(trajectory, size_m, rate_rad_s, duration_s))
+    course = Course(trajectory, size_m, rate_rad_s, duration_s)
+    curve, lasts_s = curve_of(course), duration_of(course, DURATION_S)
     if height_m is None:
         height_m = float(vertical_of(curve, 0.0)[0]) if is_spatial(curve) else HEIGHT_M
     open_link = _opener(source, link, simulate, vehicle, key)
@@ -85,7 +94,7 @@ def pilot(
         try:
             with flown:
                 flown.take_off(height_m)
-                flown.fly(curve, duration_s)
+                flown.fly(curve, lasts_s)
                 flown.land()
         except PilotError:
             pass  # the summary says how it ended

@@ -67,7 +67,8 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
             with progress_bar("flying") as progress:
                 trace = simulate(flight, controller, progress)
         fields = summary_fields(course, conditions, runner, flight, settings)
-        fields |= judge(trace, settings, drone, Scenario()) | board_fields(board, controller)
+        fields |= judge(trace, settings, drone, Scenario(), flight.trajectory)
+        fields |= board_fields(board, controller)
         fields |= {"baud": runner.baud or BAUD} | _emulated(settings, board.greeting.board)
         summary = BoardFlightSummary(
             **fields

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,31 +22,28 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.names import DEFAULT_SENSORS
+from mambo_sil.flight.passing import PassedPoint, distances_m
 from mambo_sil.flight.polynomials import PiecesInSpace
 from mambo_sil.flight.scenario import choose_sensors
 from mambo_sil.flight.traces import Trace
 
 RUN_IN_S, REST_S = 2.0, 1.0
 """Before the plan begins, in which controllers learn the weight; and at the last point behind its end."""
-LATE_S: Final = 0.4
-"""A drone passes a point within this of its time, and within half a piece."""
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """Pieces that begin after `wait_s`, flown once or in laps; before, the target comes at their first speed.
+    """Pieces that begin after `wait_s`; before, the target comes at their first speed.
 
     It begins to climb so late that it comes from no lower than half of their first height.
     """
 
     pieces: PiecesInSpace
     wait_s: float
-    laps: bool
     known: ClassVar = MOST_KNOWN
 
     def _clock(self, time_s: ArrayLike) -> FloatArray:
-        since_s, lap_s = np.asarray(time_s) - self.wait_s, self.pieces.duration_s
-        return np.asarray(since_s % lap_s if self.laps else since_s)
+        return np.asarray(np.asarray(time_s) - self.wait_s)
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -137,7 +134,7 @@ class Drones:
     ) -> FlownPlan:
         flights = int(np.size(vehicle.airframe.mass_kg))
         closed = course.choice.closed
-        target = Waiting(pieces_of(course.knots, course.duration_s), RUN_IN_S, laps=closed)
+        target = Waiting(pieces_of(course.knots, course.duration_s), RUN_IN_S)
         (_, _, x_m_s, y_m_s), (_, climb_m_s, _) = target.target(0.0), target.vertical(0.0)
         judged_s = RUN_IN_S + (course.time_s if closed else 0.0)
         period_s = self.settings.horizon.update_period_s
@@ -156,10 +153,13 @@ class Drones:
         trace = fly(flight, CompiledController(self.settings, flights))
         planned = trace.time_s >= judged_s
         tilt_rad = np.arccos(np.cos(trace.euler_rad[planned, :, 0]) * np.cos(trace.euler_rad[planned, :, 1]))
+        axes = 2 if self.settings.height is None else 3
+        passed_s = judged_s + np.concatenate([[0.0], np.cumsum(course.duration_s)])
+        path_m = (trace.position_m * [1.0, -1.0, -1.0])[..., :axes]
         return FlownPlan(
-            _off_m(trace, course, points, judged_s, axes=2 if self.settings.height is None else 3),
+            distances_m(trace.time_s, path_m, passed_points(points, course), passed_s),
             detect_crashes(trace, vehicle.drone),
-            _error_m(trace, judged_s, axes=2 if self.settings.height is None else 3),
+            _error_m(trace, judged_s, axes),
             tilt_rad.max(axis=0),
             trace.thrust_acceleration_m_s2[planned].max(axis=0),
         )
@@ -172,44 +172,18 @@ def _error_m(trace: Trace, begins_s: float, axes: int) -> FloatArray:
     return np.asarray(error_m[trace.time_s >= begins_s].max(axis=0))
 
 
+def passed_points(points: Sequence[PlanPoint], course: PlannedCourse) -> tuple[PassedPoint, ...]:
+    """Return the points that are judged; a gate at which the drone stops is not crossed."""
+    found = []
+    for knot in judged_of(course):
+        number = course.choice.point_of(knot)
+        point = points[number - 1]
+        stops = knot == course.choice.count and not course.choice.closed
+        normal = None if point.normal is None or stops else point.normal
+        found.append(PassedPoint(number, point.position_m, point.reach_m, normal))
+    return tuple(found)
+
+
 def judged_of(course: PlannedCourse) -> range:
     """Return the knots whose points are judged: all but the first, where the drone begins."""
     return range(1, course.choice.count + 1)
-
-
-def _off_m(
-    trace: Trace, course: PlannedCourse, points: Sequence[PlanPoint], begins_s: float, axes: int
-) -> FloatArray:
-    """Return how far from each judged point the drones pass (n, p), along the first `axes`; NaN if lost."""
-    path_m = (trace.position_m * [1.0, -1.0, -1.0])[..., :axes]
-    times_s = begins_s + np.concatenate([[0.0], np.cumsum(course.duration_s)])
-    found = []
-    for knot in judged_of(course):
-        near_s = min(LATE_S, *(0.5 * course.duration_s[knot - 1 : knot + 1]))
-        first, last = np.searchsorted(trace.time_s, [times_s[knot] - near_s, times_s[knot] + near_s])
-        part = path_m[max(first - 1, 0) : last + 1]
-        point = points[course.choice.point_of(knot) - 1]
-        place = part - np.array(point.position_m[:axes])
-        stops = knot == course.choice.count and not course.choice.closed
-        if point.normal is None or stops:
-            found.append(_nearest_m(place))
-        else:
-            found.append(_crossed_m(place, np.array(point.normal[:axes])))
-    return np.stack(found, axis=-1)
-
-
-def _nearest_m(place: FloatArray) -> FloatArray:
-    """Return the least distance (n,) of paths (k, n, 3), straight between their samples, from the origin."""
-    step = np.diff(place, axis=0)
-    square = np.maximum(np.sum(step * step, axis=-1), 1e-18)
-    share = np.clip(-np.sum(place[:-1] * step, axis=-1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(place[:-1] + share[..., np.newaxis] * step, axis=-1).min(axis=0))
-
-
-def _crossed_m(place: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return how far from the origin paths (k, n, 3) cross its plane along the normal; infinity without."""
-    along = place @ normal
-    crosses = (along[:-1] < 0.0) & (along[1:] >= 0.0)
-    share = np.where(crosses, -along[:-1] / np.where(crosses, along[1:] - along[:-1], 1.0), 0.0)
-    there = place[:-1] + share[..., np.newaxis] * np.diff(place, axis=0)
-    return np.asarray(np.where(crosses, np.linalg.norm(there, axis=-1), np.inf).min(axis=0))

@@ -6,11 +6,10 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_extensions.plan.hermite import pieces_of
 from mambo_extensions.plan.plan_flight import judged_of
 from mambo_extensions.plan.planning import Planned, shares_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.flight.polynomials import COLUMNS
+from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS
 from mambo_sil.results.blocks import Block, CommandResult, ResultTable, Sentence
 from mambo_sil.results.number_format import distance
 from mambo_sil.results.summary import Number, Summary
@@ -170,12 +169,14 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
 
 
 def csv_text(planned: Planned) -> str:
-    """Return the pieces as a CSV file: a duration, and the coefficients along x, y, z and of the heading."""
-    lines = [",".join(COLUMNS)]
-    pieces = pieces_of(planned.course.knots, planned.course.duration_s)
-    for piece, yaw in zip(pieces.pieces, planned.yaw, strict=True):
+    """Return the pieces as a CSV file: `COLUMNS`, and `POINT_COLUMNS` of the point at the end of each."""
+    lines = [",".join((*COLUMNS, *POINT_COLUMNS))]
+    curve = planned.curve
+    for piece, yaw, point in zip(curve.pieces, planned.yaw, curve.points, strict=True):
         left = [0.0 - one for one in piece.east]
-        lines.append(_row([piece.duration_s, *piece.north, *left, *piece.height, *yaw.tolist()]))
+        polynomials = _row([piece.duration_s, *piece.north, *left, *piece.height, *yaw.tolist()])
+        place, normal = _row([*point.place_m, point.reach_m]), _row(point.normal or ()) or ",,"
+        lines.append(f"{polynomials},{point.number},{place},{normal}")
     return "\n".join(lines) + "\n"
 
 

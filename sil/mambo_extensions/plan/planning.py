@@ -5,6 +5,7 @@ larger share is quicker, and some drone then passes a point too far away: the fl
 that all fly.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -13,17 +14,19 @@ import numpy as np
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
+from mambo_extensions.plan import LEAST_RATE
 from mambo_extensions.plan.course import PlannedCourse, course_of
 from mambo_extensions.plan.heading import first_heading, headings_of
-from mambo_extensions.plan.hermite import motion
+from mambo_extensions.plan.hermite import motion, pieces_of
 from mambo_extensions.plan.limits import FlightLimit, figures_of, limits_of
-from mambo_extensions.plan.plan_flight import Drones, FlownPlan, judged_of
+from mambo_extensions.plan.plan_flight import Drones, FlownPlan, judged_of, passed_points
 from mambo_extensions.plan.points import PlanPoint
 from mambo_extensions.plan.solver import HELD, first_course, passed_at_knots, silent, solve
 from mambo_sil.api.campaigns import draw_vehicles
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.errors import PlanError
+from mambo_sil.flight.polynomials import PiecesInSpace
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 SHARES: Final = (0.35, 4.0)
@@ -37,6 +40,8 @@ FINE: Final = 1.03
 TRIES: Final = 8
 SURE: Final = 0.85
 """Of a tolerance, what the flown drones must not leave: others fly a little wider."""
+SLOWER: Final = np.concatenate([np.arange(0.99, 0.1, -0.01), 0.1 * 0.9 ** np.arange(40.0)])
+"""Speeds of a plan at which it may keep the limits, over that at which it does not."""
 DENSE: Final = (np.arange(65) / 64.0).astype(np.float64)
 """Times in a piece at which a plan is judged: others than those at which it was made."""
 
@@ -61,6 +66,12 @@ class Planned:
     height_judged: bool
 
     @property
+    def curve(self) -> PiecesInSpace:
+        """The pieces, and the points at their ends."""
+        pieces = pieces_of(self.course.knots, self.course.duration_s).pieces
+        return PiecesInSpace(pieces, passed_points(self.points, self.course))
+
+    @property
     def reach_m(self) -> FloatArray:
         """How far from each judged point a drone may pass (p,)."""
         return reach_of(self.points, self.course)
@@ -73,7 +84,7 @@ class Planned:
 
 def reach_of(points: Sequence[PlanPoint], course: PlannedCourse) -> FloatArray:
     """Return how far from each judged point a drone may pass (p,)."""
-    return np.array([points[course.choice.point_of(knot) - 1].reach_m for knot in judged_of(course)])
+    return np.array([point.reach_m for point in passed_points(points, course)])
 
 
 def shares_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
@@ -107,9 +118,9 @@ def make_plan(
         settings = controller_toml.parse(chosen_text(drone, drone.name), f"settings for {drone.name}")
     drawn = draw_vehicles(vehicle, drones, seed)
     figures = figures_of(drone, settings, drawn)
-    search = _Search(
-        tuple(points), course_of(points, closed=closed), Drones.of(vehicle, drawn, settings), rate, progress
-    )
+    first = course_of(points, closed=closed)
+    _require_speeds(first, figures.speed_m_s)
+    search = _Search(tuple(points), first, Drones.of(vehicle, drawn, settings), rate, progress)
     share = 1.0
     if points[0].time_s is not None:
         course = _timed(search, limits_of(figures))
@@ -123,6 +134,17 @@ def make_plan(
     return Planned(
         tuple(points), course, limits_of(figures, share), share, flown, yaw, settings.height is not None
     )
+
+
+def _require_speeds(course: PlannedCourse, most_m_s: float) -> None:
+    """Raise PlanError for a point whose speed in the plane is above the limit."""
+    for knot, (x_m_s, y_m_s, _) in enumerate(course.knots[:, 1]):
+        speed_m_s = math.hypot(x_m_s, y_m_s)
+        if speed_m_s > most_m_s:
+            raise PlanError(
+                f"point {course.choice.point_of(knot)}: its speed in the plane, {speed_m_s:g} m/s, is above "
+                f"limits.speed_m_s = {most_m_s:g}; {most_m_s:g} or less would do"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,19 +247,23 @@ def _timed(search: _Search, limits: list[FlightLimit]) -> PlannedCourse:
     course = search.first.smooth(np.diff(times_s)).slower(search.rate)
     over = _over(course, limits)
     if over.max() > 1e-6:
-        keeps = [
-            rate
-            for rate in np.arange(0.99, 0.02, -0.01)
-            if shares_of(course.slower(rate), limits).max() <= 1.0
-        ]
-        cure = (
-            f"--rate {search.rate * keeps[0]:.2f} would do"
-            if keeps
-            else "no slower flight of this path would do"
-        )
+        cure = _slower_words(course, limits, search.rate)
         raise PlanError(f"{_passed_words(course, limits, over)}; {cure}")
     search.progress("flying", 0.5)
     return course
+
+
+def _slower_words(course: PlannedCourse, limits: Sequence[FlightLimit], rate: float) -> str:
+    """Return at which rate a course flown at `rate` would keep the limits, or with which times."""
+    keeps = (one for one in SLOWER if shares_of(course.slower(one), limits).max() <= 1.0)
+    found = next(keeps, None)
+    if found is None:
+        return "no slower flight of this path would do"
+    # the rate that is read is a hundredth at most below this one
+    offered = math.floor(100.0 * rate * found + 1e-9) / 100.0
+    if offered >= LEAST_RATE:
+        return f"--rate {offered:.2f} would do"
+    return f"times that are {math.ceil(1.0 / found)} times as long would do"
 
 
 def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: FloatArray) -> str:
@@ -265,8 +291,10 @@ def _missed_words(
     point = course.choice.point_of(judged_of(course)[worst])
     if flown.crashed.any():
         crashed = int(flown.crashed.sum())
+        lowest = min(range(len(points)), key=lambda one: points[one].z_m)
         return (
-            f"{crashed} of {len(flown.crashed)} drones crash on the slowest plan; a point higher up would do"
+            f"{crashed} of {len(flown.crashed)} drones crash on the slowest plan; a higher place for point "
+            f"{lowest + 1}, z = {points[lowest].z_m:g}, the lowest, may do"
         )
     far_m = float(off_m[:, worst].max())
     kind = "width" if points[point - 1].normal is not None else "tolerance"

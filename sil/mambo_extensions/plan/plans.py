@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from mambo_extensions.plan import LEAST_RATE, MOST_DRONES
-from mambo_extensions.plan.hermite import pieces_of
 from mambo_extensions.plan.plan_plots import draw_plan
 from mambo_extensions.plan.plan_report import PlanSummary, csv_text, summary_of
 from mambo_extensions.plan.planning import Planned, Progress, make_plan
@@ -26,7 +25,7 @@ from mambo_sil.results.terminal import result_text
 class Plan:
     """A course through points, and how drones have flown it; `print` shows that.
 
-    curve:   polynomial pieces, without headings; `fly` and adapters fly them.
+    curve:   polynomial pieces, without headings, and the points at their ends; `fly` and adapters fly them.
     summary: time, distances, limits and flights.
     """
 
@@ -86,8 +85,7 @@ def plan(
         seed=seed,
         progress=progress,
     )
-    course = planned.course
-    return Plan(pieces_of(course.knots, course.duration_s), summary_of(planned, vehicle.drone), planned)
+    return Plan(planned.curve, summary_of(planned, vehicle.drone), planned)
 
 
 def _points(points: object, *, closed: bool) -> tuple[PlanPoint, ...]:

@@ -135,7 +135,9 @@ def _check(place: str, point: PlanPoint) -> None:
 
 def _require_sizes(place: str, point: PlanPoint, vectors: Sequence[tuple[str, Vector | None]]) -> None:
     ranges = (
-        *((axis, value, -LARGEST_M, LARGEST_M) for axis, value in zip("xyz", point.position_m, strict=True)),
+        ("x", point.x_m, -LARGEST_M, LARGEST_M),
+        ("y", point.y_m, -LARGEST_M, LARGEST_M),
+        ("z", point.z_m, 0.0, LARGEST_M),
         ("tolerance", point.tolerance_m, LEAST_TOLERANCE_M, LARGEST_M),
         ("width", point.width_m, 2.0 * LEAST_TOLERANCE_M, LARGEST_M),
         ("speed", point.speed_m_s, 0.0, 1000.0),
@@ -149,7 +151,8 @@ def _require_sizes(place: str, point: PlanPoint, vectors: Sequence[tuple[str, Ve
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise TrajectoryError(f"{place}: {name} = {echo(repr(value))} must be a number")
         if not least <= value <= most:
-            raise TrajectoryError(f"{place}: {name} = {value:g} must lie in {least:g}..{most:g}")
+            floor = ": the floor is at 0" if name == "z" and value < 0.0 else ""
+            raise TrajectoryError(f"{place}: {name} = {value:g} must lie in {least:g}..{most:g}{floor}")
 
 
 def _rows(text: str) -> dict[str, dict[str, float]]:

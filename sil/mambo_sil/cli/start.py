@@ -90,6 +90,10 @@ def playground(
     chosen = sources or DEFAULTS
     found, drone = page_controllers(chosen), load_drone(vehicle, *chosen)
     course = None if plan is None else PiecesInSpace.read(plan)
+    if plan is not None and vehicle is None and sources is None:
+        raise typer.BadParameter(
+            "name the drone that the plan is for, with --vehicle, or its controller.toml", param_hint="--plan"
+        )
     with new_page(output, "page") as write:
         with progress_bar("compiling") as bar:
             text, flown = playground_page(found, drone, bar, course)

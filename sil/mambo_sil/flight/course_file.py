@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import io
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -43,8 +44,12 @@ def header_of(text: str) -> list[str]:
     return []
 
 
-def rows_of(text: str, columns: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def rows_of(
+    text: str, columns: Sequence[str], may_be_empty: Sequence[str] = ()
+) -> dict[str, tuple[float, ...]]:
     """Return the numbers under `columns` of every row of a CSV file that is not blank, by its line.
+
+    may_be_empty: columns whose fields may be empty: NaN.
 
     Raises `TrajectoryError`, which names line, column and rule.
     """
@@ -61,16 +66,21 @@ def rows_of(text: str, columns: Sequence[str]) -> dict[str, tuple[float, ...]]:
             line = f"line {rows.line_num}"
             if len(row) > len(header):
                 raise TrajectoryError(f"{line}: has more fields than the {len(header)} of the header")
-            found[line] = tuple(_number(row[header.index(name) :][:1], line, name) for name in columns)
+            found[line] = tuple(
+                _number(row[header.index(name) :][:1], line, name, may_be_empty=name in may_be_empty)
+                for name in columns
+            )
     except csv.Error as error:
         raise TrajectoryError(f"line {rows.line_num}: is not CSV: {error}") from None
     return found
 
 
-def _number(field: Sequence[str], line: str, column: str) -> float:
+def _number(field: Sequence[str], line: str, column: str, *, may_be_empty: bool) -> float:
     """Return one field of a CSV row as a number; no field is one missing at the end of the row."""
     text = "".join(field)
     if not text.strip():
+        if may_be_empty:
+            return math.nan
         raise TrajectoryError(f"{line}: {column} is missing")
     try:
         return float(text)

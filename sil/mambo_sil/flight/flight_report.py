@@ -25,8 +25,11 @@ from mambo_sil.flight.flight_marks import NO_MARKS, FlightMarks
 from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES, flies_settings
 from mambo_sil.flight.own_curve import is_curve_file
+from mambo_sil.flight.passing import PassedSummary, missed_words
+from mambo_sil.flight.polynomials import Pieces
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_npz
+from mambo_sil.flight.trajectories import Trajectory
 from mambo_sil.results.blocks import (
     Block,
     CommandResult,
@@ -61,6 +64,8 @@ class FlightSummary(ReportedSummary):
     """x_min, y_min, x_max, y_max, if there is a fence; None for no wall."""
     speed_limit_m_s: float | None = None
     """The speed limit, if the flight came near it."""
+    passed: list[PassedSummary] | None = None
+    """Of the points of a plan those whose time had come."""
 
     @property
     def columns(self) -> dict[str, dict[str, float]]:
@@ -74,9 +79,10 @@ class FlightSummary(ReportedSummary):
 
     @property
     def good(self) -> bool:
-        """Whether the drone stayed under control, and an emulated flight has the bits of the host."""
+        """Whether the drone stayed under control and passed all points, with the bits of the host."""
         controlled = not self.lost and self.crash is None and not self.mostly_refused
-        return controlled and self.same_bits_as_host is not False
+        missed = any(one.missed for one in self.passed or ())
+        return controlled and not missed and self.same_bits_as_host is not False
 
     def _result(
         self, folder: Path, name: str, title: str, flown: "FlySummary | Scenario", facts: dict[str, str]
@@ -131,10 +137,12 @@ class FlightSummary(ReportedSummary):
             yield "LOST: the drone diverged before the end of the flight"
         elif self.mostly_refused:
             yield "NOT CONTROLLED: the controller refused more than half of its inputs"
+        if self.passed:
+            yield missed_words(self.passed)
 
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        optional = ("metrics_without_transient", "metrics_as_seen", "walls_m", "speed_limit_m_s")
+        optional = ("metrics_without_transient", "metrics_as_seen", "walls_m", "speed_limit_m_s", "passed")
         return {key: value for key, value in dump(self).items() if value is not None or key not in optional}
 
 
@@ -301,10 +309,15 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
 
 
 def judge(
-    trace: Trace, settings: Settings, drone: VehicleFile, limited: Scenario | None = None
+    trace: Trace,
+    settings: Settings,
+    drone: VehicleFile,
+    limited: Scenario | None = None,
+    course: Trajectory | None = None,
 ) -> dict[str, Any]:
     """Return the fields of a `FlightSummary` that follow from the trace.
 
+    course:  what was flown; the points of a plan are judged.
     limited: has the fence set in flight; None for a controller that is a PD, which has no limits.
     """
     status = trace.status[:, 0]
@@ -335,7 +348,21 @@ def judge(
         "metrics_as_seen": shown(measure(seen)) | kept(seen) if seen is not None else None,
         "walls_m": walls,
         "speed_limit_m_s": speed_m_s,
+        "passed": _passed(trace, course, level=limited is None or settings.height is None),
     }
+
+
+def _passed(trace: Trace, course: Trajectory | None, *, level: bool) -> list[PassedSummary] | None:
+    """Return how the first flight passed the points of a plan; None of a course without points.
+
+    level: the height is not the controller's, and is not judged.
+    """
+    if not isinstance(course, Pieces) or not course.points:
+        return None
+    on_course = trace.time_s >= 0.0
+    target_m = np.column_stack([trace.target[:, 0, :2], -trace.target_height_m[:, 0]])
+    error_m = ((trace.position_m[:, 0] - target_m) * (1.0, -1.0, -1.0))[on_course]
+    return course.passes(trace.time_s[on_course], error_m[:, :2] if level else error_m)
 
 
 def flight_pictures(

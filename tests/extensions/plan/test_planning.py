@@ -1,5 +1,6 @@
 """Whole plans: flown by the drones that judge them, written as pieces, refused in words."""
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -11,9 +12,9 @@ import pytest
 from mambo_extensions.plan.course import course_of
 from mambo_extensions.plan.heading import headings_of
 from mambo_extensions.plan.limits import FlightLimit, figures_of, limits_of
-from mambo_extensions.plan.plan_flight import Drones, Waiting, _crossed_m, _nearest_m
+from mambo_extensions.plan.plan_flight import Drones, FlownPlan, Waiting
 from mambo_extensions.plan.plan_report import PieceSummary, PlanSummary
-from mambo_extensions.plan.planning import _Search
+from mambo_extensions.plan.planning import _missed_words, _Search
 from mambo_extensions.plan.plans import Plan
 from mambo_extensions.plan.solver import silent
 from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
@@ -85,8 +86,33 @@ def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
     assert len(lap.read_text("utf-8").splitlines()) == 3
     _, refused = run(*arguments, "-o", str(lap), code=2)
     assert "already exists" in refused
-    flown = "fly", "crazyflie", "--vehicle", "crazyflie", "--trajectory", str(lap), "--duration-s", "5"
-    run(*flown, "--no-pictures", "-o", str(tmp_path / "flown"))
+    flown = "fly", "crazyflie", "--vehicle", "crazyflie", "--trajectory", str(lap), "--no-pictures"
+    assert "passes all 2 points" in run(*flown, "-o", str(tmp_path / "flown"))[0]
+    assert json.loads((tmp_path / "flown/summary.json").read_text("utf-8"))["duration_s"] == 5.4
+    pushed, _ = run(*flown, "--push", "2,0", "-o", str(tmp_path / "pushed"), code=1)
+    assert re.search(r"MISSES \d of 2 points; the worst is point \d, passed \d+ cm away", pushed)
+    half, _ = run(*flown, "--duration-s", "3", "-o", str(tmp_path / "half"))
+    assert "passes all 1 points" in half
+
+
+def test_the_desk_says_which_points_its_drone_missed(tmp_path: Path) -> None:
+    """The lap of a stronger drone: the exit code is 1, and `held` hides nothing."""
+    points, lap = tmp_path / "points.csv", tmp_path / "lap.csv"
+    points.write_text("x,y,z,time\n0,0,1,0\n1,0.5,1.1,0.9\n0,1,1,1.9\n", "utf-8")
+    run("plan", str(points), "--vehicle", "crazyflie-brushless", "--drones", "1", "-o", str(lap))
+    flown = (
+        "fly",
+        "--app",
+        "crazyflie",
+        "--trajectory",
+        str(lap),
+        "--no-pictures",
+        "-o",
+        str(tmp_path / "desk"),
+    )
+    said, _ = run(*flown, code=1)
+    assert "held" in said
+    assert re.search(r"MISSES \d of 2\s+points", said)
 
 
 @pytest.mark.parametrize("there", ["lap.csv", "lap.png", "lap.svg"])
@@ -108,6 +134,37 @@ def test_times_that_are_too_short_name_point_limit_and_rate() -> None:
     offered = re.search(r"--rate (0\.\d+) would do", str(raised.value))
     assert offered is not None
     assert plan(points, vehicle, drones=2, rate=float(offered[1])).curve.duration_s > 1.0
+
+
+def test_a_rate_that_the_command_refuses_is_not_offered() -> None:
+    """Times that are 50 times too short: what is said are the times that would do, and they do."""
+    points = [PlanPoint(*place, time_s=0.04 * one) for one, place in enumerate(POINTS)]
+    vehicle = Vehicle.from_preset("crazyflie")
+    with pytest.raises(PlanError, match=r"times that are \d+ times as long would do") as raised:
+        plan(points, vehicle, drones=1)
+    longer = re.search(r"are (\d+) times", str(raised.value))
+    assert longer is not None
+    later = [replace(point, time_s=int(longer[1]) * float(point.time_s or 0.0)) for point in points]
+    assert plan(later, vehicle, drones=1).curve.duration_s > 1.0
+
+
+def test_a_speed_above_the_limit_is_named() -> None:
+    """With the point and the limit, and before any search."""
+    fast = [PlanPoint(0.0, 0.0, 1.0), PlanPoint(1.0, 0.0, 1.0, speed_m_s=50.0), PlanPoint(2.0, 0.0, 1.0)]
+    with pytest.raises(
+        PlanError, match=r"point 2: its speed in the plane, 50 m/s, is above limits.speed_m_s"
+    ):
+        plan(fast, Vehicle.from_preset("crazyflie"))
+
+
+def test_a_crash_names_the_lowest_point() -> None:
+    """It is the one that a higher place may help."""
+    points = [PlanPoint(0.0, 0.0, 1.0), PlanPoint(1.0, 0.0, 0.2), PlanPoint(2.0, 0.0, 1.0)]
+    course = course_of(points, closed=False)
+    flown = FlownPlan(np.full((2, 2), 0.1), np.array([True, False]), *np.zeros((3, 2)))
+    said = _missed_words(points, np.full(2, 0.1), course, flown)
+    assert "1 of 2 drones crash" in said
+    assert "point 2, z = 0.2, the lowest" in said
 
 
 def test_a_point_behind_a_wall_is_refused() -> None:
@@ -227,21 +284,12 @@ def test_a_start_in_a_climb_near_the_ground_is_flown() -> None:
 def test_the_run_in_stays_above_the_ground(climb_m_s: float, lowest_m: float) -> None:
     """A start in a climb comes from half its height at least, at the speed and climb of the first point."""
     piece = Piece(1.0, (1.0, 2.0, *[0.0] * 6), (0.0,) * 8, (0.6, climb_m_s, *[0.0] * 6))
-    waiting = Waiting(PiecesInSpace((piece,)), 2.0, laps=False)
+    waiting = Waiting(PiecesInSpace((piece,)), 2.0)
     height, climb, _ = waiting.vertical(np.linspace(0.0, 2.0, 2001)).T
     assert height.min() == pytest.approx(lowest_m)
     np.testing.assert_allclose(np.gradient(height, 1e-3)[climb == 0.0][:-1], 0.0, atol=1e-9)
     assert (height[-1], climb[-1]) == pytest.approx((0.6, climb_m_s))
     assert waiting.target(0.0)[0] == pytest.approx(1.0 - 2.0 * 2.0)
-
-
-def test_distances_of_a_path_by_hand() -> None:
-    """A path past the origin, between its samples; through a plane beside it; and one that turns back."""
-    past = np.array([[-1.0, 0.3, 0.0], [1.0, 0.3, 0.0]])[:, np.newaxis]
-    assert _nearest_m(past) == pytest.approx([0.3])
-    normal = np.array([1.0, 0.0, 0.0])
-    assert _crossed_m(past + np.array([0.5, 0.0, 0.0]), normal) == pytest.approx([0.3])
-    assert _crossed_m(past[::-1], normal) == [np.inf]
 
 
 def test_a_plan_that_begins_and_ends_in_flight_is_flown() -> None:

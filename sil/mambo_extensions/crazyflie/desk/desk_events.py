@@ -13,6 +13,8 @@ from mambo_extensions.crazyflie.desk.events_file import SENSORS, EventSection, E
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.own_curve import load_curve
+from mambo_sil.flight.passing import PassedSummary
+from mambo_sil.flight.polynomials import Pieces
 from mambo_sil.flight.trajectories import CURVES, Trajectory, vertical_of
 
 SAMPLE_MS: Final = 10
@@ -227,6 +229,15 @@ def measure(trace: DeskTrace, file: EventsFile) -> dict[MeasureName, float]:
         "lost_s": 0.001 * SAMPLE_MS * int(np.count_nonzero(trace.lost[~blind] > 0)),
         "largest_x_m": float(position[:, 0].max()),
     }
+
+
+def passed(trace: DeskTrace, file: EventsFile) -> list[PassedSummary] | None:
+    """Return how the drone passed the points of a plan; None of a course without points."""
+    curve, *_ = _curve(file)
+    if not isinstance(curve, Pieces) or not curve.points:
+        return None
+    flown = trace.time_s >= 0.0
+    return curve.passes(trace.time_s[flown], (trace.position_m - trace.target_m)[flown])
 
 
 def broken(measures: dict[MeasureName, float], file: EventsFile) -> list[MeasureName]:

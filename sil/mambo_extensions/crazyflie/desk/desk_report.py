@@ -14,6 +14,7 @@ from mambo_extensions.crazyflie.desk.desk_events import DeskTrace
 from mambo_extensions.crazyflie.desk.events_file import BoundSection, EventsFile, MeasureName
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
+from mambo_sil.flight.passing import PassedSummary, missed_words
 from mambo_sil.results.blocks import CommandResult, Picture, ResultTable, Sentence
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.pictures import inline, save
@@ -54,12 +55,13 @@ class DeskSummary(ReportedSummary):
     seed: int
     measures: dict[MeasureName, Number]
     broken: list[MeasureName]
+    passed: list[PassedSummary] | None = None
     console: str
 
     @property
     def good(self) -> bool:
-        """Whether every measure is within the bounds of the events file."""
-        return not self.broken
+        """Whether every measure is within the bounds of the events file, and no point of a plan is missed."""
+        return not self.broken and not any(one.missed for one in self.passed or ())
 
     def result(self, folder: Path, /) -> CommandResult:
         """Return the result of this flight; drawing raises ResultsError."""
@@ -74,8 +76,8 @@ class DeskSummary(ReportedSummary):
 
         return CommandResult(
             f"App {name}",
-            self.good if self.flight.bounds else None,
-            [_verdict(self)],
+            self.good if self.flight.bounds or self.passed else None,
+            [_verdict(self), *([missed_words(self.passed)] if self.passed else [])],
             [
                 Picture(picture, "Height, distance to the target and command.", [path]),
                 ResultTable(("", "", "", "bound", ""), _rows(self), (0, 2, 3, 4)),
@@ -148,7 +150,8 @@ def draw_flight(path: Path, events: EventsFile, title: str) -> tuple[Path, Path]
 def _figure(values: FloatArray, events: EventsFile, title: str) -> Figure:
     time_s, x_m, y_m, z_m, target_x_m, target_y_m, target_z_m, *commands_rad, _lost = values
     figure = Figure(figsize=(PAGE_INCHES, 5.0), layout="constrained")
-    height, distance, command = figure.subplots(3, 1, sharex=True)
+    over_time, above = figure.subfigures(1, 2, width_ratios=(1.5, 1.0))
+    height, distance, command = over_time.subplots(3, 1, sharex=True)
     flown, target = LOOKS[0].line, LOOKS[1].line
     height.plot(time_s, z_m, label="flown", **flown)
     height.plot(time_s, target_z_m, label="target", **target)
@@ -158,7 +161,13 @@ def _figure(values: FloatArray, events: EventsFile, title: str) -> Figure:
     for axes in (height, distance, command):
         for event in events.event:
             axes.axvline(event.at_s, color=QUIET, linewidth=THIN)
-    height.set(title=title, ylabel="height, m")
+    plan = above.subplots()
+    plan.plot(y_m, x_m, label="flown", **flown)
+    plan.plot(target_y_m, target_x_m, label="target", **target)
+    plan.set(xlabel="y (to the left), m", ylabel="x (ahead), m", aspect="equal", adjustable="datalim")
+    plan.invert_xaxis()  # x ahead is up, y to the left is left: as seen by who stands behind the start
+    figure.suptitle(title, parse_math=False)
+    height.set(ylabel="height, m")
     distance.set(ylabel="distance, m", ylim=(0.0, None))
     command.set(ylabel="command, rad", xlabel="time, s")
     height.legend()

@@ -50,7 +50,15 @@ CurveRate = Annotated[
     float | None,
     typer.Option(help=f"Rate of the curve, in rad/s; by default {RATE_RAD_S:g}.", metavar="RATE"),
 ]
-CurveTime = Annotated[float, typer.Option(help="Time on the curve, in s.", metavar="S")]
+DURATION_S: Final = 100.0
+CurveTime = Annotated[
+    float | None,
+    typer.Option(
+        help=f"Time on the curve, in s; by default {DURATION_S:g}, or that of a plan, of a closed one two "
+        "laps.",
+        metavar="S",
+    ),
+]
 
 
 def _known_controller(value: str) -> str:
@@ -67,7 +75,7 @@ class Course:
     trajectory: CurveChoice = "bernoulli"
     size_m: CurveSize = None
     rate_rad_s: CurveRate = None
-    duration_s: CurveTime = 100.0
+    duration_s: CurveTime = None
     start: Annotated[
         Start,
         typer.Option(help="hover, or take-off: 5 s earlier on the ground.", metavar="START"),

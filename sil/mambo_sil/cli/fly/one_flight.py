@@ -14,7 +14,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
 from mambo_codegen.settings.messages import degrees_hint
 from mambo_codegen.settings.model import Settings
-from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
+from mambo_sil.cli.fly.fly_options import DURATION_S, RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
 from mambo_sil.cli.fly.target_columns import target_columns
 from mambo_sil.cli.options import load, load_drone, show_result
 from mambo_sil.cli.progress import progress_bar
@@ -34,6 +34,7 @@ from mambo_sil.flight.flight_report import FlightSummary, FlySummary, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import CONTROLLER_NAMES, CURVE_FORMS, SIZED, TIMED, PdName, flies_settings
 from mambo_sil.flight.own_curve import check_curve, curve_named, is_curve_file, load_curve
+from mambo_sil.flight.polynomials import Pieces
 from mambo_sil.flight.scenario import (
     LARGEST_RATE_RAD_S,
     LARGEST_SEED,
@@ -82,7 +83,7 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
             trace = trace.in_space()
         fields = summary_fields(course, conditions, runner, flight, settings)
         limited = Scenario() if flies_settings(runner.controller) else None
-        fields |= judge(trace, settings, drone, limited) | {"same_bits_as_host": same_bits}
+        fields |= judge(trace, settings, drone, limited, flight.trajectory) | {"same_bits_as_host": same_bits}
         summary = FlySummary(**fields)
         write_flight(trace, summary, settings, output, folder, flight=flight)
         summary.write(folder)
@@ -130,12 +131,13 @@ def described_flight(
         sensors = choose_sensors(conditions.sensors, drone)
     except FlightError as error:
         raise FlightError(f"--{error}") from error
-    _within("--duration-s", course.duration_s, period_s, LONGEST_S)
+    duration_s = duration_of(course)
+    _within("--duration-s", duration_s, period_s, LONGEST_S)
     _within("--seed", conditions.seed, 0, LARGEST_SEED)
     try:
         flight = Flight(
             curve,
-            duration_s=course.duration_s,
+            duration_s=duration_s,
             start=course.start,
             yaw_rad=course.yaw_rad,
             vehicle=vehicle,
@@ -262,6 +264,17 @@ def _on_board(runner: Runner, settings: Settings) -> PositionController:
         return EmulatedController(settings, build_guest(settings, builder(chosen), work), core)
 
 
+def duration_of(course: Course, default_s: float = DURATION_S) -> float:
+    """Return the duration of a course: the given one, that of a file's pieces, or `default_s`.
+
+    Raises FlightError and TrajectoryError.
+    """
+    if course.duration_s is not None:
+        return course.duration_s
+    flown = load_curve(course.trajectory)[0] if is_curve_file(course.trajectory) else None
+    return flown.flown_s if isinstance(flown, Pieces) else default_s
+
+
 def curve_of(course: Course) -> Trajectory:
     """Return the curve by name, or that of a file; raises FlightError and TrajectoryError."""
     size_m, rate_rad_s = _size_and_rate(course)
@@ -269,7 +282,7 @@ def curve_of(course: Course) -> Trajectory:
         raise TrajectoryError(f"--trajectory {echo(course.trajectory)} must be {CURVE_FORMS}")
     curve = curve_named(course.trajectory, size_m or 0.0, rate_rad_s or 0.0)
     if is_curve_file(course.trajectory):
-        check_curve(echo(course.trajectory), curve, course.duration_s)
+        check_curve(echo(course.trajectory), curve, duration_of(course))
     return curve
 
 
