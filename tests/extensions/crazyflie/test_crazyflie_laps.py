@@ -9,21 +9,17 @@ import numpy as np
 import pytest
 
 from mambo_extensions.plan.hermite import pieces_of
-from mambo_sil.flight.polynomials import COLUMNS
-from tests.extensions.crazyflie.support import radio
-from tests.extensions.crazyflie.support.radio import Drone
-from tests.extensions.crazyflie.support.scripts import (
-    PLACE,
-    at_call,
-    change_values,
-    evaluate,
-    figure_of,
-    run,
-    uploaded,
-)
+from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS
+from tests.support import radio
+from tests.support.radio import Drone
+from tests.support.scripts import PLACE, at_call, change_values, evaluate, figure_of, run, uploaded
 
 PREPARED = ["set_value", "stop"]
 LANDED = ["notify", "land", "stop", "close"]
+
+
+POINT = (2, 0.0, 0.0, 1.0, 0.1, "", "", "")
+"""What the columns of a point hold, which nothing of it reads."""
 
 
 def lap(
@@ -48,13 +44,15 @@ def lap(
     rows = [
         [
             str(number)
-            for number in (1.0, *piece.north, *(-one for one in piece.east), *piece.height, *heading)
+            for number in (1.0, *piece.north, *(-one for one in piece.east), *piece.height, *heading, *POINT)
         ]
         for piece in pieces_of(knots, np.ones(count)).pieces
     ]
     for name, text in numbers.items():
         rows[0][COLUMNS.index(name)] = text
-    (tmp_path / "lap.csv").write_text("\n".join(map(",".join, [COLUMNS, *rows])) + "\n", "utf-8")
+    (tmp_path / "lap.csv").write_text(
+        "\n".join(map(",".join, [(*COLUMNS, *POINT_COLUMNS), *rows])) + "\n", "utf-8"
+    )
     return str(tmp_path / "lap.csv")
 
 

@@ -19,7 +19,7 @@ from mambo_extensions.plan.plans import Plan
 from mambo_extensions.plan.solver import silent
 from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
 from mambo_sil.errors import ArgumentError, PlanError, TrajectoryError
-from mambo_sil.flight.polynomials import Piece, PiecesInSpace, read_course
+from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS, Piece, PiecesInSpace, read_course
 from tests.support.command import run
 
 POINTS = [(0.0, 0.0, 1.0), (0.8, 0.4, 1.1), (0.6, -0.6, 1.0)]
@@ -89,30 +89,24 @@ def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
     flown = "fly", "crazyflie", "--vehicle", "crazyflie", "--trajectory", str(lap), "--no-pictures"
     assert "passes all 2 points" in run(*flown, "-o", str(tmp_path / "flown"))[0]
     assert json.loads((tmp_path / "flown/summary.json").read_text("utf-8"))["duration_s"] == 5.4
-    pushed, _ = run(*flown, "--push", "2,0", "-o", str(tmp_path / "pushed"), code=1)
+    pushed, _ = run(*flown, "--push", "5,0", "-o", str(tmp_path / "pushed"), code=1)
     assert re.search(r"MISSES \d of 2 points; the worst is point \d, passed \d+ cm away", pushed)
     half, _ = run(*flown, "--duration-s", "3", "-o", str(tmp_path / "half"))
     assert "passes all 1 points" in half
 
 
 def test_the_desk_says_which_points_its_drone_missed(tmp_path: Path) -> None:
-    """The lap of a stronger drone: the exit code is 1, and `held` hides nothing."""
-    points, lap = tmp_path / "points.csv", tmp_path / "lap.csv"
-    points.write_text("x,y,z,time\n0,0,1,0\n1,0.5,1.1,0.9\n0,1,1,1.9\n", "utf-8")
-    run("plan", str(points), "--vehicle", "crazyflie-brushless", "--drones", "1", "-o", str(lap))
-    flown = (
-        "fly",
-        "--app",
-        "crazyflie",
-        "--trajectory",
-        str(lap),
-        "--no-pictures",
-        "-o",
-        str(tmp_path / "desk"),
-    )
-    said, _ = run(*flown, code=1)
+    """1.5 m ahead in 0.6 s is too quick for it: the exit code is 1, and `held` hides nothing."""
+    there, within_s = 1.5, 0.6
+    x = [0.0] * 4 + [k * there / within_s**power for power, k in enumerate((35, -84, 70, -20), start=4)]
+    piece = [within_s, *x, *[0.0] * 8, 1.0, *[0.0] * 15]
+    rows = (*COLUMNS, *POINT_COLUMNS), (*piece, 2, there, 0, 1, 0.1, "", "", "")
+    lap = tmp_path / "lap.csv"
+    lap.write_text("".join(",".join(map(str, row)) + "\n" for row in rows), "utf-8")
+    flown = "fly", "--app", "crazyflie", "--trajectory", str(lap), "--no-pictures"
+    said, _ = run(*flown, "-o", str(tmp_path / "desk"), code=1)
     assert "held" in said
-    assert re.search(r"MISSES \d of 2\s+points", said)
+    assert re.search(r"MISSES 1 of 1 points; the worst is point 2, passed \d+\s+cm\s+away", said)
 
 
 @pytest.mark.parametrize("there", ["lap.csv", "lap.png", "lap.svg"])

@@ -145,7 +145,12 @@ def read_lap(path: str) -> tuple[Piece, ...]:
     """Return the pieces of a file of `mambo-nmpc plan`; raise ValueError if it is none."""
     with Path(path).open(newline="", encoding="utf-8") as file:
         rows = [row for row in csv.reader(file) if row]
-    if len(rows) < 2 or rows[0][0] != "duration" or any(len(row) < 33 for row in rows):
+    if (
+        len(rows) < 2
+        or rows[0][0] != "duration"
+        or len(rows[0]) < 33
+        or any(len(row) != len(rows[0]) for row in rows)
+    ):
         raise ValueError("a lap has rows of a duration and 8 coefficients of x, y, z and yaw")
     numbers = [[float(field) for field in row[:33]] for row in rows[1:]]
     if any(row[0] <= 0.0 or not all(map(math.isfinite, row)) for row in numbers):
