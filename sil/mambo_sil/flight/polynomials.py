@@ -128,7 +128,7 @@ class Pieces:
         powers = since_s ** np.arange(COEFFICIENTS, dtype=np.float64)
         slopes = np.append(0.0, np.arange(1.0, COEFFICIENTS) * powers[:-1])
         table = np.array([getattr(piece, axis) for axis in AXES])
-        return np.array([powers, slopes]) @ table.T
+        return np.asarray(np.array([powers, slopes]) @ table.T)
 
     @cached_property
     def _ends(self) -> FloatArray:

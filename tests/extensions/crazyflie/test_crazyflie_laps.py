@@ -10,9 +10,17 @@ import pytest
 
 from mambo_extensions.plan.hermite import pieces_of
 from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS
-from tests.support import radio
-from tests.support.radio import Drone
-from tests.support.scripts import PLACE, at_call, change_values, evaluate, figure_of, run, uploaded
+from tests.extensions.crazyflie.support import radio
+from tests.extensions.crazyflie.support.radio import Drone
+from tests.extensions.crazyflie.support.scripts import (
+    PLACE,
+    at_call,
+    change_values,
+    evaluate,
+    figure_of,
+    run,
+    uploaded,
+)
 
 PREPARED = ["set_value", "stop"]
 LANDED = ["notify", "land", "stop", "close"]

@@ -1,9 +1,13 @@
 """Flight mode MPC on the desk, with the set-points of a companion: take-over, steps, low rates, bad ones."""
 
+import importlib.util
 import math
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -12,6 +16,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Circle
 from tests.extensions.px4.support import HOLD, MPC, Px4Desk, build_px4, px4_settings
+from tests.support.laps import write_lap
 
 SEEDS = range(2)
 CIRCLE = Circle(1.0, 1.5)
@@ -78,6 +83,76 @@ def send(
         there = places(from_s + 0.001 * period_ms * (k + 1))[0]
         distances.append(math.hypot(*(desk.state.position_m - there)[:2]))
     return largest_deg, np.array(distances)
+
+
+class FakeNode:
+    """The parts of a ROS 2 node that the companion of the manual uses; its clock is the desk's."""
+
+    now_s = 0.0
+    sent: ClassVar[list[Any]] = []
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def get_clock(self) -> Any:
+        """Return the clock."""
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * FakeNode.now_s)))
+
+    def create_publisher(self, kind: type[Any], topic: str, qos: object) -> Any:
+        """Return a publisher that keeps the messages."""
+        assert (kind, topic, qos) == (SimpleNamespace, "/fmu/in/trajectory_setpoint", "sensor data")
+        return SimpleNamespace(publish=FakeNode.sent.append)
+
+    def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
+        """Call it at once; the test calls it again."""
+        assert period_s == 0.02
+        callback()
+
+
+@pytest.fixture
+def companion(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return the script of the manual, with stand-ins for ROS 2, which is in no package index."""
+    for name, parts in {
+        "rclpy": {},
+        "rclpy.node": {"Node": FakeNode},
+        "rclpy.qos": {"qos_profile_sensor_data": "sensor data"},
+        "px4_msgs": {},
+        "px4_msgs.msg": {"TrajectorySetpoint": SimpleNamespace},
+    }.items():
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+        vars(sys.modules[name]).update(parts)
+    script = Path(__file__).parents[3] / "docs/how-to/fly_px4.py"
+    spec = importlib.util.spec_from_file_location("fly_px4", script)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_plan_is_flown_by_the_companion_of_the_manual(
+    module: Path, companion: ModuleType, tmp_path: Path
+) -> None:
+    """Its set-points lead the drone from elsewhere to the first point, then through all points of the lap."""
+    lap = write_lap(tmp_path / "lap.csv")
+    desk = Px4Desk(module, 0).select(MPC, 500)
+    desk.set("px4.trajectory", 1)
+    node = companion.Companion(lap)
+    times_s, errors_m = [], []
+    for k in range(round((companion.WAIT_S + lap.flown_s) / 0.02)):
+        FakeNode.now_s = 0.02 * k
+        node.send()
+        message = FakeNode.sent.pop()
+        sent = np.array([message.position, message.velocity, message.acceleration]) * (1.0, -1.0, -1.0)
+        desk.full_state(sent)
+        desk.run(20)
+        since_s = 0.02 * (k + 1) - companion.WAIT_S
+        if since_s >= 0.0:
+            (x, y, *_), (z, *_) = lap.target(since_s), lap.vertical(since_s)
+            times_s.append(since_s)
+            errors_m.append(desk.state.position_m - np.array([x, -y, z]))
+    passed = lap.passes(np.array(times_s), np.array(errors_m))
+    assert [one.missed for one in passed] == [False, False]
 
 
 def test_a_take_over_in_hover_has_no_jump(module: Path) -> None:
