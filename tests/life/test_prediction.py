@@ -7,7 +7,7 @@ import pytest
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2, hover_thrust
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.life.prediction import Prediction
+from mambo_sil.life.prediction import DelayPrediction
 from mambo_sil.life.records import EstimatedState
 from tests.support.derived import settings_for
 from tests.support.links import drone
@@ -18,11 +18,11 @@ TICKS = 10
 """Of the drone in a period of 10 ms."""
 
 
-def prediction(delay_s: float = DELAY_S) -> Prediction:
+def prediction(delay_s: float = DELAY_S) -> DelayPrediction:
     """Return the prediction of a pilot of the drone over a link."""
     settings = settings_for(drone())
     assert settings.height is not None
-    found = Prediction(settings, settings.height, hover_thrust(settings))
+    found = DelayPrediction(settings, settings.height, hover_thrust(settings))
     found.delay_s = delay_s
     return found
 

@@ -127,7 +127,7 @@ def _nearest_m(place: FloatArray) -> FloatArray:
 
 def _crossed_m(place: FloatArray, normal: FloatArray) -> FloatArray:
     """Return how far from the origin paths (k, n, 3) cross its plane along the normal; infinity without."""
-    along = place @ normal
+    along = np.sum(place * normal, axis=-1)
     crosses: NDArray[np.bool_] = (along[:-1] < 0.0) & (along[1:] >= 0.0)
     share = np.where(crosses, -along[:-1] / np.where(crosses, along[1:] - along[:-1], 1.0), 0.0)
     there = place[:-1] + share[..., np.newaxis] * np.diff(place, axis=0)

@@ -28,7 +28,7 @@ KEPT: Final = 1000
 """How many commands are kept."""
 
 
-class Prediction:
+class DelayPrediction:
     """Carries states ahead; call `begin` at a take-over, and `sent` for each command."""
 
     def __init__(self, settings: Settings, height: Height, hover_m_s2: float) -> None:

@@ -13,7 +13,7 @@ from mambo_sil.errors import LinkError
 from mambo_sil.flight.frames import turned_tilt, wrapped
 from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 from mambo_sil.life.lean import Lean
-from mambo_sil.life.prediction import Prediction
+from mambo_sil.life.prediction import DelayPrediction
 from mambo_sil.life.records import EstimatedState, SetAttitude
 from mambo_sil.life.steady_frame import FrameJump, SteadyFrame
 from mambo_sil.model.identify.signals import UPDATES
@@ -80,7 +80,7 @@ class Steering:
         self.frame = SteadyFrame()
         most_m_s2 = AT_LIMIT * controller.settings.observer.disturbance_limit_m_s2
         self.lean = Lean(controller.settings.model.drag_1_s, most_m_s2)
-        self.prediction = Prediction(controller.settings, controller.settings.height, self.hover_m_s2)
+        self.prediction = DelayPrediction(controller.settings, controller.settings.height, self.hover_m_s2)
         self.take_overs = 0
         self._steps = 0
         self._record = record
