@@ -122,7 +122,8 @@ def _nearest_m(place: FloatArray) -> FloatArray:
     step = np.diff(place, axis=0)
     square = np.maximum(np.sum(step * step, axis=-1), 1e-18)
     share = np.clip(-np.sum(place[:-1] * step, axis=-1) / square, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(place[:-1] + share[..., np.newaxis] * step, axis=-1).min(axis=0))
+    nearest = place[:-1] + share[..., np.newaxis] * step
+    return np.asarray(_length_m(nearest).min(axis=0))
 
 
 def _crossed_m(place: FloatArray, normal: FloatArray) -> FloatArray:
@@ -131,4 +132,9 @@ def _crossed_m(place: FloatArray, normal: FloatArray) -> FloatArray:
     crosses: NDArray[np.bool_] = (along[:-1] < 0.0) & (along[1:] >= 0.0)
     share = np.where(crosses, -along[:-1] / np.where(crosses, along[1:] - along[:-1], 1.0), 0.0)
     there = place[:-1] + share[..., np.newaxis] * np.diff(place, axis=0)
-    return np.asarray(np.where(crosses, np.linalg.norm(there, axis=-1), np.inf).min(axis=0))
+    return np.asarray(np.where(crosses, _length_m(there), np.inf).min(axis=0))
+
+
+def _length_m(place: FloatArray) -> FloatArray:
+    """Return the length (...) of vectors (..., 2 or 3)."""
+    return np.asarray(np.sqrt(np.sum(place * place, axis=-1)))

@@ -125,10 +125,10 @@ class Pieces:
 
     def _motion(self, piece: Piece, since_s: float) -> FloatArray:
         """Return place and velocity (2, 3) of a piece at a time."""
-        powers = since_s ** np.arange(COEFFICIENTS, dtype=np.float64)
+        powers = np.cumprod([1.0, *(since_s for _ in range(COEFFICIENTS - 1))])
         slopes = np.append(0.0, np.arange(1.0, COEFFICIENTS) * powers[:-1])
         table = np.array([getattr(piece, axis) for axis in AXES])
-        return np.asarray(np.array([powers, slopes]) @ table.T)
+        return np.array([np.sum(table * factors, axis=1) for factors in (powers, slopes)])
 
     @cached_property
     def _ends(self) -> FloatArray:

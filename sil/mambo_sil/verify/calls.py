@@ -137,8 +137,8 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
     lengths = np.array([len(tape) for tape in tapes], np.intp)
     is_long = lengths > 2 * np.median(lengths) if len(tapes) else np.zeros(0, np.bool_)
     found: dict[int, Outcomes] = {}
-    for indices in (np.flatnonzero(~is_long), np.flatnonzero(is_long)):
-        found |= zip(indices.tolist(), _run_at_once(settings, [tapes[at] for at in indices]), strict=True)
+    for indices in (np.flatnonzero(~is_long).tolist(), np.flatnonzero(is_long).tolist()):
+        found |= zip(indices, _run_at_once(settings, [tapes[at] for at in indices]), strict=True)
     return [found[at] for at in range(len(tapes))]
 
 

@@ -112,13 +112,14 @@ class FakeNode:
 @pytest.fixture
 def companion(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Return the script of the manual, with stand-ins for ROS 2, which is in no package index."""
-    for name, parts in {
+    stand_ins: dict[str, dict[str, object]] = {
         "rclpy": {},
         "rclpy.node": {"Node": FakeNode},
         "rclpy.qos": {"qos_profile_sensor_data": "sensor data"},
         "px4_msgs": {},
         "px4_msgs.msg": {"TrajectorySetpoint": SimpleNamespace},
-    }.items():
+    }
+    for name, parts in stand_ins.items():
         monkeypatch.setitem(sys.modules, name, ModuleType(name))
         vars(sys.modules[name]).update(parts)
     script = Path(__file__).parents[3] / "docs/how-to/fly_px4.py"

@@ -150,7 +150,7 @@ def draw_flight(path: Path, events: EventsFile, title: str) -> tuple[Path, Path]
 def _figure(values: FloatArray, events: EventsFile, title: str) -> Figure:
     time_s, x_m, y_m, z_m, target_x_m, target_y_m, target_z_m, *commands_rad, _lost = values
     figure = Figure(figsize=(PAGE_INCHES, 5.0), layout="constrained")
-    over_time, above = figure.subfigures(1, 2, width_ratios=(1.5, 1.0))
+    over_time, above = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.5, 1.0))[0]
     height, distance, command = over_time.subplots(3, 1, sharex=True)
     flown, target = LOOKS[0].line, LOOKS[1].line
     height.plot(time_s, z_m, label="flown", **flown)
