@@ -100,7 +100,7 @@ class Pieces:
         """Whether the pieces end as they begin, in flight: in the same place, with the same velocity."""
         last = self.pieces[-1]
         begins, ends = self._motion(self.pieces[0], 0.0), self._motion(last, last.duration_s)
-        return bool(np.linalg.norm(begins[1]) > SAME and np.allclose(begins, ends, rtol=0.0, atol=SAME))
+        return bool(np.max(np.abs(begins[1])) > SAME and np.allclose(begins, ends, rtol=0.0, atol=SAME))
 
     def passes(self, time_s: FloatArray, error_m: FloatArray) -> list[PassedSummary]:
         """Return how far from each point whose time has come a drone passed.
