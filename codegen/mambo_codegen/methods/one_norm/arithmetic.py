@@ -38,9 +38,9 @@ class OneNormArithmetic(Arithmetic):
         """Return gain * tilt, m/step^2."""
         return self._down(gain_m_step2_rad * tilt_rad, "gain_product")
 
-    def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
+    def acceleration_product(self, share: Any, acceleration_m_step2: Real) -> Real:
         """Return share * acceleration."""
-        return self._down(share * acceleration_m_step2, "share_product")
+        return self._down(share * acceleration_m_step2, "acceleration_product")
 
     def initial_error(self, difference_m: Real) -> Real:
         """Return a difference of positions as a predicted error, clamped in fixed point."""
@@ -85,7 +85,7 @@ def _shifts(bits: OneNormFormats) -> dict[str, int]:
         "thrust_product": bits.thrust + bits.step_squared - bits.gain,
         "velocity_product": bits.step + bits.velocity - bits.acceleration,
         "gain_product": bits.gain + bits.angle - bits.acceleration,
-        "share_product": bits.share,
+        "acceleration_product": bits.share,
         "initial_error": bits.error - bits.position,
         "error_change": bits.acceleration - bits.error,
         "distance_gradient": bits.gain + bits.response - bits.distance_gradient,

@@ -71,11 +71,13 @@ class Predictor:
             tilt = state[:, 4:6]
             by_angle = arithmetic.gain_product(gain, tilt[:, None])
             acceleration = by_angle[:, :, 0] + by_angle[:, :, 1]
-            displacement = displacement + arithmetic.share_product(self._displacement_share, acceleration)
+            displacement = displacement + arithmetic.acceleration_product(
+                self._displacement_share, acceleration
+            )
         if target_acceleration_m_step2 is not None:
             by_target = target_acceleration_m_step2
             acceleration = acceleration - by_target if self._has_lag else -by_target
-            displacement = displacement - arithmetic.share_product(self._displacement_share, by_target)
+            displacement = displacement - arithmetic.acceleration_product(self._displacement_share, by_target)
         error = arithmetic.initial_error(state[:, 0:2] - target[:, 0:2])
         return Prediction(gain, tilt, error, displacement, acceleration)
 
@@ -94,16 +96,18 @@ class Predictor:
                 by_angle = arithmetic.gain_product(prediction.gain_m_step2_rad, tilt_change)
                 change = by_angle[:, :, 0] + by_angle[:, :, 1]
                 if self._has_lag:
-                    displaced = arithmetic.share_product(displacement_share, by_angle)
+                    displaced = arithmetic.acceleration_product(displacement_share, by_angle)
                     displacement = displacement + (displaced[:, :, 0] + displaced[:, :, 1])
-                    deficit = deficit - arithmetic.share_product(deficit_share, by_angle)
+                    deficit = deficit - arithmetic.acceleration_product(deficit_share, by_angle)
                 else:
-                    displacement = displacement + arithmetic.share_product(displacement_share[0], change)
+                    displacement = displacement + arithmetic.acceleration_product(
+                        displacement_share[0], change
+                    )
                 acceleration = acceleration + change
             error = error + arithmetic.error_change(displacement)
             if self._has_lag:
                 displacement = displacement + (acceleration + (deficit[:, :, 0] + deficit[:, :, 1]))
-                deficit = arithmetic.share_product(deficit_decay, deficit)
+                deficit = arithmetic.acceleration_product(deficit_decay, deficit)
             else:
                 displacement = displacement + acceleration
             errors[i] = error

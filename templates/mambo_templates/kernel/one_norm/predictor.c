@@ -53,17 +53,17 @@ NMPC_INLINE void predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_
 
 #if WITH_LAG
     rollout->displacement_m_step = rollout->displacement_m_step
-                                   + (share_product(NMPC_ROLL_DISPLACEMENT_SHARE, roll_m_step2)
-                                      + share_product(NMPC_PITCH_DISPLACEMENT_SHARE, pitch_m_step2));
+                                   + (acceleration_product(NMPC_ROLL_DISPLACEMENT_SHARE, roll_m_step2)
+                                      + acceleration_product(NMPC_PITCH_DISPLACEMENT_SHARE, pitch_m_step2));
     rollout->roll_deficit_m_step2 =
-        rollout->roll_deficit_m_step2 - share_product(NMPC_ROLL_DEFICIT_SHARE, roll_m_step2);
+        rollout->roll_deficit_m_step2 - acceleration_product(NMPC_ROLL_DEFICIT_SHARE, roll_m_step2);
     rollout->pitch_deficit_m_step2 =
-        rollout->pitch_deficit_m_step2 - share_product(NMPC_PITCH_DEFICIT_SHARE, pitch_m_step2);
+        rollout->pitch_deficit_m_step2 - acceleration_product(NMPC_PITCH_DEFICIT_SHARE, pitch_m_step2);
 #elif WITH_HALVES
     rollout->displacement_m_step = rollout->displacement_m_step + half(change_m_step2);
 #else
     rollout->displacement_m_step =
-        rollout->displacement_m_step + share_product(NMPC_DISPLACEMENT_SHARE, change_m_step2);
+        rollout->displacement_m_step + acceleration_product(NMPC_DISPLACEMENT_SHARE, change_m_step2);
 #endif
     rollout->acceleration_m_step2 = rollout->acceleration_m_step2 + change_m_step2;
 }
@@ -90,8 +90,8 @@ NMPC_INLINE void predictor_step(nmpc_rollout_t *rollout)
     rollout->displacement_m_step =
         rollout->displacement_m_step
         + (rollout->acceleration_m_step2 + (rollout->roll_deficit_m_step2 + rollout->pitch_deficit_m_step2));
-    rollout->roll_deficit_m_step2 = share_product(NMPC_ROLL_DEFICIT_DECAY, rollout->roll_deficit_m_step2);
-    rollout->pitch_deficit_m_step2 = share_product(NMPC_PITCH_DEFICIT_DECAY, rollout->pitch_deficit_m_step2);
+    rollout->roll_deficit_m_step2 = acceleration_product(NMPC_ROLL_DEFICIT_DECAY, rollout->roll_deficit_m_step2);
+    rollout->pitch_deficit_m_step2 = acceleration_product(NMPC_PITCH_DEFICIT_DECAY, rollout->pitch_deficit_m_step2);
 #else
     rollout->displacement_m_step = rollout->displacement_m_step + rollout->acceleration_m_step2;
 #endif
@@ -108,7 +108,7 @@ static void start_rollout(nmpc_rollout_t *rollout, const nmpc_real_t gain_m_step
     rollout->acceleration_m_step2 = gain_product(gain_m_step2_rad[NMPC_ROLL], tilt_rad[NMPC_ROLL])
                                     + gain_product(gain_m_step2_rad[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
     rollout->displacement_m_step = velocity_product(NMPC_PREDICTION_STEP_S, relative_velocity_m_s)
-                                   + share_product(NMPC_DISPLACEMENT_SHARE, rollout->acceleration_m_step2);
+                                   + acceleration_product(NMPC_DISPLACEMENT_SHARE, rollout->acceleration_m_step2);
     rollout->roll_deficit_m_step2 = (nmpc_real_t)0;
     rollout->pitch_deficit_m_step2 = (nmpc_real_t)0;
 #else
@@ -131,7 +131,7 @@ static void accelerate_target(nmpc_rollout_t *rollout, nmpc_real_t target_accele
     rollout->displacement_m_step = rollout->displacement_m_step - half(target_acceleration_m_step2);
 #else
     rollout->displacement_m_step =
-        rollout->displacement_m_step - share_product(NMPC_DISPLACEMENT_SHARE, target_acceleration_m_step2);
+        rollout->displacement_m_step - acceleration_product(NMPC_DISPLACEMENT_SHARE, target_acceleration_m_step2);
 #endif
 }
 

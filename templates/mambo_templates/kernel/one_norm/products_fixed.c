@@ -28,7 +28,7 @@ NMPC_INLINE nmpc_real_t gain_product(nmpc_real_t gain_m_step2_rad, nmpc_real_t t
 
 #if not WITH_HALVES
 /* The acceleration has room to be shifted left first: then the result is the upper word of the product. */
-NMPC_INLINE nmpc_real_t share_product(nmpc_real_t share, nmpc_real_t acceleration_m_step2)
+NMPC_INLINE nmpc_real_t acceleration_product(nmpc_real_t share, nmpc_real_t acceleration_m_step2)
 {
     return (nmpc_real_t)(((nmpc_sum_t)share
                           * (nmpc_real_t)(acceleration_m_step2 * ((nmpc_real_t)1 << (32 - NMPC_SHARE_BITS))))
