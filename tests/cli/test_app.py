@@ -50,7 +50,7 @@ def test_a_broken_bound_fails() -> None:
         (("--events", "camra-lost"), "did you mean camera-lost?"),
         (("--wind", "gusts"), "leave out --wind"),
         (("--events", "camera-lost", "--trajectory", "circle"), "leave out --trajectory"),
-        (("--sensors", "mambo"), "--sensors mambo must be mocap or flow-deck with --app"),
+        (("--sensors", "mambo"), "--sensors mambo must be mocap, flow-deck or lighthouse with --app"),
         (("--trajectory", "points"), "--trajectory points must be bernoulli, gerono"),
         (("--trajectory", "points.csv"), "points.csv: cannot be read"),
         (

@@ -116,6 +116,7 @@ def _without_events(**keys: Any) -> EventsFile:
 def _with_sensors(file: EventsFile, name: str) -> EventsFile:
     """Return an events file with other sensors; raises FlightError."""
     if name not in events_file.SENSORS:
-        raise FlightError(f"--sensors {echo(name)} must be {' or '.join(events_file.SENSORS)} with --app")
+        *others, last = events_file.SENSORS
+        raise FlightError(f"--sensors {echo(name)} must be {', '.join(others)} or {last} with --app")
     sensors = SensorsSection.model_validate(file.sensors.model_dump() | {"kind": name})
     return file.model_copy(update={"sensors": sensors})
