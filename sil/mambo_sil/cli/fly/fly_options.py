@@ -54,8 +54,7 @@ DURATION_S: Final = 100.0
 CurveTime = Annotated[
     float | None,
     typer.Option(
-        help=f"Time on the curve, in s; by default {DURATION_S:g}, or that of a plan, of a closed one two "
-        "laps.",
+        help=f"Time on the curve, in s; by default {DURATION_S:g}, of a plan its own or two laps.",
         metavar="S",
     ),
 ]
