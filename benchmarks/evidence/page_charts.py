@@ -96,7 +96,7 @@ def settings_chart(flown: Table) -> Figure:
     for title, look in zip(_NAMES, looks(list(_NAMES.values())).values(), strict=True):
         cells = {place: row[title] for place, row in enumerate(flown) if row[title]}
         calm = {place: _number(cell.split(",")[1]) for place, cell in cells.items() if cell.startswith("0,")}
-        axes.plot(list(calm.values()), list(calm), label=title, markersize=6.0, **look.dots)
+        axes.plot(list(calm.values()), list(calm), label=title, **look.dots)
         for place in cells.keys() - calm.keys():
             axes.text(0.21, place, f"{title}: {cells[place]}", va="center", color=VERMILION)
     _logarithmic(axes)

@@ -9,8 +9,6 @@ from mambo_extensions.crazyflie.desk.desk_events import broken, fly_events, meas
 
 CLOCKS_MS = (3, 7, 9)
 """Offsets of the clock of camera or flow deck, each with a seed of its own."""
-RATTLING = ("noise-4-mm",)
-"""The drone stays in the air and near, but loses 2 mm more of its height than is aimed at."""
 DISORDER = ("packets-out-of-order",)
 """The preset's height is the firmware's, which is 5 cm off then where 2 cm are aimed at."""
 FAR = ("random-set-points",)
@@ -24,11 +22,11 @@ QUICKER_THAN_THE_PRESET = ("heavy-and-quick", "planned-again")
 HELD_BY_THE_FIRMWARE = ("pull-up", "reflections", "sagging-cell", "swapped-markers")
 """The preset leaves the height to the firmware, which loses more; swapped markers move it 1 cm farther."""
 NOT_THE_PRESETS = (
-    *(*RATTLING, *DISORDER, *FAR, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT),
+    *(*DISORDER, *FAR, *FLOW, *HEADING, *ONLY_WITH_A_HEIGHT),
     *(*QUICKER_THAN_THE_PRESET, *HELD_BY_THE_FIRMWARE),
 )
 NAMES = [
-    pytest.param(name, marks=[pytest.mark.xfail(strict=True)] * (name in (*RATTLING, *HEADING)))
+    pytest.param(name, marks=[pytest.mark.xfail(strict=True)] * (name in HEADING))
     for name in events_file.EVENTS.names()
 ]
 
@@ -58,16 +56,6 @@ def test_a_flight_says_how_much_of_its_distance_is_drift(app: Path) -> None:
     file = events_file.load("sagging-cell")
     flown = measure(fly_events(app, file), file)
     assert 0.0 < flown["drift_m"] < 0.3 * flown["mean_m"]
-
-
-@pytest.mark.parametrize("name", RATTLING)
-def test_commands_that_rattle_do_not_take_the_thrust(name: str, app: Path) -> None:
-    """The drone stays in the air, and near."""
-    file = events_file.load(name)
-    for seed, offset_ms in enumerate(CLOCKS_MS):
-        measures = measure(fly_events(app, file, seed, offset_ms), file)
-        assert measures["lowest_m"] > 0.7 * file.height_m
-        assert measures["off_m"] < 1.0
 
 
 @pytest.mark.parametrize("name", FLOW[:-1])

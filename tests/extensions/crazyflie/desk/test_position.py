@@ -93,7 +93,8 @@ def test_nothing_is_said_of_the_position_before_it_is_measured(
     sensors: DeskSensors, app: Path, flow_app: Path
 ) -> None:
     """A filter that has just started says nothing of its source; then the source is named once, and right."""
-    for library, wrong in ((app, DeskSensors.FLOW_DECK), (flow_app, DeskSensors.MOCAP)):
+    is_flow = sensors is DeskSensors.FLOW_DECK
+    for library, for_flow in ((app, False), (flow_app, True)):
         desk = Desk(library, DeskConditions(sensors=sensors, camera_offset_ms=3))
         desk.measure(on=False)
         desk.run(1)
@@ -106,8 +107,8 @@ def test_nothing_is_said_of_the_position_before_it_is_measured(
         desk.run(400)
         said = desk.console.splitlines()[1:]
         assert "NMPC: position found" in said
-        assert len(said) == 1 + (sensors == wrong)
-        assert desk.log("nmpc.source") == 1.0 + sensors
+        assert len(said) == 1 + (is_flow != for_flow)
+        assert desk.log("nmpc.source") == 1.0 + is_flow
 
 
 def test_a_flight_without_a_position_says_why_no_motor_starts(app: Path) -> None:
