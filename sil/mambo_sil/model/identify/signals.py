@@ -46,7 +46,7 @@ JUMP: Final = (
     *("jump_x_m", "jump_y_m", "jump_z_m", "jump_vx_m_s", "jump_vy_m_s", "jump_vz_m_s", "jump_yaw_rad"),
 )
 """By what it did last, as the controller was told."""
-GROUNDED: Final = "grounded"
+GROUNDED: Final = "on_ground"
 """Whether the controller was told that the floor may carry the drone."""
 LEVELLED: Final = "levelled"
 """Whether its caller flew level instead of the tilt that it computed."""

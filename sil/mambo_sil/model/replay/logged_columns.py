@@ -95,9 +95,8 @@ _OTHER: Final[dict[str, tuple[Column, ...]]] = {
     **{name: (Column(name),) for name in (*TARGET_AHEAD, TARGET_KNOWN)},
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
-    **{
-        name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, GROUNDED, LEVELLED, JUMPS, *JUMP)
-    },
+    GROUNDED: (Column(GROUNDED), Column("grounded")),
+    **{name: (Column(name),) for name in (TAKE_OVERS, UPDATE, START_THRUST, LEVELLED, JUMPS, *JUMP)},
 }
 SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     name: (
