@@ -180,6 +180,9 @@ OPTIONS: Final[dict[str, Option]] = {
     "prefix": Option(LEVEL, {"code.prefix": "own"}, _LEVEL),
     "exact tilt": Option(SPACE, {"model.tilt": "exact", "limits.tilt_rad": 0.8}, _SPACE),
     "acceleration learnt": Option(SPACE, {"height.learnt": "acceleration"}, _SPACE),
+    "acceleration learnt, no limit": Option(
+        SPACE, {"height.learnt": "acceleration", "height.learnt_acceleration_limit_m_s2": 0.0}, _SPACE
+    ),
     "nothing learnt": Option(SPACE, {"height.learnt": "none"}, _SPACE),
     "height, delay, no weight, no limit": Option(
         SPACE,

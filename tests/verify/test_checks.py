@@ -65,13 +65,13 @@ ONE_NORM_FAULTS: Final[dict[str, tuple[Check, Settings, Harm, str]]] = {
     "another scale": (
         bits.check,
         FIXED,
-        Harm(CONTROLLER, r"quantize\(state->yaw_rad, NMPC_YAW_SCALE\)", "quantize(state->yaw_rad, 1.0f)"),
+        Harm(CONTROLLER, r"quantize\(given->yaw_rad, NMPC_YAW_SCALE\)", "quantize(given->yaw_rad, 1.0f)"),
         "the self-test fails",
     ),
     "a conversion that loses digits": (
         dialects.check,
         ONE_NORM,
-        Harm(CONTROLLER, r"\+ \(nmpc_real_t\)absolute\(", "+ (double)absolute("),
+        Harm(CONTROLLER, r"\+ absolute\(", "+ (double)absolute("),
         f"{CONTROLLER}:",
     ),
     "a declaration inside for": (

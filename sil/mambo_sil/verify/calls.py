@@ -135,16 +135,16 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
     Tapes of alike lengths run at once; the few long ones run apart, so that the others end early.
     """
     lengths = np.array([len(tape) for tape in tapes], np.intp)
-    is_long = lengths > 2 * np.median(lengths) if len(tapes) else np.zeros(0, np.bool_)
+    is_long = lengths > 2 * (np.median(lengths) if len(tapes) else 0)
     found: dict[int, Outcomes] = {}
-    for indices in (np.flatnonzero(~is_long).tolist(), np.flatnonzero(is_long).tolist()):
+    for indices in filter(len, (np.flatnonzero(~is_long).tolist(), np.flatnonzero(is_long).tolist())):
         found |= zip(indices, _run_at_once(settings, [tapes[at] for at in indices]), strict=True)
     return [found[at] for at in range(len(tapes))]
 
 
 def _run_at_once(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
     """Run tapes side by side; those that have ended make calls that are refused."""
-    longest = max((len(tape) for tape in tapes), default=0)
+    longest = max(len(tape) for tape in tapes)
     padded = np.zeros((len(tapes), longest), call_type(settings))
     padded["call"] = ApiFunction.RESET | (NULL_SELF << 2)
     for row, tape in zip(padded, tapes, strict=True):
