@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal, reciprocal
-from mambo_codegen.numbers.reach import THRUST_LEFT
+from mambo_codegen.numbers.reach import PLANNED_SHARE, THRUST_LEFT
 from mambo_codegen.numbers.trigonometry import ARC_TANGENT_ERROR, arc_tangent
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
@@ -102,6 +102,7 @@ def thrust_vector_context(vector: ThrustVectorConstants | None) -> dict[str, obj
         "most_slope": MOST_SLOPE,
         "quarter_turn": math.pi / 2,
         "thrust_left": THRUST_LEFT,
+        "planned_share": PLANNED_SHARE,
         "least_spare_m_s2": LEAST_SPARE_M_S2,
         "known_spare_rad": KNOWN_SPARE_RAD,
     }

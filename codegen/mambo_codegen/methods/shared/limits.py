@@ -22,6 +22,7 @@ from mambo_codegen.methods.shared.limits_constants import (
 )
 from mambo_codegen.methods.shared.math import Real, clamp, larger, smaller
 from mambo_codegen.methods.shared.tracker import TargetMotion, unknown_motion
+from mambo_codegen.numbers.reach import PLANNED_SHARE
 from mambo_codegen.settings.fields import SMALLEST_LIMIT
 
 Rows = NDArray[np.bool_]
@@ -147,6 +148,7 @@ class LimitsLaw:
         self._smallest_speed = constant(SMALLEST_LIMIT, "velocity")
         self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
         self._whole = constant(1.0, "sine")
+        self._planned_share = constant(PLANNED_SHARE, "sine")
         self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
         self._trim = constant(limits.tilted.trim_m_s2, "braking")
         self._turn = None
@@ -345,12 +347,13 @@ class LimitsLaw:
         return replace(memory, target_m_s=moved)
 
     def shortened(self, move: Real, length: Real) -> tuple[Real, Rows]:
-        """Return vectors (n, 2) of at most a length (n,), and which were as long or longer (n,)."""
+        """Return vectors (n, 2) of at most a length (n,), and which took its planned share or more (n,)."""
         products = self._products
         square = products.square_sum(move)
         is_long = square >= products.square(length)
+        takes_much = square >= products.square(products.share_product(length, self._planned_share))
         share = smaller(products.share(length, products.inverse_root(square)), self._whole)
-        return np.where(is_long[:, None], products.share_product(move, share[:, None]), move), is_long
+        return np.where(is_long[:, None], products.share_product(move, share[:, None]), move), takes_much
 
     def is_slow(self, bounds: Bounds, target: Real) -> Rows:
         """Return whether targets move at half the speed at which braking ends or less, along x and y (n,)."""

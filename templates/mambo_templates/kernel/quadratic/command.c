@@ -36,18 +36,21 @@ NMPC_INLINE nmpc_real_t largest_move(const nmpc_t *self, const nmpc_step_t *step
 }
 
 #if WITH_THRUST_VECTOR
-/* Shorten a move, right and forward, to what the thrust leaves in its direction. */
+/* Shorten a move, right and forward, to what the thrust leaves in its direction; say whether little is left. */
 NMPC_INLINE void limit_to_thrust(nmpc_step_t *step, nmpc_real_t move_m_step2[2])
 {
     const nmpc_square_t square = square_sum(move_m_step2[0], move_m_step2[1]);
+    const nmpc_real_t planned_m_step2 = share_product(step->left_m_step2, NMPC_PLANNED_SHARE);
 
     step->by_thrust = 0U;
+    if (square >= squared(planned_m_step2)) {
+        step->by_thrust = NMPC_LIMIT_THRUST;
+    }
     if (square >= squared(step->left_m_step2)) {
         const nmpc_real_t share = smaller(length_ratio(step->left_m_step2, inverse_root(square)), NMPC_ONE);
 
         move_m_step2[0] = share_product(move_m_step2[0], share);
         move_m_step2[1] = share_product(move_m_step2[1], share);
-        step->by_thrust = NMPC_LIMIT_THRUST;
     }
 }
 

@@ -42,7 +42,7 @@ typedef struct {
     /* The slopes of the thrust, right and forward; the longest move that it leaves. */
     nmpc_real_t slope[2];
     nmpc_real_t left_m_step2;
-    /* NMPC_LIMIT_THRUST if that limits the move, else 0. */
+    /* NMPC_LIMIT_THRUST if the move takes the planned share of that, else 0. */
     unsigned int by_thrust;
 #endif
 } nmpc_step_t;

@@ -26,7 +26,7 @@ from .radio import CHECKS_S, GROUP
 
 TURN_S, STREAM_PERIOD_S = 2.0, 0.02
 TRAJECTORY_MEMORY, PIECE_BYTES = 0x12, 132
-SLOWER, JUDGED_S = 0.85, 1.0
+SLOWER, JUDGED_S = 0.8, 1.0
 """So much slower runs the time of a figure that is too quick; so long after that it is judged again."""
 MOST_SLOWED = 3
 HOP_HEIGHT_M, HOP_CLIMB_S, HOP_M, HOP_S = 0.3, 1.5, 0.15, 1.5
