@@ -233,9 +233,21 @@ def test_the_log_shows_commands_saturation_and_disturbance(app: Crazyflie) -> No
     assert app.logged("disturbanceY") > 0.1
     assert abs(app.logged("disturbanceX")) < 0.01
     app.setpoint.position.x = 5000.0
-    assert flown_since(app, np.array([0.0, -0.2, 0.0, -2.0, 0.0, 0.0, 0.0]), 60)[-1] == (0.0, 0.0)
+    moving = [app.update(np.array([0.0, -0.2 - 0.02 * k, 0.0, -2.0, 0.0, 0.0, 0.0])) for k in range(60)]
+    assert moving[-1] == (0.0, 0.0)
     assert app.logged("status") == 3
     assert app.logged("disturbanceY") > 0.1, "it keeps its estimate while it flies level"
+
+
+def test_a_jump_of_the_estimate_comes_little_by_little(app: Crazyflie) -> None:
+    """At once the whole would tilt it to the limit; what stays is all there in a second."""
+    app.aim(np.zeros(6))
+    flown_since(app, np.zeros(7), 20)
+    jumped = 0.1 * np.eye(7)[0]
+    assert 1.0 < np.max(np.abs(flown_since(app, jumped, 3))) < 5.0
+    assert app.logged("x") < 0.02
+    flown_since(app, jumped, 97)
+    assert app.logged("x") == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_path: Path) -> None:

@@ -53,6 +53,7 @@ def test_the_position_is_that_of_now_whenever_the_filter_predicts_and_measures(
     app.aim(np.zeros(6))
     for offset_ms in range(10):
         app.ticks += 10  # another controller flew: the next tick takes over
+        app.state.position.x = 0.0
         for time_ms in range(offset_ms, 1000):
             filtered(app, time_ms, delay_ms)
             app.setpoint.timestamp = app.time_ms
