@@ -2,7 +2,9 @@
 
 $ python fly_px4.py lap.csv
 
-It sends the first point for 10 s, to which the mode glides, then the lap, then its last point until Ctrl-C.
+Take off and select MPC first. It sends the first point for 10 s, to which the mode glides, then the lap, then
+its last point until Ctrl-C; from then on the sticks move the target. The plan's x is north, its y west, z up
+from the place where PX4 started.
 """
 
 import argparse
@@ -10,8 +12,10 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rclpy
 from px4_msgs.msg import TrajectorySetpoint
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 
@@ -20,6 +24,13 @@ from mambo_nmpc.curves import PiecesInSpace
 PERIOD_S = 0.02
 WAIT_S = 10.0
 """At the first point, before the lap begins."""
+LOWEST_M = 0.3
+"""A lap that is lower is refused: the mode would land there."""
+
+
+def lowest_m(lap: PiecesInSpace) -> float:
+    """Return the least height of a lap; a level one, whose heights are all 0, has none."""
+    return float(lap.vertical(np.arange(0.0, lap.flown_s, PERIOD_S))[:, 0].min())
 
 
 def set_point(lap: PiecesInSpace, time_s: float) -> Any:
@@ -61,8 +72,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("lap", type=Path, help="file of `mambo-nmpc plan`")
     lap = PiecesInSpace.read(parser.parse_args().lap)
+    if lowest_m(lap) < LOWEST_M:
+        parser.error(f"the lap comes down to {lowest_m(lap):.2f} m: give its points z of {LOWEST_M} or more")
     rclpy.init()
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(Companion(lap))
 
 

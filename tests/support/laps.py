@@ -11,9 +11,9 @@ LEGS_M = ((1.0, 0.5, 0.2), (-0.6, 0.8, -0.1))
 """Along x ahead, y to the left, and up."""
 
 
-def write_lap(path: Path) -> PiecesInSpace:
-    """Write two legs from rest to rest, from a metre above the floor on, and return them as they are read."""
-    rows, place = [",".join((*COLUMNS, *POINT_COLUMNS))], np.array([0.0, 0.0, 1.0])
+def write_lap(path: Path, height_m: float = 1.0) -> PiecesInSpace:
+    """Write two legs from rest to rest, from a height on, and return them as they are read."""
+    rows, place = [",".join((*COLUMNS, *POINT_COLUMNS))], np.array([0.0, 0.0, height_m])
     smooth = np.array([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0]) / LEG_S ** np.arange(8)
     for leg in LEGS_M:
         axes = [[start, *(length * smooth[1:])] for start, length in zip(place, leg, strict=True)]

@@ -114,6 +114,7 @@ def companion(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """Return the script of the manual, with stand-ins for ROS 2, which is in no package index."""
     stand_ins: dict[str, dict[str, object]] = {
         "rclpy": {},
+        "rclpy.executors": {"ExternalShutdownException": RuntimeError},
         "rclpy.node": {"Node": FakeNode},
         "rclpy.qos": {"qos_profile_sensor_data": "sensor data"},
         "px4_msgs": {},
@@ -154,6 +155,22 @@ def test_a_plan_is_flown_by_the_companion_of_the_manual(
             errors_m.append(desk.state.position_m - np.array([x, -y, z]))
     passed = lap.passes(np.array(times_s), np.array(errors_m))
     assert [one.missed for one in passed] == [False, False]
+
+
+@pytest.mark.parametrize("z_m", [0.0, 0.2])
+def test_a_lap_on_the_floor_is_refused(
+    z_m: float,
+    companion: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Before anything is sent: a level plan has no height, and PX4's place of start is on the ground."""
+    write_lap(tmp_path / "lap.csv", z_m)
+    monkeypatch.setattr(sys, "argv", ["fly_px4.py", str(tmp_path / "lap.csv")])
+    with pytest.raises(SystemExit):
+        companion.main()
+    assert f"comes down to {z_m:.2f} m" in capsys.readouterr().err
 
 
 def test_a_take_over_in_hover_has_no_jump(module: Path) -> None:
