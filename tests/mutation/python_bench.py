@@ -28,6 +28,7 @@ from typing import Any, Final, TextIO
 import pytest
 
 from mambo_codegen import kept
+from mambo_codegen.methods import method_of
 from tests.mutation.python_mutants import PythonMutant, names_of, python_mutants
 
 ROOT: Final = Path(__file__).parents[2]
@@ -263,6 +264,7 @@ def _survives(
     except Exception:  # whatever a fault leads to
         return False
     _install(module, other)
+    method_of.cache_clear()
     vars(kept)["write_cached"] = lambda *_: None  # what a mutant computes is not kept
     return _pass(session, items)
 

@@ -1,5 +1,6 @@
 """The methods of control: each folder is one, behind the interface `Method`; `method_of` finds it."""
 
+from functools import lru_cache
 from typing import Final
 
 from mambo_codegen.methods.interface import LinearLaw, Method, ReferenceController, Step, StepResult
@@ -12,6 +13,7 @@ __all__ = ["LinearLaw", "Method", "ReferenceController", "Step", "StepResult", "
 _METHODS: Final[dict[str, type[Method]]] = {"1-norm": OneNorm, "quadratic": Quadratic}
 
 
+@lru_cache(maxsize=32)
 def method_of(settings: Sections) -> Method:
-    """Return the method that `controller.method` names, with `settings`."""
+    """Return the method that `controller.method` names, with `settings`; its constants are derived once."""
     return _METHODS[settings.controller.method](settings)
