@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.adapters import touches_floor
+from mambo_nmpc.adapters.crazyflow_calls import CrazyflowCalls, can_call
 from mambo_nmpc.curves import Trajectory, sample
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.arguments import require
@@ -72,20 +73,37 @@ class CrazyflowPilot:
         state = DroneState.in_frame("NWU", *seen, touches_floor(*seen[:2]))
         outcome = self._controller.step(state, self._target(step))
         command = outcome.attitude_thrust("NWU")
-        command[..., 3] *= np.asarray(self.mass_kg, np.float64)
+        command[..., 3] *= self.each(self.mass_kg)
         return command.astype(np.float32)
+
+    def targets(self, ages: NDArray[Any]) -> TargetState:
+        """Return where the drones shall be after steps (...): (..., 1) with one curve, or (..., drones)."""
+        times_s = ages[..., np.newaxis] / self._freq_hz
+        points = [sample(curve, times_s, height_m=self._height_m) for curve in self._curves]
+        return TargetState(*(np.concatenate(part, axis=-2) for part in zip(*points, strict=True)))
+
+    def wanted_rad(self) -> NDArray[np.float64]:
+        """Return the headings of the targets (worlds, drones), in NED."""
+        return self.each(yaw_to_ned("NWU", self.yaw_rad))
+
+    def each(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Return numbers (worlds, drones) of one or of such."""
+        return np.array(np.broadcast_to(np.asarray(values, np.float64), self._batch))
 
     def _target(self, step: NDArray[Any]) -> TargetState:
         """Return where the drones shall be after steps (worlds,)."""
-        ages = step[:1] if (step == step[0]).all() else step  # worlds of one age: sampled once
-        times_s = ages[:, np.newaxis] / self._freq_hz
-        points = [sample(curve, times_s, height_m=self._height_m) for curve in self._curves]
+        found = self.targets(ages_of(step))
         position_m, velocity_m_s, acceleration_m_s2 = (
-            np.broadcast_to(np.concatenate(part, axis=1), (*self._batch, 3))
-            for part in zip(*points, strict=True)
+            np.broadcast_to(part, (*self._batch, 3))
+            for part in (found.position_m, found.velocity_m_s, found.acceleration_m_s2)
+            if part is not None
         )
-        yaw_rad = np.broadcast_to(yaw_to_ned("NWU", self.yaw_rad), self._batch)
-        return TargetState(position_m, velocity_m_s, acceleration_m_s2, yaw_rad)
+        return TargetState(position_m, velocity_m_s, acceleration_m_s2, self.wanted_rad())
+
+
+def ages_of(step: NDArray[Any]) -> NDArray[Any]:
+    """Return the ages of worlds (w,), or (1,) if all are of one age and need one target only."""
+    return step[:1] if (step == step[0]).all() else step
 
 
 def attach(
@@ -109,12 +127,19 @@ def attach(
     """
     pilot = CrazyflowPilot(sim, controller, trajectory, height_m=height_m, yaw_rad=yaw_rad)
     advance = type(sim).step
+    calls = None
+    if measure is None and can_call(sim, controller):
+        calls = CrazyflowCalls(controller, pilot.targets, pilot.ticks)
 
     def step(n_steps: int = 1) -> None:
         """Simulate all drones in all worlds for n time steps, and command them."""
         while n_steps > 0:
             steps = np.asarray(sim.data.core.steps)
             past = int(steps[0, 0]) % pilot.ticks
+            if past == 0 and calls is not None:
+                numbers = pilot.wanted_rad(), pilot.each(pilot.mass_kg)
+                n_steps -= calls.advance(sim, n_steps, ages_of(steps.reshape(-1)), *numbers)
+                continue
             if past == 0:
                 seen = sim.data.states.pos, sim.data.states.quat, sim.data.states.vel
                 if measure is not None:

@@ -33,7 +33,7 @@ class Heading:
 
     def __init__(self, compiled: CompiledController) -> None:
         self._compiled = compiled
-        self._most_rad = HEADING_RATE_RAD_S * compiled.settings.horizon.update_period_s
+        self.most_rad = HEADING_RATE_RAD_S * compiled.settings.horizon.update_period_s
         self.yaw_rad = np.full(compiled.n, np.nan)
         """The last set-points (n,), NaN before the first measured heading that is a number in its range."""
 
@@ -51,7 +51,7 @@ class Heading:
         measured_rad = np.where(np.abs(measured_rad) <= YAW_LIMIT_RAD, measured_rad, np.nan)
         yaw_rad = np.where(np.isnan(self.yaw_rad), measured_rad, self.yaw_rad)
         if wanted_rad is not None:
-            turned_rad = self._compiled.slew_heading(yaw_rad, wanted_rad, self._most_rad)
+            turned_rad = self._compiled.slew_heading(yaw_rad, wanted_rad, self.most_rad)
             yaw_rad = np.where(np.isnan(yaw_rad), np.nan, turned_rad)
         self.yaw_rad = yaw_rad
         return yaw_rad

@@ -78,7 +78,6 @@ def setter_quantities(method: Method, setter: Setter) -> Sequence[str]:
     return method.limiting.quantities if method.limiting else LIMITS
 
 
-_YAW: Final = ("yaw",)
 _DISTURBANCE: Final = ("disturbance",)
 
 DIRT = b"\xa5"
@@ -111,6 +110,11 @@ class CompiledController:
     def native_setter(self, setter: Setter, values: ArrayLike) -> tuple[Any, NDArray[Any]]:
         """Return the function of a setter, and `values` (n, k) as it reads them."""
         return self._native_set(f"nmpc_host_{setter}", values, setter_quantities(self._method, setter))
+
+    @property
+    def native_slew_heading(self) -> Any:
+        """The function `nmpc_host_slew_heading`."""
+        return ffi.addressof(self._library, "nmpc_host_slew_heading")
 
     @property
     def instances(self) -> NDArray[np.uint8]:
@@ -170,13 +174,13 @@ class CompiledController:
         self, previous_rad: ArrayLike, wanted_rad: ArrayLike, most_change_rad: float
     ) -> NDArray[np.float64]:
         """Return what `nmpc_slew_heading` returns (n,) for previous and wanted headings (n,)."""
-        previous, wanted = (
-            as_array(self._numbers, given, _YAW, (self.n,)) for given in (previous_rad, wanted_rad)
-        )
-        turned, most = np.empty_like(previous), as_array(self._numbers, [most_change_rad], _YAW, (1,))
-        addresses = map(_address, (previous, wanted, most, turned))
-        self._library.nmpc_host_slew_heading(self.n, *addresses)
-        return self._numbers.to_si(turned, *_YAW).astype(np.float64)
+        given = [np.ascontiguousarray(values, np.float64) for values in (previous_rad, wanted_rad)]
+        if any(values.shape != (self.n,) for values in given):
+            raise ValueError(f"expected two arrays of shape {(self.n,)}")
+        turned = np.empty(self.n)
+        previous, wanted, found = (ffi.from_buffer("double[]", array) for array in (*given, turned))
+        self._library.nmpc_host_slew_heading(self.n, previous, wanted, most_change_rad, found)
+        return turned
 
     def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
         """Replace the limits by `limits` (n, k), in the order of nmpc_limits_t; returns a status (n,).

@@ -33,8 +33,8 @@ DECLARATIONS: Final = """
     void nmpc_host_last_disturbance(const void *controllers, int n, void *disturbance);
     void nmpc_host_set_limits(void *controllers, int n, const void *limits, int *status);
     void nmpc_host_set_position_measured(void *controllers, int n, const void *is_measured, int *status);
-    void nmpc_host_slew_heading(int n, const void *previous, const void *wanted, const void *most_change,
-                                void *next);
+    void nmpc_host_slew_heading(int n, const double *previous, const double *wanted, double most_change,
+                                double *next);
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
                            double thrust_acceleration_m_s2, double *command);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);

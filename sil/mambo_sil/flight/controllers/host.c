@@ -134,16 +134,6 @@ void nmpc_host_last_disturbance(const nmpc_t *controllers, int n, nmpc_real_t *d
 }
 #endif
 
-void nmpc_host_slew_heading(int n, const nmpc_real_t *previous_rad, const nmpc_real_t *wanted_rad,
-                            const nmpc_real_t *most_change_rad, nmpc_real_t *next_rad)
-{
-    int i;
-
-    for (i = 0; i < n; i++) {
-        next_rad[i] = nmpc_slew_heading(previous_rad[i], wanted_rad[i], most_change_rad[0]);
-    }
-}
-
 #ifdef NMPC_ANGLE_BITS
 /* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
 static nmpc_real_t number_of(double value, int bits)
@@ -163,6 +153,20 @@ static nmpc_real_t number_of(double value, int bits)
 #define NUMBER(value, quantity) ((nmpc_real_t)(value))
 #define IN_SI(number, quantity) ((double)(number))
 #endif
+
+/* Headings in SI units. */
+void nmpc_host_slew_heading(int n, const double *previous_rad, const double *wanted_rad, double most_change_rad,
+                            double *next_rad)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        const nmpc_real_t next = nmpc_slew_heading(NUMBER(previous_rad[i], YAW), NUMBER(wanted_rad[i], YAW),
+                                                   NUMBER(most_change_rad, YAW));
+
+        next_rad[i] = IN_SI(next, YAW);
+    }
+}
 
 #define WHOLE_TYPE double
 #define MEASURE(member, column, quantity) measured.member = NUMBER(state[column], quantity);
