@@ -24,27 +24,27 @@ if TYPE_CHECKING:
     from mambo_sil.flight.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.flight.states import DroneState, StepOutcome, TargetState
 
-__all__ = [
-    "ArgumentError",
-    "CampaignFlights",
-    "Controller",
-    "ControllerOptions",
-    "DroneState",
-    "FlightResult",
-    "MamboNmpcError",
-    "Pilot",
-    "Plan",
-    "PlanPoint",
-    "StepOutcome",
-    "TargetState",
-    "Vehicle",
-    "attitude_of_quaternion",
-    "campaign",
-    "command_in_frame",
-    "draw_vehicles",
-    "fly",
-    "plan",
-]
+    __all__ = [
+        "ArgumentError",
+        "CampaignFlights",
+        "Controller",
+        "ControllerOptions",
+        "DroneState",
+        "FlightResult",
+        "MamboNmpcError",
+        "Pilot",
+        "Plan",
+        "PlanPoint",
+        "StepOutcome",
+        "TargetState",
+        "Vehicle",
+        "attitude_of_quaternion",
+        "campaign",
+        "command_in_frame",
+        "draw_vehicles",
+        "fly",
+        "plan",
+    ]
 
 _HOMES: Final = {
     "ArgumentError": "mambo_sil.errors",
@@ -54,9 +54,6 @@ _HOMES: Final = {
     "DroneState": "mambo_sil.flight.states",
     "FlightResult": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
-    "Pilot": "mambo_extensions.mavlink.pilot",
-    "Plan": "mambo_extensions.plan.plans",
-    "PlanPoint": "mambo_extensions.plan.points",
     "StepOutcome": "mambo_sil.flight.states",
     "TargetState": "mambo_sil.flight.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
@@ -65,20 +62,28 @@ _HOMES: Final = {
     "command_in_frame": "mambo_sil.flight.frames",
     "draw_vehicles": "mambo_sil.api.campaigns",
     "fly": "mambo_sil.api.flights",
-    "plan": "mambo_extensions.plan.plans",
 }
-"""The module of each name: imported at its first use, so that the command line starts at once."""
+"""The module of each name of the core: imported at its first use, so that the command line starts at once."""
 
 
 if not TYPE_CHECKING:  # a checker would take every name for one of this module
 
     def __getattr__(name: str) -> Any:
-        """Return one of `__all__`."""
-        if name not in _HOMES:
+        """Return one of `__all__`, of the core or of an extension."""
+        if name in _HOMES:
+            return getattr(importlib.import_module(_HOMES[name]), name)
+        if name == "__all__":
+            return sorted({*_HOMES, *_extensions().names("api")})
+        if name.startswith("_") or name not in _extensions().names("api"):
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(importlib.import_module(_HOMES[name]), name)
+        return _extensions().load("api", name)
+
+
+def _extensions() -> Any:
+    """Return the module that knows the names of extensions, when it is needed."""
+    return importlib.import_module("mambo_codegen.extensions")
 
 
 def __dir__() -> list[str]:
     """Return the names of the module, also those that are not imported yet."""
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_HOMES, *_extensions().names("api")})

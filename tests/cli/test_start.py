@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.errors import INTERRUPTED
-from mambo_sil.cli.app import PANELS
+from mambo_sil.cli.app import panels
 from tests.support.command import HEARS_CTRL_C, MAIN, command, run
 
 HEAVY = {"capstone", "cffi", "elftools", "jinja2", "matplotlib", "numpy", "optuna", "scipy", "unicorn"}
@@ -59,8 +59,8 @@ def test_a_command_loads_only_what_it_needs(arguments: list[str], unwanted: set[
 def test_every_command_has_its_line() -> None:
     """The first sentence of what it does, in the panel of what it is for."""
     said, _ = run("--help")
-    assert all(f"─ {panel} ─" in said for panel in PANELS)
-    for name in (name for commands in PANELS.values() for name in commands):
+    assert all(f"─ {panel} ─" in said for panel in panels())
+    for name in (name for commands in panels().values() for name in commands):
         assert f"│ {name} " in said
 
 

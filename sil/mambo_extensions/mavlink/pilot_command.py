@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from mambo_sil.cli.command import JoinedCommand
 from mambo_sil.cli.fly.fly_options import Course, CurveChoice, CurveRate, CurveSize
 from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, load_drone, show_result
 from mambo_sil.cli.progress import Bar, progress_bar
@@ -153,3 +154,14 @@ def _watch(bar: Bar) -> "Callable[[Pilot], None]":
         bar.stage(flown.words)
 
     return watch
+
+
+COMMAND: Final = JoinedCommand(
+    pilot,
+    panel="Fly",
+    after="fly",
+    examples="""\
+mambo-nmpc pilot controller.toml --link udp:127.0.0.1:14540 --trajectory circle --size-m 1
+mambo-nmpc pilot controller.toml --simulate px4 -o piloted
+""",
+)

@@ -1,7 +1,6 @@
 """Cycles and stack of a controller on the board at a port, over the flight that `footprint` counts."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,40 +10,10 @@ from mambo_codegen.errors import echo
 from mambo_codegen.settings.model import Settings
 from mambo_extensions.pil.board_controller import BoardController
 from mambo_extensions.pil.connection import Connection
-from mambo_extensions.pil.pil_report import Spread
 from mambo_sil.board.footprint.counts import counted_flight
+from mambo_sil.board.footprint.on_board import BoardMeasurement, Spread
 from mambo_sil.errors import BoardError, FlightError
 from mambo_sil.flight.engine.simulate import fly
-
-
-@dataclass(frozen=True)
-class BoardMeasurement:
-    """What a board measured in the steps of a flight that its controller accepted."""
-
-    port: str
-    board_says: str
-    """The name of the board in its firmware."""
-    clock_hz: int
-    ticks: int
-    cycles: Spread
-    """Of `nmpc_step`, at `clock_hz`."""
-    mean_cycles: float
-    stack_bytes: int
-    different_steps: int
-    """Steps with other bits than on this machine."""
-    link_faults: dict[str, int]
-    """What went wrong on the link and was made good."""
-
-    @property
-    def sentence(self) -> str:
-        """What was flown on which board, and whether its bits are those of this machine."""
-        bits = (
-            f"{self.different_steps} STEPS HAVE OTHER BITS THAN ON THIS MACHINE"
-            if self.different_steps
-            else "all bits equal those of this machine"
-        )
-        clock = f"{self.clock_hz / 1e6:g} MHz"
-        return f"{self.board_says} at {clock}, {self.port}: {self.ticks} steps of the counted flight, {bits}"
 
 
 def choose_board(candidates: Sequence[Board], port: str, says: str) -> Board:

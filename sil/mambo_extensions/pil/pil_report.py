@@ -4,7 +4,7 @@ import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, Self
+from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
@@ -12,31 +12,12 @@ from mambo_codegen.errors import echo
 from mambo_extensions.pil.board_controller import BoardController
 from mambo_extensions.pil.connection import Connection
 from mambo_extensions.pil.timed import Arrival, TimedController
+from mambo_sil.board.footprint.on_board import Spread
 from mambo_sil.flight.flight_report import FlySummary
 from mambo_sil.results.blocks import CommandResult, ResultTable
 
 CLOCK_TOLERANCE: Final = 0.01
 """Share by which the clocks of board and desk may differ: a ceramic resonator is half as bad."""
-
-
-class Spread(BaseModel):
-    """Least, median and most of something measured in every step."""
-
-    model_config = ConfigDict(frozen=True)
-
-    least: float
-    median: float
-    most: float
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> Self:
-        """Return the spread of `values`."""
-        return cls(least=min(values), median=statistics.median(values), most=max(values))
-
-    @property
-    def milliseconds(self) -> str:
-        """Least, median and most, of times in s."""
-        return " / ".join(f"{1e3 * value:.3g}" for value in (self.least, self.median, self.most))
 
 
 class EmulatedCount(BaseModel):

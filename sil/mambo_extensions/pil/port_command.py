@@ -1,22 +1,27 @@
 """`fly --port`: the controller on a board flies the simulated drone."""
 
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing
 from functools import partial
 
 import typer
 
 from mambo_codegen import boards
+from mambo_codegen.boards import Board
 from mambo_codegen.bundle.digest import TICKS
 from mambo_codegen.errors import BuildError, echo
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_extensions.pil.board_controller import BoardController
 from mambo_extensions.pil.connection import Connection
+from mambo_extensions.pil.on_board import choose_board, measure_on_board
 from mambo_extensions.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields
 from mambo_extensions.pil.serial_port import open_port
 from mambo_extensions.pil.timed import TimedController
 from mambo_sil.board.firmware.elf import FootprintError
-from mambo_sil.board.footprint.measure import measure_footprint
+from mambo_sil.board.footprint.build_digests import BuildDigest, digest_text, reference_digest
+from mambo_sil.board.footprint.measure import measure_footprint, usual_ticks
+from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.cli.fly.fly_options import Conditions, Course, Output, Runner
 from mambo_sil.cli.fly.one_flight import (
     FLIGHT_FILES,
@@ -46,6 +51,26 @@ def connect(port: str, baud: int | None, settings: Settings) -> AbstractContextM
     """Connect to the board at `port`, whose faults go to stderr; raises BoardError."""
     say = partial(typer.echo, err=True)
     return closing(Connection(port, partial(open_port, port, baud or BAUD), settings, say=say))
+
+
+def measure_at_port(
+    settings: Settings, candidates: Sequence[Board], port: str, baud: int | None
+) -> tuple[Board, BoardMeasurement]:
+    """Return which of the candidates the board at `port` is, and what it measures; raises BoardError."""
+    with connect(port, baud, settings) as connection:
+        board = choose_board(candidates, port, connection.greeting.board)
+        with progress_bar("flying") as progress:
+            return board, measure_on_board(settings, connection, port, usual_ticks(settings), progress)
+
+
+def run_at_port(
+    settings: Settings, port: str, baud: int | None, episodes: int, progress: Callable[[float], None]
+) -> Iterator[BuildDigest]:
+    """Yield the digest of the reference, then of the board at `port`; call `progress` with the share done."""
+    with connect(port, baud, settings) as connection:
+        yield reference_digest(settings, episodes)
+        digest = connection.digest(episodes, progress)
+        yield BuildDigest("board", echo(connection.greeting.board), "", digest_text(digest))
 
 
 def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: Output) -> None:

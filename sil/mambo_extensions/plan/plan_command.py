@@ -1,12 +1,13 @@
 """`plan`: from points to a course that a drone flies."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from mambo_codegen.errors import echo
 from mambo_extensions.plan import LEAST_RATE, MOST_DRONES
+from mambo_sil.cli.command import JoinedCommand
 from mambo_sil.cli.options import (
     AsJson,
     Drone,
@@ -89,3 +90,15 @@ def plan(
     show(made.summary, result_text(made.summary.result()), as_json=as_json)
     if not made.summary.good:
         raise typer.Exit(1)
+
+
+COMMAND: Final = JoinedCommand(
+    plan,
+    panel="Fly",
+    after="fly",
+    examples="""\
+mambo-nmpc plan points.csv --vehicle crazyflie -o lap.csv
+mambo-nmpc plan points.csv --vehicle crazyflie --closed --rate 0.9 -o slower.csv
+mambo-nmpc plan mission.plan --vehicle my-drone.toml -o mission.csv
+""",
+)

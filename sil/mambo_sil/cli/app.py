@@ -10,43 +10,35 @@ from typing import Final
 
 import typer
 
-from mambo_extensions.mavlink.pilot_command import pilot
-from mambo_extensions.plan.plan_command import plan
+from mambo_codegen import extensions
+from mambo_codegen.errors import BAD_INPUT, MamboNmpcError
 from mambo_sil.cli.board import check_bits, footprint, sweep
-from mambo_sil.cli.command import Command, examples, root
+from mambo_sil.cli.command import Command, JoinedCommand, examples, root
 from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
 from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
 from mambo_sil.cli.generate import generate, which_controller
 from mambo_sil.cli.margins import margins
-from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
-from mambo_sil.cli.start import doctor, init, playground
+from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, vehicles
+from mambo_sil.cli.start import doctor, init
 from mambo_sil.errors import UserNotice
 
 PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
-    "Start": {"init": init, "doctor": doctor, "playground": playground},
+    "Start": {"init": init, "doctor": doctor},
     "Settings": {
         "presets": list_presets,
         "schema": schema,
         "vehicles": vehicles,
         "identify": identify,
         "design": design,
-        "tune": tune,
         "diff": diff,
         "margins": margins,
     },
     "Generate": {"generate": generate, "which-controller": which_controller},
-    "Fly": {
-        "fly": fly,
-        "plan": plan,
-        "pilot": pilot,
-        "campaign": campaign,
-        "faults": faults,
-        "replay": replay,
-    },
+    "Fly": {"fly": fly, "campaign": campaign, "faults": faults, "replay": replay},
     "Board": {"footprint": footprint, "sweep": sweep, "check-bits": check_bits},
     "Evidence": {"verify": verify, "regress": regress, "table2": table2, "report": report},
 }
-"""Commands by name, in the panels and the order of the help."""
+"""The core's commands by name, in the panels and the order of the help."""
 
 EXAMPLES: Final = """\
 mambo-nmpc init
@@ -67,11 +59,6 @@ mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
 mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc fly controller.toml --app crazyflie --events camera-lost
-mambo-nmpc plan points.csv --vehicle crazyflie -o lap.csv
-mambo-nmpc plan points.csv --vehicle crazyflie --closed --rate 0.9 -o slower.csv
-mambo-nmpc plan mission.plan --vehicle my-drone.toml -o mission.csv
-mambo-nmpc pilot controller.toml --link udp:127.0.0.1:14540 --trajectory circle --size-m 1
-mambo-nmpc pilot controller.toml --simulate px4 -o piloted
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen
@@ -102,10 +89,6 @@ mambo-nmpc campaign -o campaign
 mambo-nmpc campaign campaign.toml --flights 200 -o campaign
 mambo-nmpc campaign --vehicle crazyflie -o crazyflie
 mambo-nmpc campaign --scheduler tcp://10.0.0.1:8786 -o campaign
-mambo-nmpc tune -o tuned
-mambo-nmpc tune tune.toml --trials 300 -o tuned
-mambo-nmpc tune --vehicle my-drone.toml -o tuned-for-mine
-mambo-nmpc tune --storage postgresql://db/studies -o tuned
 mambo-nmpc identify --manoeuvre eight.py
 mambo-nmpc identify flight.csv -o identified
 mambo-nmpc identify monday.csv tuesday.csv -o identified
@@ -121,29 +104,43 @@ mambo-nmpc margins --campaign default --drones 300
 mambo-nmpc margins controller.toml --vehicle identified/vehicle.toml --uncertainty
 mambo-nmpc which-controller firmware.elf
 mambo-nmpc which-controller firmware.hex controller.toml controller-old
-mambo-nmpc playground -o play.html
-mambo-nmpc playground pd controller.toml --vehicle crazyflie -o mine.html
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """
 """The examples that the help of each command shows."""
 
 
+def panels() -> dict[str, dict[str, Callable[..., None]]]:
+    """Return all commands by name, in the panels and the order of the help."""
+    found = {panel: list(commands.items()) for panel, commands in PANELS.items()}
+    for name, joined in _joined().items():
+        others = found[joined.panel]
+        place = [other for other, _ in others].index(joined.after) + 1
+        others.insert(place, (name, joined.run))
+    return {panel: dict(commands) for panel, commands in found.items()}
+
+
+def _joined() -> dict[str, JoinedCommand]:
+    """Return the commands of extensions by name."""
+    return extensions.load_all("commands")
+
+
 def app() -> typer.Typer:
     """Return the root command with all its sub-commands."""
-    joined = root()
-    for panel, commands in PANELS.items():
+    shown_lines = "".join([EXAMPLES, *(one.examples for one in _joined().values())]).splitlines()
+    made = root()
+    for panel, commands in panels().items():
         for name, command in commands.items():
-            lines = [line for line in EXAMPLES.splitlines() if line.split()[1] == name]
+            lines = [line for line in shown_lines if line.split()[1] == name]
             more = [VERIFY_EXIT_CODES] if name == "verify" else []
             epilog = examples(*lines, *more) if lines else None
             what, when, *rest = (inspect.getdoc(command) or "").split("\n\n")
             shown = "\n\n".join((f"{what}\n{when}", *rest))
-            add = joined.command(
+            add = made.command(
                 name, cls=Command, help=shown, short_help=what, epilog=epilog, rich_help_panel=panel
             )
             add(command)
-    return joined
+    return made
 
 
 def main() -> None:
@@ -153,4 +150,11 @@ def main() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
         warnings.simplefilter("default", UserNotice)
-    app()()
+    if extensions.are_older_than_sources():
+        typer.echo(f"extensions are missing: the installed metadata are older; {extensions.AGAIN}", err=True)
+    try:
+        command = app()
+    except MamboNmpcError as error:  # an extension that is not there
+        typer.echo(str(error), err=True)
+        sys.exit(BAD_INPUT)
+    command()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mambo_codegen import extensions
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.cli.options import (
     AsJson,
@@ -71,14 +72,9 @@ def footprint(
         )
         on_board = None
         if port is not None:
-            from mambo_extensions.pil.on_board import choose_board, measure_on_board
-            from mambo_extensions.pil.port_command import connect
-            from mambo_sil.board.footprint.measure import usual_ticks
-
-            with connect(port, baud, settings) as connection:
-                chosen = [choose_board(chosen, port, connection.greeting.board)]
-                with progress_bar("flying") as progress:
-                    on_board = measure_on_board(settings, connection, port, usual_ticks(settings), progress)
+            measure_at_port = extensions.load("port", "footprint")
+            compared, on_board = measure_at_port(settings, chosen, port, baud)
+            chosen = [compared]
         with progress_bar("measuring") as progress:
             measured, missing = measure_boards(settings, chosen, optimisation, progress)
         if on_board is not None:
@@ -249,7 +245,6 @@ def check_bits(
         builds_text,
         count_builds,
         run_everywhere,
-        run_on_board,
     )
 
     demand_port(port, baud)
@@ -262,11 +257,8 @@ def check_bits(
         if port is None:
             results = run_everywhere(settings, chosen, count)
         else:
-            from mambo_extensions.pil.port_command import connect
-
-            results = run_on_board(
-                settings, stack.enter_context(connect(port, baud, settings)), count, progress
-            )
+            run_at_port = extensions.load("port", "check-bits")
+            results = run_at_port(settings, port, baud, count, progress)
         for result in results:
             found.append(result)
             if port is None:

@@ -9,6 +9,8 @@ import os
 import signal
 import sys
 import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any, Final, Never
 
 import typer
@@ -33,6 +35,16 @@ EXIT_CODES = (
 
 RENAMED: Final = {"same-bits": "check-bits", "identify-binary": "which-controller"}
 """Commands of version 0.3 that have another name now."""
+
+
+@dataclass(frozen=True)
+class JoinedCommand:
+    """A command of an extension: its panel of the help, the command that it stands behind, its examples."""
+
+    run: Callable[..., None]
+    panel: str
+    after: str
+    examples: str
 
 
 def _without_types(parameters: list[Any]) -> list[Any]:

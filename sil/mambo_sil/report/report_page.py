@@ -8,12 +8,9 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from mambo_codegen import extensions
 from mambo_codegen.errors import echo
 from mambo_codegen.plain_file import guess_name
-from mambo_extensions.crazyflie.desk.desk_report import DeskSummary
-from mambo_extensions.mavlink.pilot_report import PilotSummary
-from mambo_extensions.pil.pil_report import BoardFlightSummary
-from mambo_extensions.tune.tuning_report import TuneSummary
 from mambo_sil.board.footprint.footprint_report import FootprintSummary
 from mambo_sil.board.footprint.sweep_report import SweepSummary
 from mambo_sil.errors import ResultsError
@@ -35,7 +32,6 @@ from mambo_sil.verify.verify_report import VerifySummary
 RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     FlySummary,
     RepeatSummary,
-    BoardFlightSummary,
     Table2Summary,
     SensedSummary,
     FootprintSummary,
@@ -48,11 +44,8 @@ RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     LogReplaySummary,
     MarginsSummary,
     DiffSummary,
-    DeskSummary,
-    TuneSummary,
-    PilotSummary,
 )
-"""The summaries that a result folder may have; its key "command" says which."""
+"""The summaries of the core's commands; the key "command" of a result folder says which it has."""
 
 _UNFINISHED: Final = "campaign.json"
 """The file that a campaign writes first; it writes its summary last."""
@@ -95,14 +88,19 @@ def report_page(folders: Sequence[Path], progress: Callable[[int], None]) -> tup
     return results_page(shown, {summary.generator for summary in summaries}, progress), overview
 
 
+def results() -> tuple[type[ReportedSummary], ...]:
+    """Return the summaries that a result folder may have, those of extensions too."""
+    return (*RESULTS, *extensions.load_all("report").values())
+
+
 def read_summary(folder: Path) -> ReportedSummary:
     """Read the summary in a result folder; raises ResultsError."""
     if (folder / SUMMARY).is_file():
-        return _read(folder / SUMMARY, *RESULTS)
+        return _read(folder / SUMMARY, *results())
     if (folder / _UNFINISHED).is_file():
         return _read(folder / _UNFINISHED, UnfinishedCampaign)
     what = f"has no {SUMMARY}" if folder.is_dir() else f"is not a folder{guess_name(folder)}"
-    commands = ", ".join(kind.command for kind in RESULTS)
+    commands = ", ".join(kind.command for kind in results())
     raise ResultsError(f"{echo(str(folder))}: {what}; name a result folder of {commands}")
 
 

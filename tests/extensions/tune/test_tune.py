@@ -32,8 +32,8 @@ from mambo_extensions.tune.study import (
     propose,
     search,
 )
+from mambo_extensions.tune.tune_command import tune
 from mambo_extensions.tune.tuning_report import controller_text, front_csv, judge_trials, summarise
-from mambo_sil.cli.settings import tune
 from mambo_sil.errors import StudyError
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.store import claim

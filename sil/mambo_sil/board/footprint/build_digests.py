@@ -11,7 +11,6 @@ from mambo_codegen.errors import BuildError, echo
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
-from mambo_extensions.pil.connection import Connection
 from mambo_sil.board.emulated import build_guest, digest_emulated
 from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, Builder, builder, clang_builder
 from mambo_sil.errors import EmulatorError
@@ -38,7 +37,7 @@ class BuildDigest:
 
 def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
     """Yield the digest of the reference, then of every build for this machine and for `boards`."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(method_of(settings), episodes)))
+    yield reference_digest(settings, episodes)
     for name in HOST_COMPILERS:
         for optimisation in OPTIMISATIONS:
             yield _on_host(settings, name, optimisation, episodes)
@@ -48,13 +47,9 @@ def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -
                 yield _on_board(settings, board, name, optimisation, episodes)
 
 
-def run_on_board(
-    settings: Settings, board: Connection, episodes: int, progress: Callable[[float], None]
-) -> Iterator[BuildDigest]:
-    """Yield the digest of the reference, then of a real board; call `progress` with the share done."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(method_of(settings), episodes)))
-    digest = board.digest(episodes, progress)
-    yield BuildDigest("board", echo(board.greeting.board), "", _format(digest))
+def reference_digest(settings: Settings, episodes: int) -> BuildDigest:
+    """Return the digest of the reference, with which all others are compared."""
+    return BuildDigest(REFERENCE, "NumPy", "", digest_text(self_test_digest(method_of(settings), episodes)))
 
 
 def count_builds(boards: Sequence[Board]) -> int:
@@ -89,7 +84,7 @@ def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int
     if shutil.which(compiler) is None:
         return BuildDigest("host", compiler, optimisation, None, f"{compiler} is missing")
     library = build_library(settings, Toolchain((compiler,), optimisation))
-    return BuildDigest("host", compiler, optimisation, _format(digest_compiled(library, episodes)))
+    return BuildDigest("host", compiler, optimisation, digest_text(digest_compiled(library, episodes)))
 
 
 def _on_board(
@@ -102,8 +97,9 @@ def _on_board(
             digest = digest_emulated(settings, elf, board.emulated_core.value, episodes)
     except (BuildError, EmulatorError) as error:
         return BuildDigest(board.name, compiler, optimisation, None, str(error))
-    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _format(digest))
+    return BuildDigest(board.name, found.toolchain.command[0], optimisation, digest_text(digest))
 
 
-def _format(digest: int) -> str:
+def digest_text(digest: int) -> str:
+    """Return a digest as a C literal."""
     return f"0x{digest:08X}"

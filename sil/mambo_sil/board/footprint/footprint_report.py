@@ -7,12 +7,12 @@ from pathlib import Path
 
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.model import Settings
-from mambo_extensions.pil.on_board import BoardMeasurement
 from mambo_sil.board.firmware.gate import Forbidden
 from mambo_sil.board.firmware.sizes import Parts
 from mambo_sil.board.firmware.stack import Frame
 from mambo_sil.board.footprint.counts import CycleCounts, InstructionCounts
 from mambo_sil.board.footprint.measure import Footprint, Limit
+from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.results.blocks import Block, CommandResult, Details, Facts, Note, ResultTable, Sentence
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import ReportedSummary

@@ -11,7 +11,6 @@ from mambo_codegen.boards import Board
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.model import Settings
-from mambo_extensions.pil.on_board import BoardMeasurement
 from mambo_sil.board.emulated import build_guest
 from mambo_sil.board.firmware.disassembly import is_readable
 from mambo_sil.board.firmware.elf import load
@@ -21,6 +20,7 @@ from mambo_sil.board.firmware.sizes import Added, measure_added
 from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.board.footprint.counts import InstructionCounts, count_instructions
 from mambo_sil.board.footprint.cycles import MODELS
+from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.errors import EmulatorError, FlightError
 from mambo_sil.flight.controllers.controller_library import with_default_prefix
 from mambo_sil.results.build_folders import scratch_folder

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mambo_codegen import extensions
 from mambo_codegen.errors import UnwritableError, echo
 from mambo_sil.cli.fly.fly_options import Conditions, Course, OtherFlight, Output, Runner, command_of
 from mambo_sil.cli.options import (
@@ -46,16 +47,14 @@ def _fly(runner: Runner, course: Course, conditions: Conditions, output: Output,
         fly_again(other.repeat, output, other)
         return
     if other.app is not None:
-        from mambo_extensions.crazyflie.app_command import fly_app
-
+        fly_app = extensions.load("apps", other.app)
         fly_app(course, conditions, runner, output, other)
         return
     if other.events is not None:
         raise typer.BadParameter("it is for a flight with --app", param_hint="--events")
     demand_port(runner.port, runner.baud)
     if runner.port is not None:
-        from mambo_extensions.pil.port_command import fly_on_port
-
+        fly_on_port = extensions.load("port", "fly")
         fly_on_port(course, conditions, runner, output)
     else:
         from mambo_sil.cli.fly.one_flight import fly_once

@@ -4,10 +4,11 @@ import inspect
 from collections.abc import Callable, Container
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 import typer
 
+from mambo_codegen import extensions
 from mambo_codegen.errors import echo
 from mambo_sil.cli.options import (
     AsJson,
@@ -65,6 +66,13 @@ def _known_controller(value: str) -> str:
     if value in CONTROLLER_NAMES or ".py:" in value:
         return value
     raise typer.BadParameter(f"{echo(value)} is none of {', '.join(CONTROLLER_NAMES)}, FILE.py:CLASS")
+
+
+def _known_app(value: str | None) -> str | None:
+    """Return the name of an app that an extension flies; refuses others."""
+    if value is None or value in extensions.names("apps"):
+        return value
+    raise typer.BadParameter(f"{echo(value)} is none of {', '.join(extensions.names('apps'))}")
 
 
 @dataclass(frozen=True)
@@ -184,11 +192,13 @@ class OtherFlight:
         typer.Option(help="Repeat a recorded flight; also write the optimizer's iterations.", metavar="FILE"),
     ] = None
     app: Annotated[
-        Literal["crazyflie"] | None,
+        str | None,
         typer.Option(
             help="crazyflie: fly the app that --for writes, unchanged, with estimator, loops and mixer as in "
             "its firmware.",
             metavar="TARGET",
+            callback=_known_app,
+            autocompletion=lambda: extensions.names("apps"),
         ),
     ] = None
     events: Annotated[
