@@ -18,7 +18,7 @@ from typing import Final
 from benchmarks.app_sizes import COMPILER, FLAGS
 from benchmarks.markdown import table
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse
 from mambo_codegen.settings.model import Settings
@@ -60,7 +60,7 @@ def call_cost(settings: Settings) -> CallCost:
     """Compile, emulate and count an app on a circle; without the PID controller that it calls."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for path, text in render_target(settings, TARGETS["crazyflie"]).items():
+        for path, text in render_target(settings, find_target("crazyflie")).items():
             (folder / Path(path).name).write_text(text, "utf-8")
         program, frames_bytes = _build(folder)
         machine = start(program, CORE, counting=True)

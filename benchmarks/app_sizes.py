@@ -13,7 +13,7 @@ from typing import Final
 from benchmarks.evidence.sources import ROOT
 from benchmarks.markdown import table
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse
 from mambo_codegen.settings.model import Settings
@@ -44,7 +44,7 @@ def sizes(settings: Settings) -> dict[str, tuple[int, int]]:
     found = dict.fromkeys((*LIBRARY.values(), APP, SUM), (0, 0))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for path, text in render_target(settings, TARGETS["crazyflie"]).items():
+        for path, text in render_target(settings, find_target("crazyflie")).items():
             (folder / Path(path).name).write_text(text, "utf-8")
         for source in folder.glob("*.c"):
             flash, ram = _sizes_of(source)

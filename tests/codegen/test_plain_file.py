@@ -12,7 +12,6 @@ from mambo_codegen.atomic import put, put_stream
 from mambo_codegen.errors import MamboNmpcError
 from mambo_codegen.plain_file import find_obstacle, read_plain_file
 from mambo_codegen.settings import presets
-from mambo_extensions.tune import tuning_file
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.flight.scenario import read_record
 from mambo_sil.flight.trajectories import Waypoints
@@ -63,7 +62,6 @@ def test_a_plain_file_is_read_up_to_a_limit(tmp_path: Path) -> None:
         lambda path: presets.load(str(path)),
         lambda path: boards.load(str(path)),
         campaign_file.read,
-        tuning_file.read,
         Waypoints.read,
         read_record,
     ],

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.vehicles import vehicle_toml
 from tests.support.derived import settings_for
@@ -20,7 +20,7 @@ def sentences() -> set[str]:
     flow = with_option(cameras, "observer.position_noise", 0.04)
     found: set[str] = set()
     for settings in (cameras, flow):
-        for text in render_target(settings, TARGETS["crazyflie"], with_digest=False).values():
+        for text in render_target(settings, find_target("crazyflie"), with_digest=False).values():
             for printed in PRINTED.findall(text):
                 found |= {one for one in printed if one and one != FORMAT_ALONE}
     return {one.removesuffix("\\n").replace("%d", "...") for one in found}

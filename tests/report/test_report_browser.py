@@ -7,7 +7,7 @@ import pytest
 
 from mambo_sil.report.report_page import report_page
 from tests.support.browser import Browser
-from tests.support.results import FOLDERS
+from tests.support.results import all_folders
 
 PHONE_PX, DESK_PX = 360, 1280
 SPACE, ARROW_RIGHT = 32, 39
@@ -23,10 +23,10 @@ pytestmark = pytest.mark.long
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a report of a folder of every command, each part open."""
     base = tmp_path_factory.mktemp("results")
-    for name, make in FOLDERS.items():
+    for name, make in all_folders().items():
         (base / name).mkdir()
         make(base / name)
-    page, _ = report_page([base / name for name in FOLDERS], lambda _: None)
+    page, _ = report_page([base / name for name in all_folders()], lambda _: None)
     opened = page.replace('<details class="part">', '<details class="part" open>')
     assert opened != page
     (base / "report.html").write_text(opened, "utf-8")

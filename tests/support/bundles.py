@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mambo_codegen.bundle import bundle
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.model import Settings
 
 FILES = {
@@ -27,7 +27,7 @@ def place(files: Mapping[str, str], folder: Path) -> Path:
 
 def write_target(name: str, settings: Settings, folder: Path) -> Path:
     """Write the firmware target `name` for `settings` into `folder`, and return it."""
-    return place(render_target(settings, TARGETS[name], with_digest=False), folder)
+    return place(render_target(settings, find_target(name), with_digest=False), folder)
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -6,7 +6,6 @@ the settings exits with 2, which `RefusedError` reports.
 
 import json
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -15,18 +14,12 @@ import pytest
 from typer.testing import CliRunner
 
 from mambo_codegen.bundle.render import render, render_target, with_prefix
-from mambo_codegen.bundle.targets import TARGETS
-from mambo_extensions.pil.board_controller import BoardController
-from mambo_extensions.pil.connection import Connection
-from mambo_extensions.pil.serial_port import open_port
+from mambo_codegen.bundle.targets import find_target, target_names
 from mambo_sil.cli.app import app
-from mambo_sil.flight import loop
 from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.engine.simulate import fly as fly_in_engine
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.traces import read_npz
-from tests.extensions.pil.support.serial_line import Faults, build_firmware, serial_line
-from tests.extensions.px4.support import px4_files
 from tests.support.bundles import place
 from tests.support.command import unwrapped
 from tests.support.option_flights import OptionFlights
@@ -191,14 +184,9 @@ def same_bits(_flights: OptionFlights) -> str:
 
 def port(flights: OptionFlights) -> str:
     """Compare the flight on a board behind a serial line with that on this machine."""
-    elf = build_firmware(flights.settings, "host", Path("pil").absolute())
-    flight = flights.flight()
-    with serial_line(elf, Faults()) as line:
-        connection = Connection(line.port, partial(open_port, line.port, 500000), flights.settings, say=print)
-        with closing(connection):
-            controller = BoardController(flights.settings, connection)
-            assert loop.fly(flight, controller).same_bits(flights.trace)
-            assert controller.different == []
+    from tests.extensions.pil.support.option import fly_on_line  # noqa: PLC0415 - an extension
+
+    fly_on_line(flights)
     return "="
 
 
@@ -220,12 +208,16 @@ def margins(flights: OptionFlights) -> str:
 def target(flights: OptionFlights, name: str) -> str:
     """Write the folder of a target: its C is that of the bundle, and the code around it compiles."""
     prefix, settings = flights.settings.code.prefix, flights.settings
-    files = render_target(settings, TARGETS[name], with_digest=False)
+    files = render_target(settings, find_target(name), with_digest=False)
     controller = with_prefix("nmpc.c", prefix)
-    found = files[f"{TARGETS[name].source_folder}{controller}"]
-    assert found == TARGETS[name].opening + render(settings, with_digest=False)[controller]
+    found = files[f"{find_target(name).source_folder}{controller}"]
+    assert found == find_target(name).opening + render(settings, with_digest=False)[controller]
     folder = Path(name).absolute()
-    place(px4_files(settings) if name == "px4" else files, folder)
+    if name == "px4":
+        from tests.extensions.px4.support import px4_files  # noqa: PLC0415 - an extension
+
+        files = px4_files(settings)
+    place(files, folder)
     compiler, *patterns = GLUE.get(name, [""])
     for pattern in patterns:
         (source, *others) = sorted(folder.glob(with_prefix(pattern, prefix)))
@@ -234,7 +226,7 @@ def target(flights: OptionFlights, name: str) -> str:
 
 
 ALL: Final[dict[str, Callable[[OptionFlights], str]]] = {
-    **{name: partial(target, name=name) for name in TARGETS},
+    **{name: partial(target, name=name) for name in target_names()},
     "fly": fly,
     "reference": partial(fly, options=("--controller", "reference")),
     "numpy": numpy,

@@ -12,8 +12,6 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_codegen.settings.controller_toml import to_toml
-from mambo_extensions.mavlink.pilot import Pilot
-from mambo_extensions.playground.page_controllers import page_controllers
 from mambo_nmpc import Controller, DroneState, TargetState
 from mambo_nmpc.adapters.rotorpy import RotorpyController
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -86,6 +84,8 @@ def replay(flights: OptionFlights, folder: Path) -> str:
 
 def playground(flights: OptionFlights, folder: Path) -> str:
     """Take it into a page."""
+    from mambo_extensions.playground.page_controllers import page_controllers  # noqa: PLC0415 - an extension
+
     (found,) = page_controllers([str(written(flights, folder))])
     assert found.commands_thrust == flights.method.has_height
     return "+"
@@ -124,6 +124,8 @@ def rotorpy(flights: OptionFlights, folder: Path) -> str:
 
 def pilot(flights: OptionFlights, folder: Path) -> str:
     """Make a pilot, without a flight."""
+    from mambo_nmpc import Pilot  # noqa: PLC0415 - of an extension
+
     Pilot.simulate(written(flights, folder), flights.name)
     return "+"
 

@@ -2,16 +2,18 @@
 
 An option is a choice, an optional section, a text, or a number that 0 switches off. **Who adds one to the
 settings adds a row to `OPTIONS`**, else tests/test_options.py fails. Who adds a consumer adds its name to
-`CONSUMERS`, `TARGETS` or `COMMANDS`, a mark to the strings of marks, and a function to
-tests/support/option_consumers.py or option_commands.py. A row has what is set, on top of the values of its
-base, and a mark for each consumer, in their order:
+`CONSUMERS`, `TARGETS` or `COMMANDS`, that of an extension also to `EXTENSIONS`, a mark to the strings of
+marks, and a function to tests/support/option_consumers.py or option_commands.py. A row has what is set, on
+top of the values of its base, and a mark for each consumer, in their order:
 
     =   flown, with the bits of the reference controller, or of the C that another consumer flies
     +   flown or written, where there are no bits to compare
     A-Z refused, in the words of `REFUSALS`
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from mambo_codegen.settings.model import Settings
@@ -50,6 +52,22 @@ COMMANDS: Final = (
     "verify",
 )
 """What the command line does besides."""
+EXTENSIONS: Final = {
+    "app": "crazyflie",
+    "pilot": "mavlink",
+    "playground": "playground",
+    "port": "pil",
+    "tune": "tune",
+    **{name: name for name in ("crazyflie", "fmu", "pil", "px4")},
+}
+"""The extension of a consumer that is none of the core's."""
+
+
+def installed(columns: Iterable[str]) -> list[str]:
+    """Return the consumers without those whose extension's folder is not there."""
+    folder = Path(__file__).parents[1] / "extensions"
+    return [one for one in columns if one not in EXTENSIONS or (folder / EXTENSIONS[one]).is_dir()]
+
 
 REFUSALS: Final = {
     "H": r"be left out: the settings have \[height\]",

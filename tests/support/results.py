@@ -2,22 +2,17 @@
 
 import contextlib
 import copy
+import importlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from mambo_codegen import __version__, boards
 from mambo_codegen.settings.model import Settings
-from mambo_extensions.crazyflie.desk import desk_report
-from mambo_extensions.crazyflie.desk.desk_events import DeskTrace
-from mambo_extensions.crazyflie.desk.events_file import BoundSection, EventsFile
-from mambo_extensions.mavlink.pilot_report import PilotSummary
-from mambo_extensions.tune.study import FinishedTrial
-from mambo_extensions.tune.tuning_report import TuneSummary
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint
@@ -374,72 +369,6 @@ def diff_folder(folder: Path) -> None:
     ).write(folder)
 
 
-def app_folder(folder: Path) -> None:
-    """Write a flight of an app that breaks one of two bounds."""
-    events = EventsFile(bounds={"lowest_m": BoundSection(least=0.5), "off_m": BoundSection(most=0.25)})
-    time_s = np.arange(0.0, 4.0, 0.01)
-    zeros = np.zeros((len(time_s), 3))
-    flown = DeskTrace(time_s, zeros, zeros, zeros[:, :2], zeros[:, 0], 0.0, f"NMPC: {HOSTILE}\n")
-    desk_report.write_trace(flown, folder / "trace.csv")
-    desk_report.DeskSummary(
-        app="crazyflie",
-        source=HOSTILE,
-        settings=Settings().digest,
-        events="camera-lost",
-        flight=events,
-        seed=0,
-        measures={"lowest_m": 0.75, "off_m": 1.05, "mean_m": 0.21, "drift_m": 0.02, "touch_m_s": 0.3},
-        broken=["off_m"],
-        console=flown.console,
-    ).write(folder)
-
-
-def tune_folder(folder: Path) -> None:
-    """Write a study whose chosen trial is closer than its base."""
-    base, chosen = (
-        FinishedTrial(number, {"cost.response_time_s": 0.1}, iae_m_s, 0.002, 1)
-        for number, iae_m_s in ((0, 1.0), (3, 0.5))
-    )
-    TuneSummary(
-        study="mambo-nmpc-0",
-        seed=0,
-        flights=8,
-        duration_s=20.0,
-        trials=4,
-        base=base,
-        chosen=chosen,
-        rule=HOSTILE,
-        front=[chosen],
-    ).write(folder)
-
-
-def pilot_folder(folder: Path) -> None:
-    """Write a flight over a link that the pilot's switch ended, without its log."""
-    PilotSummary(
-        source=HOSTILE,
-        settings="0123",
-        link="udp:127.0.0.1:14540",
-        autopilot="PX4",
-        simulated=True,
-        end=f"the mode is {HOSTILE}",
-        good=False,
-        trajectory="eight",
-        set_points=1000,
-        flown_s=10.0,
-        interval_s=(0.01, 0.011),
-        horizontal_rms_m=0.052,
-        vertical_rms_m=0.013,
-        command_rms_rad_s=0.2,
-        hover_parameter="MPC_THR_HOVER",
-        hover_thrust=0.5,
-        mean_thrust=0.49,
-        link_delay_s=0.002,
-        jumps=1,
-        pauses=0,
-        refused=0,
-    ).write(folder)
-
-
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "repeat": repeat_folder,
@@ -454,8 +383,16 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "identify": identify_folder,
     "margins": margins_folder,
     "diff": diff_folder,
-    "fly --app": app_folder,
-    "tune": tune_folder,
-    "pilot": pilot_folder,
 }
-"""A folder of every command."""
+"""A folder of every command of the core."""
+
+
+def of_extensions() -> Iterator[Any]:
+    """Yield the modules `support.results` of the tests of extensions, each with a folder of its command."""
+    for path in sorted(Path(__file__).parents[1].glob("extensions/*/support/results.py")):
+        yield importlib.import_module(f"tests.extensions.{path.parts[-3]}.support.results")
+
+
+def all_folders() -> dict[str, Callable[[Path], None]]:
+    """Return what makes a folder of every command that there is."""
+    return FOLDERS | {one.COMMAND: one.write_folder for one in of_extensions()}

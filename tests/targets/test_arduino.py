@@ -8,7 +8,7 @@ import pytest
 
 from mambo_codegen import boards
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import place, write_target
@@ -207,11 +207,11 @@ def test_the_example_of_a_page_compiles(scalar: str, has_height: bool, tmp_path:
     level = with_option(presets.preset("mambo"), "code.scalar", scalar)
     settings = height_settings(scalar) if has_height else level
     for name in ("platformio", "espidf"):
-        files = render_target(settings, TARGETS[name], with_digest=False)
+        files = render_target(settings, find_target(name), with_digest=False)
         example = files["README.md"].partition("```c\n")[2].partition("```")[0]
         folder = place(files | {"example.c": example}, tmp_path / name)
         shell(
             *(require("gcc", "gcc"), "-std=c99", "-Wall", "-Wextra", "-Werror"),
-            *(f"-I./{TARGETS[name].source_folder}", "-c", "example.c"),
+            *(f"-I./{find_target(name).source_folder}", "-c", "example.c"),
             folder=folder,
         )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -121,7 +121,7 @@ def flight_process(folder: Path) -> Iterator[FlightProcess]:
 def build(settings: Settings, folder: Path, right: str = "", wrong: str = "") -> Path:
     """Make librsedu.so with the target's Makefile, and the process; in the block `right` reads `wrong`."""
     compiler = require("arm-linux-gnueabi-gcc", "gcc-arm-linux-gnueabi and libc6-dev-armel-cross")
-    files = render_target(settings, TARGETS["mambo"], with_digest=False)
+    files = render_target(settings, find_target("mambo"), with_digest=False)
     assert not right or files[BLOCK].count(right) == 1, f"the template moved on: {right}"
     place(files | {BLOCK: files[BLOCK].replace(right, wrong) if right else files[BLOCK]}, folder)
     numbers = (10 if settings.height else 7) if settings.controller.method == "quadratic" else 4

@@ -21,14 +21,13 @@ from mambo_codegen.bundle.flags import (
     RULE_FLAGS,
     WARNING_FLAGS,
 )
-from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.kernel import KernelLoader
 from mambo_codegen.bundle.limits_context import limits_context
 from mambo_codegen.bundle.products import infix
 from mambo_codegen.bundle.sbom import with_sbom
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
-from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -104,19 +103,18 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     context = template_context(settings, with_digest=with_digest) | {
         "ticks_per_update": ticks,
         "update_period_ns": round(1e9 * settings.horizon.update_period_s),
-        "variables": fmu_variables(settings),
-        "pil_payload_bytes": _pil_payload_bytes(method_of(settings)),
         "for_flow": settings.observer is not None and settings.observer.position_noise >= FLOW_NOISE_M,
         "flown_m_s2": flown_acceleration_m_s2(settings),
         "flown_share": FLOWN_SHARE,
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
+        **({} if target.context is None else target.context(settings)),
     }
     own = f"{TARGETS_FOLDER}/{target.name}/"
     paths = [path for path in templates.list_templates(extensions=["j2", "py"]) if path.startswith(own)]
     files = {
         path.removeprefix(own).removesuffix(".j2"): templates.get_template(path).render(context)
         for path in paths
-        if path.endswith(".j2")
+        if path.endswith(".j2") and not path.rpartition("/")[2].startswith("_")
     }
     scripts = {path.removeprefix(own): _source(path) for path in paths if path.endswith(".py")}
     return with_sbom(library | _finish(files, settings) | scripts)
@@ -125,13 +123,6 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
 def _source(path: str) -> str:
     """Return the text of a script, which is the same for all settings."""
     return KernelLoader("mambo_templates", "").get_source(environment(), path)[0]
-
-
-def _pil_payload_bytes(method: Method) -> int:
-    """Return the longest payload of the processor in the loop, for the inputs of a step behind its head."""
-    port = method.port
-    numbers = len(port.numbers("state")) + len(port.numbers("target")) + 1
-    return 128 if 5 + (numbers * method.numbers.bytes[0]) <= 128 else 200
 
 
 def _places(name: str, context: Mapping[str, object]) -> list[str]:

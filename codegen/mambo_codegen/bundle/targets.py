@@ -1,15 +1,21 @@
 """The targets of `mambo-nmpc generate --for`: folders that build as they are, in a firmware or a tool.
 
-A target is an entry here and a folder of templates, `firmware/NAME`, laid out like the folder that they make:
-`src/Kbuild.j2` becomes `src/Kbuild`. Names of the controller in paths and texts get its prefix. Python, such
-as `fly.py`, is copied as it stands: its numbers are in a file of values.
+A target is an entry here or an entry point of an extension, and a folder of templates, `firmware/NAME`,
+laid out like the folder that they make: `src/Kbuild.j2` becomes `src/Kbuild`; a file that begins with `_` is
+a part of others. Names of the controller in paths and texts get its prefix. Python, such as `fly.py`, is
+copied as it stands: its numbers are in a file of values.
 """
 
 import difflib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from mambo_codegen import extensions
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
+
+if TYPE_CHECKING:
+    from mambo_codegen.settings.model import Settings
 
 TARGETS_FOLDER: Final = "firmware"
 """The folder of the templates of each target."""
@@ -26,6 +32,7 @@ class FirmwareTarget:
     self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
     flies_height: whether it wants roll, pitch and thrust from one controller.
+    context: returns what its templates insert besides.
     """
 
     name: str
@@ -35,6 +42,7 @@ class FirmwareTarget:
     self_test: bool = True
     tick_s: float | None = None
     flies_height: bool = False
+    context: "Callable[[Settings], dict[str, object]] | None" = None
 
     def refuse_level(self, *, has_height: bool) -> None:
         """Raise InvalidSettingsError for settings without a height if the target needs one."""
@@ -62,7 +70,7 @@ class FirmwareTarget:
         return ticks
 
 
-_NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add rounds once: its bits are others. */
+NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add rounds once: its bits are others. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
@@ -70,34 +78,39 @@ _NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add rounds 
 #endif
 
 """
-_TARGETS: Final = (
-    FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
-    FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
+"""The opening where the user's tools choose the flags."""
+
+_OWN: Final = (
+    FirmwareTarget("arduino", "mambo", "src/", opening=NO_FLAGS),
     FirmwareTarget("espidf", "mambo", ""),
-    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS, self_test=False),
     FirmwareTarget("mambo", "mambo", "src/", self_test=False, tick_s=0.005),
-    FirmwareTarget("pil", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),
-    FirmwareTarget("px4", None, "src/modules/mc_nmpc/", flies_height=True),
 )
-TARGETS: Final = {target.name: target for target in _TARGETS}
-"""All targets by name."""
+_TARGETS: Final = {target.name: target for target in _OWN}
+
+
+def target_names() -> list[str]:
+    """Return the names of all targets, those of extensions too, sorted."""
+    return sorted({*_TARGETS, *extensions.names("targets")})
 
 
 def complete_targets(incomplete: str) -> list[str]:
     """Return the targets that begin with `incomplete`, for the shell."""
-    return [name for name in TARGETS if name.startswith(incomplete)]
+    return [name for name in target_names() if name.startswith(incomplete)]
 
 
 def find_target(name: str) -> FirmwareTarget:
     """Return the target of that name; raises SourceNotFoundError."""
-    if name in TARGETS:
-        return TARGETS[name]
-    near = difflib.get_close_matches(name, TARGETS, n=1)
+    if name in _TARGETS:
+        return _TARGETS[name]
+    if name in extensions.names("targets"):
+        found: FirmwareTarget = extensions.load("targets", name)
+        return found
+    near = difflib.get_close_matches(name, target_names(), n=1)
     guess = f" (did you mean {near[0]}?)" if near else ""
     raise SourceNotFoundError(
-        f"--for {echo(name)} is not a target{guess}; targets are {', '.join(TARGETS)}; without --for the "
-        "bundle has a Makefile and fits any firmware"
+        f"--for {echo(name)} is not a target{guess}; targets are {', '.join(target_names())}; "
+        "without --for the bundle has a Makefile and fits any firmware"
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_codegen.bundle.targets import TARGETS, complete_targets, default_source, find_target
+from mambo_codegen.bundle.targets import complete_targets, default_source, find_target, target_names
 from mambo_codegen.errors import DriftError, echo
 from mambo_codegen.settings.toml_file import PRESETS
 from mambo_sil.cli.options import AsJson, OptionalSource, Scalar, complete_presets, load, output_option
@@ -28,7 +28,7 @@ def generate(
         str | None,
         typer.Option(
             "--for",
-            help=f"Write a folder that builds for: {', '.join(TARGETS)}.",
+            help=f"Write a folder that builds for: {', '.join(target_names())}.",
             metavar="TARGET",
             autocompletion=complete_targets,
         ),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
@@ -80,7 +80,7 @@ def test_names_that_are_linked_have_the_prefix(name: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_every_log_and_parameter_has_its_documentation(name: str) -> None:
     """One line in front of it, from which the firmware builds its pages; the group has one too."""
-    files = render_target(SUBJECTS[name], TARGETS["crazyflie"], with_digest=False)
+    files = render_target(SUBJECTS[name], find_target("crazyflie"), with_digest=False)
     kinds = {"LOG": 0, "PARAM": 0}
     for text in (text for path, text in files.items() if path.endswith(".c")):
         for before, line in itertools.pairwise(text.splitlines()):
@@ -142,7 +142,7 @@ def test_an_update_period_that_the_firmware_cannot_keep_is_refused() -> None:
     with pytest.raises(
         InvalidSettingsError, match=r"update_period_s = 0\.0125 must be a whole multiple of 0\.001"
     ):
-        render_target(settings, TARGETS["crazyflie"])
+        render_target(settings, find_target("crazyflie"))
 
 
 USER_C = """#include "nmpc_app.h"

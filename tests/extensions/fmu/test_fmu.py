@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.shared.heading import slew_heading
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from mambo_extensions.fmu.fmu_variables import fmu_variables
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.controllers.compiled import CompiledController

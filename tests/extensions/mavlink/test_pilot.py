@@ -12,9 +12,9 @@ from mambo_extensions.mavlink.pilot_report import PilotSummary
 from mambo_extensions.mavlink.sockets import Address, MavlinkSocket, parse_link
 from mambo_sil.errors import LinkError
 from mambo_sil.results.blocks import Picture
+from tests.extensions.mavlink.support.results import write_folder as pilot_folder
 from tests.support.command import run, unwrapped
 from tests.support.links import write_drone
-from tests.support.results import pilot_folder
 
 
 @pytest.fixture

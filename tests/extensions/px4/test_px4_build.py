@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
@@ -74,7 +74,7 @@ LARGEST_CONTROLLER_BYTES, LARGEST_MODULE_BYTES = 14336, 13696
 
 def own_flags(name: str, source: str) -> list[str]:
     """Return the flags in the module's CMakeLists.txt for a source: those of all, and its own."""
-    text = render_target(SUBJECTS[name], TARGETS["px4"], with_digest=False)[f"{MODULE}CMakeLists.txt"]
+    text = render_target(SUBJECTS[name], find_target("px4"), with_digest=False)[f"{MODULE}CMakeLists.txt"]
     of_one = re.findall(
         rf"^set_source_files_properties\({source} PROPERTIES COMPILE_OPTIONS (\S+)\)$", text, re.M
     )
@@ -112,7 +112,7 @@ def test_px4_s_flags_build_it_without_a_word_and_its_own_keep_the_bits(name: str
 
 def test_every_file_includes_what_it_uses() -> None:
     """By itself or by the module's headers: the desk's stand-in has all of PX4's in one, PX4 has not."""
-    files = render_target(SUBJECTS["learnt"], TARGETS["px4"], with_digest=False)
+    files = render_target(SUBJECTS["learnt"], find_target("px4"), with_digest=False)
     code = {path.removeprefix(MODULE): text for path, text in files.items() if path.endswith(("pp", ".c"))}
     for path in filter(lambda path: path.endswith("pp"), code):
         for name, header in WHERE.items():
@@ -128,7 +128,7 @@ def included(code: Mapping[str, str], path: str) -> set[str]:
 
 def test_cmakelists_names_every_source_and_parameter() -> None:
     """And PX4 takes names of at most 16 letters."""
-    files = render_target(SUBJECTS["prefix"], TARGETS["px4"], with_digest=False)
+    files = render_target(SUBJECTS["prefix"], find_target("px4"), with_digest=False)
     names = {path.removeprefix(MODULE) for path in files if path.startswith(MODULE)}
     listed = re.findall(r"^\t\t([\w.]+\.(?:c|cpp|hpp))$", files[f"{MODULE}CMakeLists.txt"], re.MULTILINE)
     assert {*listed} == {name for name in names if name.endswith((".c", ".cpp", ".hpp"))}
@@ -142,5 +142,5 @@ def test_settings_that_do_not_fly_the_height_are_refused(tmp_path: Path) -> None
     """PX4 wants the thrust with the attitude; there is no preset, since no two drones are alike."""
     message = r"--for px4 wants settings with \[height\]"
     with pytest.raises(InvalidSettingsError, match=message):
-        render_target(presets.preset("mambo"), TARGETS["px4"])
+        render_target(presets.preset("mambo"), find_target("px4"))
     assert "--for px4 has no preset" in run("generate", "--for", "px4", "-o", str(tmp_path), code=2)[1]

@@ -10,7 +10,7 @@ from typing import Any, Final
 import cffi
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.results.shared_library import LibrarySource, built_library, load_library
@@ -40,7 +40,7 @@ def build(settings: Settings, toolchain: Toolchain) -> Path:
     files = {name: folder.joinpath(name).read_text("utf-8") for name in (*SOURCES, *HEADERS)}
     for stand_in in folder.joinpath("stand_ins").iterdir():
         files[f"stand_ins/{stand_in.name}"] = stand_in.read_text("utf-8")
-    app = render_target(settings, TARGETS[TARGET], with_digest=True)
+    app = render_target(settings, find_target(TARGET), with_digest=True)
     files |= {
         path: text for path, text in app.items() if path.startswith("src/") and path[-2:] in (".c", ".h")
     }

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulation.avr_machine import demand_skips
 from tests.support.bundles import place
@@ -57,7 +57,7 @@ def build_firmware(
     require(compiler, package)
     here = _built.get((settings.digest, board))
     if here is None or change is not None:
-        files = render_target(settings, TARGETS["pil"], with_digest=False)
+        files = render_target(settings, find_target("pil"), with_digest=False)
         before = dict(files)
         if change is not None:
             change(files)

@@ -10,7 +10,7 @@ import numpy as np
 
 import mambo_templates
 from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.controller_toml import parse
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
@@ -26,7 +26,7 @@ HERE: Final = Path(__file__).parent
 TEMPLATES: Final = Path(mambo_templates.__file__).parent / "firmware" / "px4"
 POSITION, HOLD, LAND, MPC = 2, 4, 18, 23
 """Modes of PX4: `nav_state`."""
-MODULE: Final = TARGETS["px4"].source_folder
+MODULE: Final = find_target("px4").source_folder
 FLAGS: Final = ("-O2", "-ffp-contract=off", "-Wl,-Bsymbolic", "-Wall", "-Wextra", "-Wno-unused-parameter")
 _INCLUDE: Final = re.compile(r"^#include <([a-zA-Z0-9_/]+\.(?:h|hpp))>$", re.MULTILINE)
 _FIELD: Final = re.compile(r"^(\w+?)(\d*)(?:\[(\d)\])? (\w+)(?: = (\d+))?\s*(?:#.*)?$", re.MULTILINE)
@@ -86,7 +86,7 @@ def status_ulog(rows: list[dict[str, float]], fields: list[tuple[str, str, int]]
 
 def px4_files(settings: Settings) -> dict[str, str]:
     """Return the module's C and C++ by path, with headers in the place of PX4's in the folder px4."""
-    rendered = render_target(settings, TARGETS["px4"], with_digest=False)
+    rendered = render_target(settings, find_target("px4"), with_digest=False)
     module = {path.removeprefix(MODULE): text for path, text in rendered.items() if path.startswith(MODULE)}
     code = {path: text for path, text in module.items() if path.endswith((".c", ".h", ".cpp", ".hpp"))}
     named = {name for text in code.values() for name in _INCLUDE.findall(text) if "/" in name}

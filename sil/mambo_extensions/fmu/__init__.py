@@ -1,0 +1,1 @@
+"""The functional mock-up unit of a controller: a target of `generate --for`."""
