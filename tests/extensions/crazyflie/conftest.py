@@ -1,7 +1,9 @@
 """The Crazyflie's app and its scripts, generated once."""
 
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import Final
 
 import pytest
 
@@ -9,6 +11,9 @@ from tests.extensions.crazyflie.support.crazyflie import Built, Crazyflie, build
 from tests.extensions.crazyflie.support.radio import Drone
 from tests.extensions.crazyflie.support.scripts import SETTINGS, modules_of, ready
 from tests.support.bundles import write_target
+
+collect_ignore: Final = [] if find_spec("mambo_extensions.plan") else ["test_crazyflie_laps.py"]
+"""The laps that the scripts upload are those of the extension `plan`."""
 
 
 @pytest.fixture(scope="session")

@@ -11,16 +11,8 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.drone.plant.rigid_body import to_world
 from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover
-from tests.extensions.px4.support import (
-    HOLD,
-    LAND,
-    MPC,
-    POSITION,
-    Px4Desk,
-    build_px4,
-    px4_settings,
-    status_ulog,
-)
+from tests.extensions.px4.support import HOLD, LAND, MPC, POSITION, px4_settings, status_ulog
+from tests.extensions.px4.support.px4_desk import Px4Desk, build_px4
 from tests.support.command import run
 
 SEEDS = range(3)

@@ -15,7 +15,8 @@ import pytest
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Circle
-from tests.extensions.px4.support import HOLD, MPC, Px4Desk, build_px4, px4_settings
+from tests.extensions.px4.support import HOLD, MPC, px4_settings
+from tests.extensions.px4.support.px4_desk import Px4Desk, build_px4
 from tests.support.laps import write_lap
 
 SEEDS = range(2)

@@ -9,7 +9,8 @@ from typing import Final
 import pytest
 
 from mambo_codegen.settings.controller_toml import to_toml
-from tests.extensions.px4.support import MPC, Px4Desk, build_px4, px4_settings, status_ulog
+from tests.extensions.px4.support import MPC, px4_settings, status_ulog
+from tests.extensions.px4.support.px4_desk import Px4Desk, build_px4
 from tests.support.command import run
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
