@@ -11,7 +11,7 @@ import pytest
 
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
-from tests.support.command import command
+from tests.support.command import command, of_installed
 from tests.support.tools import require, require_module
 
 FILES = {
@@ -49,13 +49,15 @@ COMMANDS = (
     "regress regress.toml",
     *(
         pytest.param(line, marks=pytest.mark.long)
-        for line in (
-            "campaign campaign.toml --flights 1 --workers 1",
-            "tune tune.toml --trials 1 --workers 1",
-            "faults slow-table1.toml --vehicle slow.toml",
-            "table2",
-            "diff slow-table1.toml slow-mambo-1norm.toml --vehicle slow.toml",
-            "sweep slow-table1.toml --vehicle slow.toml --vary horizon.prediction=5:5:1",
+        for line in of_installed(
+            (
+                "campaign campaign.toml --flights 1 --workers 1",
+                "tune tune.toml --trials 1 --workers 1",
+                "faults slow-table1.toml --vehicle slow.toml",
+                "table2",
+                "diff slow-table1.toml slow-mambo-1norm.toml --vehicle slow.toml",
+                "sweep slow-table1.toml --vehicle slow.toml --vary horizon.prediction=5:5:1",
+            )
         )
     ),
 )

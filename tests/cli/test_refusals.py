@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 from mambo_sil.cli.command import RENAMED
-from tests.support.command import run, unwrapped
+from tests.support.command import of_installed, run, unwrapped
 
-COMMANDS = ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
+COMMANDS = of_installed(
+    ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
+)
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, "init", "identify"])
@@ -29,29 +31,31 @@ def test_a_command_of_before_names_the_new_one(old: str, new: str) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [
-        "generate '' --for crazyflie -o a/b",
-        "generate -o a/b --for ''",
-        "init ''",
-        "design ''",
-        "fly '' -o a/b",
-        "fly --vehicle= -o a/b",
-        "fly --on '' -o a/b",
-        "fly --trajectory '' -o a/b",
-        "fly --repeat '' -o a/b",
-        "footprint --board '' -o a/b",
-        "check-bits --board mambo --board ''",
-        "campaign '' -o a/b",
-        "regress '' -o a/b",
-        "identify log.csv '' -o a/b",
-        "identify --manoeuvre ''",
-        "which-controller ''",
-        "replay '' -o a/b",
-        "diff mambo ''",
-        "report ''",
-        "playground mambo '' -o a.html",
-        "vehicles ''",
-    ],
+    of_installed(
+        [
+            "generate '' --for crazyflie -o a/b",
+            "generate -o a/b --for ''",
+            "init ''",
+            "design ''",
+            "fly '' -o a/b",
+            "fly --vehicle= -o a/b",
+            "fly --on '' -o a/b",
+            "fly --trajectory '' -o a/b",
+            "fly --repeat '' -o a/b",
+            "footprint --board '' -o a/b",
+            "check-bits --board mambo --board ''",
+            "campaign '' -o a/b",
+            "regress '' -o a/b",
+            "identify log.csv '' -o a/b",
+            "identify --manoeuvre ''",
+            "which-controller ''",
+            "replay '' -o a/b",
+            "diff mambo ''",
+            "report ''",
+            "playground mambo '' -o a.html",
+            "vehicles ''",
+        ]
+    ),
 )
 def test_an_empty_name_is_refused(line: str, tmp_path: Path) -> None:
     """It is the unset variable of a script; neither the default nor the current folder takes its place."""
@@ -91,26 +95,27 @@ def test_an_option_that_may_be_there_again_has_all_its_values() -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [
-        "fly contoller.toml",
-        "generate contoller.toml -o out",
-        "diff mambo contoller.toml",
-        "margins contoler.toml",
-        "fly mambo --vehicle contoller.toml",
-        "design contoller.toml",
-        "footprint --board contoller.toml",
-        "fly mambo --app crazyflie --events contoller.toml",
-        "fly mambo --trajectory contoller.csv",
-        "fly --repeat contoller.json",
-        "campaign contoller.toml",
-        "regress contoller.toml",
-        "regress --controller contoller.toml",
-        "tune contoller.toml",
-        "identify contoller.csv",
-        "replay contoller.csv mambo",
-        "which-controller contoller.elf",
-        "report contoller",
-    ],
+    of_installed(
+        [
+            "fly contoller.toml",
+            "generate contoller.toml -o out",
+            "diff mambo contoller.toml",
+            "margins contoler.toml",
+            "fly mambo --vehicle contoller.toml",
+            "design contoller.toml",
+            "footprint --board contoller.toml",
+            "fly mambo --trajectory contoller.csv",
+            "fly --repeat contoller.json",
+            "campaign contoller.toml",
+            "regress contoller.toml",
+            "regress --controller contoller.toml",
+            "tune contoller.toml",
+            "identify contoller.csv",
+            "replay contoller.csv mambo",
+            "which-controller contoller.elf",
+            "report contoller",
+        ]
+    ),
 )
 def test_a_misspelt_file_gets_the_name_of_the_one_beside_it(line: str, tmp_path: Path) -> None:
     """As a misspelt key does, in every command that takes a file."""
@@ -171,19 +176,25 @@ def test_an_option_without_effect_is_refused(line: str, message: str, tmp_path: 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "line",
-    [
-        *(f"{command} no.toml -o a/b" for command in COMMANDS if command != "table2"),
-        *(f"{command} --scalar flat -o a/b" for command in COMMANDS if command not in ("campaign", "tune")),
-        "footprint --optimisation=fast --board crazyflie -o a/b",
-        "table2 --sensors --scalar flat -o a/b",
-        "campaign --flights 0 -o a/b",
-        "campaign --scheduler tcp://127.0.0.1:9 -o a/b",
-        "tune --trials 0 -o a/b",
-        "tune --storage nowhere -o a/b",
-        "identify no.csv --columns x -o a/b",
-        "init no-preset -o a/b",
-        "design no-drone -o a/b",
-    ],
+    of_installed(
+        [
+            *(f"{command} no.toml -o a/b" for command in COMMANDS if command != "table2"),
+            *(
+                f"{command} --scalar flat -o a/b"
+                for command in COMMANDS
+                if command not in ("campaign", "tune")
+            ),
+            "footprint --optimisation=fast --board crazyflie -o a/b",
+            "table2 --sensors --scalar flat -o a/b",
+            "campaign --flights 0 -o a/b",
+            "campaign --scheduler tcp://127.0.0.1:9 -o a/b",
+            "tune --trials 0 -o a/b",
+            "tune --storage nowhere -o a/b",
+            "identify no.csv --columns x -o a/b",
+            "init no-preset -o a/b",
+            "design no-drone -o a/b",
+        ]
+    ),
 )
 def test_a_refused_command_leaves_nothing(line: str, tmp_path: Path) -> None:
     """Exit 2, a message without traceback, and the folder as it was."""

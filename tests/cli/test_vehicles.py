@@ -10,10 +10,10 @@ import pytest
 from mambo_codegen.settings.toml_file import parse_document
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.scenario import read_record
-from tests.support.command import run, unwrapped
+from tests.support.command import of_installed, run, unwrapped
 from tests.support.tools import require_module
 
-FLYING = ("fly", "sweep", "tune", "campaign", "faults", "regress")
+FLYING = of_installed(("fly", "sweep", "tune", "campaign", "faults", "regress"))
 DRONE = """\
 [body]
 mass_kg = 0.03
@@ -130,17 +130,6 @@ def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     assert "the trace equals the recorded one, bit for bit" in said
     _, said = run("campaign", "campaign.toml", "--flights", "2", "-o", "out", code=2)
     assert 'flight.vehicle = "mine" instead of "mambo"' in said
-
-
-@pytest.mark.long
-def test_a_study_states_its_drone() -> None:
-    """In its summary and in its identity."""
-    require_module("optuna")
-    text = 'flights = 1\nbase = "mambo-1norm"\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
-    Path("tune.toml").write_text(text + "[search]\noptimizer.iterations = { choice = [4, 5] }\n", "utf-8")
-    run("tune", "tune.toml", "--trials", "1", "--workers", "1", "-o", "out")
-    assert summary("out")["vehicle"] == vehicle_toml.load("mine.toml").model_dump(mode="json")
-    assert json.loads(Path("out/study.json").read_text("utf-8"))["vehicle"]["name"] == "mine"
 
 
 @pytest.mark.long

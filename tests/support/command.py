@@ -3,12 +3,14 @@
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
 from typer.testing import CliRunner
 
-from mambo_sil.cli.app import app
+from mambo_codegen import extensions
+from mambo_sil.cli.app import app, panels
 
 MAIN: Final = "from mambo_sil.cli.app import main; main()"
 """The script that is mambo-nmpc."""
@@ -21,6 +23,16 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
     result = CliRunner().invoke(app(), arguments)
     assert result.exit_code == code, (result.output, result.exception)
     return result.stdout, without_progress(result.stderr)
+
+
+def of_installed(lines: Iterable[str]) -> list[str]:
+    """Return the lines without those of commands and apps whose extension is not there."""
+    commands = {name for panel in panels().values() for name in panel}
+    return [
+        line
+        for line in lines
+        if line.split()[0] in commands and ("--app" not in line or extensions.names("apps"))
+    ]
 
 
 def without_progress(text: str) -> str:

@@ -57,6 +57,7 @@ def test_a_broken_bound_fails() -> None:
             ("--trajectory", "high.py:High"),
             "--trajectory high.py:High: its height at 0 s, 12 m, must lie in 0.1..10 m with --app",
         ),
+        (("--events", "wrung.toml"), "(did you mean wrong.toml?)"),
         (("--events", "wrong.toml"), "heigt_m is not a key of this file; did you mean height_m?"),
         (("--events", "late.toml"), "nmpc.tild is not a parameter of this app"),
     ],

@@ -1,5 +1,6 @@
 """The files of `tune`: what reads them, and what `design` has to do with them."""
 
+import json
 import os
 from pathlib import Path
 
@@ -8,7 +9,9 @@ import pytest
 from mambo_codegen.errors import MamboNmpcError
 from mambo_codegen.settings.presets import load
 from mambo_extensions.tune.tuning_file import read
+from mambo_sil.drone.vehicles import vehicle_toml
 from tests.support.command import run
+from tests.support.tools import require_module
 
 
 @pytest.mark.usefixtures("in_an_empty_folder")
@@ -38,3 +41,17 @@ def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path) -> Non
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(MamboNmpcError, match=r"pipe: cannot be read: it is a pipe or a device; name a plain"):
         read(tmp_path / "pipe")
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_a_study_states_its_drone() -> None:
+    """In its summary and in its identity."""
+    require_module("optuna")
+    Path("mine.toml").write_text(run("vehicles", "generic")[0], "utf-8")
+    text = 'flights = 1\nbase = "mambo-1norm"\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
+    Path("tune.toml").write_text(text + "[search]\noptimizer.iterations = { choice = [4, 5] }\n", "utf-8")
+    run("tune", "tune.toml", "--trials", "1", "--workers", "1", "-o", "out")
+    drone = vehicle_toml.load("mine.toml").model_dump(mode="json")
+    assert json.loads(Path("out/summary.json").read_text("utf-8"))["vehicle"] == drone
+    assert json.loads(Path("out/study.json").read_text("utf-8"))["vehicle"]["name"] == "mine"

@@ -70,9 +70,11 @@ def _known_controller(value: str) -> str:
 
 def _known_app(value: str | None) -> str | None:
     """Return the name of an app that an extension flies; refuses others."""
-    if value is None or value in extensions.names("apps"):
+    known = extensions.names("apps")
+    if value is None or value in known:
         return value
-    raise typer.BadParameter(f"{echo(value)} is none of {', '.join(extensions.names('apps'))}")
+    others = f"is none of {', '.join(known)}" if known else "is not there, since no extension flies an app"
+    raise typer.BadParameter(f"{echo(value)} {others}")
 
 
 @dataclass(frozen=True)
