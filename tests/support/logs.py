@@ -316,7 +316,8 @@ def ulog(
 ) -> bytes:
     """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body.
 
-    Where the columns have a seen position, the camera measured it, in the axes of the estimate.
+    Where the columns have a seen position, the camera measured it, in the axes of the estimate; a commanded
+    heading is that of the set-point.
 
     `target` names the columns of position, velocity and acceleration of the target, as far as it has them;
     `hover` is the estimated share of the thrust in hover, where the columns have a thrust.
@@ -334,7 +335,7 @@ def ulog(
     motion = [columns[name] for name in ("x_m", "y_m")] + [columns.get("z_m", 0.0 * roll - 1.0)]
     motion += [columns[name] for name in ("vx_m_s", "vy_m_s")]
     topics = [
-        (_quaternion(commands[0], commands[1], yaw) if quaternion else commands)
+        (_quaternion(*commands, columns.get("yaw_command_rad", yaw)) if quaternion else commands)
         + (thrust if "thrust_command" in columns else []),
         _quaternion(roll, pitch, yaw),
         motion,

@@ -12,6 +12,7 @@ from mambo_sil.drone.sensors.drift import DriftingEstimate, DriftSuite
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import AutopilotSensors
 from mambo_sil.errors import LogError
+from mambo_sil.flight.frames import turned_tilt
 from mambo_sil.model.identify.estimator import estimator_errors
 from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.identify.identify_report import vehicle_text
@@ -52,6 +53,19 @@ def test_a_dataflash_log_is_read(angles: str, tmp_path: Path) -> None:
     assert wanted.roll.fitted is not None
     assert abs(found.roll.fitted.sum_s.value - wanted.roll.fitted.sum_s.value) < 1e-3
     assert abs(found.roll.fitted.gain.value - wanted.roll.fitted.gain.value) < 1e-3
+
+
+def test_commands_of_px4_are_read_at_the_heading_of_the_drone(tmp_path: Path) -> None:
+    """It lags that of the set-point, by up to 1.5 rad here, to which roll and pitch of the log belong."""
+    lead_rad = 1.5 * np.sin(FLOWN["time_s"])
+    tilts = zip(FLOWN["roll_command_rad"], FLOWN["pitch_command_rad"], lead_rad, strict=True)
+    names = ("roll_command_rad", "pitch_command_rad")
+    sent = dict(zip(names, np.array([turned_tilt(*one) for one in tilts]).T, strict=True))
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog(FLOWN | sent | {"yaw_command_rad": FLOWN["yaw_rad"] + lead_rad}, quaternion=True))
+    (log,), _ = read_logs([path], {})
+    for name in names:
+        np.testing.assert_allclose(log.signals[name].value, FLOWN[name], atol=1e-6)
 
 
 def test_the_thrust_is_over_mass_where_hover_is_estimated(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
+from mambo_sil.flight.frames import turned_tilt
 from mambo_sil.model.identify.csv_log import LONGEST_PERIOD_S, demand_one_clock, reading
 from mambo_sil.model.identify.signals import (
     GROUNDED,
@@ -129,7 +130,7 @@ def _signals(topics: Mapping[str, Mapping[str, FloatArray]], name: str) -> dict[
         raise LogError(tuple(faults))
     command, attitude = topics[SETPOINT], topics[ATTITUDE]
     signals = {}
-    for angle, values in _commands(command).items():
+    for angle, values in _commands(command, attitude).items():
         signals[f"{angle}_command_rad"] = stamped(command[_CLOCK], values, f"{SETPOINT}.{angle}")
     for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
         values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
@@ -214,13 +215,27 @@ def _steps(steps: Mapping[str, FloatArray], flies: NDArray[np.bool_]) -> dict[st
     }
 
 
-def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the commanded roll and pitch: roll_body and pitch_body, or the angles of the quaternion q_d."""
-    direct = [setpoint.get(f"{angle}_body") for angle in _ANGLES[:2]]
-    if all(each is not None and np.isfinite(each).any() for each in direct):
-        return {angle: each for angle, each in zip(_ANGLES, direct, strict=False) if each is not None}
-    parts = [setpoint[f"q_d[{i}]"] for i in range(4)]
-    return dict(zip(_ANGLES[:2], _euler_rad(parts)[:2], strict=True))
+def _commands(
+    setpoint: Mapping[str, FloatArray], attitude: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the commanded roll and pitch: roll_body and pitch_body, or the angles of the quaternion q_d.
+
+    They are those of the heading of the set-point, which the drone lags; returned are those of the drone's.
+    """
+    roll, pitch, yaw = (setpoint.get(f"{angle}_body") for angle in _ANGLES)
+    if roll is None or pitch is None or not (np.isfinite(roll).any() and np.isfinite(pitch).any()):
+        roll, pitch, yaw = _euler_rad([setpoint[f"q_d[{i}]"] for i in range(4)])
+    if yaw is not None and attitude[_CLOCK].size:
+        turns = np.nan_to_num(_yaw_at(setpoint[_CLOCK], attitude) - yaw)
+        known = [np.where(np.isfinite(each), each, np.nan).tolist() for each in (roll, pitch, turns)]
+        roll, pitch = np.array([turned_tilt(*one) for one in zip(*known, strict=True)]).reshape(-1, 2).T
+    return {"roll": roll, "pitch": pitch}
+
+
+def _yaw_at(clock: FloatArray, attitude: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the heading (k,) that was the newest at each time (k,)."""
+    yaw_rad = _euler_rad([attitude[f"q[{i}]"] for i in range(4)])[2]
+    return yaw_rad[np.maximum(np.searchsorted(attitude[_CLOCK], clock, side="right") - 1, 0)]
 
 
 def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray] | None) -> dict[str, Signal]:
