@@ -126,7 +126,7 @@ def _library(include: str) -> ctypes.CDLL:
         "crazyflow",
         (files, header.read_text("utf-8")),
         lambda: files,
-        (*_FLAGS, f"-I{include}"),
+        (*_FLAGS, "-isystem", include),
         ffi,
         ("-lm",),
     )
