@@ -178,10 +178,8 @@ FIGURES = [
     ),
     Figure(
         "docs/how-to/plan.md",
-        r"without them the quickest lap that all fly is (.+?) % slower",
-        lambda: "{} and {} % quicker, on the third course {}".format(
-            *(shown(abs(one)) for one in quicker("largest share", "with lag and dead time"))
-        ),
+        r"without them the quickest lap that all fly is (.+?) % quicker",
+        lambda: "{}, {} and {}".format(*map(shown, quicker("largest share", "with lag and dead time"))),
     ),
     Figure(
         "docs/reference/python.md",
