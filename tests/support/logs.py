@@ -331,11 +331,15 @@ def ulog(
         "vehicle_local_position": "uint64_t timestamp;float x;float y;float z;float vx;float vy;",
     }
     roll, pitch, yaw = (columns[f"{name}_rad"] for name in ("roll", "pitch", "yaw"))
-    commands = [columns["roll_command_rad"], columns["pitch_command_rad"]]
+    roll_command, pitch_command = columns["roll_command_rad"], columns["pitch_command_rad"]
     motion = [columns[name] for name in ("x_m", "y_m")] + [columns.get("z_m", 0.0 * roll - 1.0)]
     motion += [columns[name] for name in ("vx_m_s", "vy_m_s")]
     topics = [
-        (_quaternion(*commands, columns.get("yaw_command_rad", yaw)) if quaternion else commands)
+        (
+            _quaternion(roll_command, pitch_command, columns.get("yaw_command_rad", yaw))
+            if quaternion
+            else [roll_command, pitch_command]
+        )
         + (thrust if "thrust_command" in columns else []),
         _quaternion(roll, pitch, yaw),
         motion,
