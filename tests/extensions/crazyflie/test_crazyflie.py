@@ -242,7 +242,7 @@ def test_the_log_shows_commands_saturation_and_disturbance(app: Crazyflie) -> No
 def test_a_jump_of_the_estimate_comes_little_by_little(app: Crazyflie) -> None:
     """At once the whole would tilt it to the limit; what stays is all there in a second."""
     app.aim(np.zeros(6))
-    flown_since(app, np.zeros(7), 20)
+    flown_since(app, np.zeros(7), 200)
     jumped = 0.1 * np.eye(7)[0]
     assert 1.0 < np.max(np.abs(flown_since(app, jumped, 3))) < 5.0
     assert app.logged("x") < 0.02
