@@ -19,12 +19,7 @@ ROOT: Final = Path(__file__).parents[1]
 EXTENSIONS: Final = ("crazyflie", "fmu", "mavlink", "pil", "plan", "playground", "px4", "tune")
 ROOTS: Final = ("codegen", "sil", "templates")
 TESTED: Final = (
-    *(
-        "tests/test_house.py",
-        "tests/api/test_api.py",
-        "tests/report/test_report.py",
-        "tests/targets/test_mambo.py",
-    ),
+    *("tests/test_house.py", "tests/api/test_api.py", "tests/report/test_report.py"),
     *("tests/cli/test_start.py", "tests/cli/test_design.py", "tests/cli/test_refusals.py"),
     *("tests/codegen/test_targets.py", "tests/codegen/test_sbom.py", "tests/codegen/test_plain_file.py"),
     *("tests/experiment/campaign/test_campaign.py", "tests/targets/test_mambo.py"),
