@@ -7,8 +7,8 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from tests.support.derived import settings_for
 from tests.support.tools import require
 
-MOST_INSTRUCTIONS = 740
-MOST_WITH_A_STEP = 4720
+MOST_INSTRUCTIONS = 750
+MOST_WITH_A_STEP = 4800
 MOST_FRAME_BYTES = 160
 
 

@@ -250,6 +250,21 @@ def test_a_jump_of_the_estimate_comes_little_by_little(app: Crazyflie) -> None:
     assert app.logged("x") == pytest.approx(0.1, abs=0.002)
 
 
+@pytest.mark.parametrize("wild", [np.inf, np.nan, 1e30, 50.0])
+@pytest.mark.parametrize("place", [0, 3])
+def test_a_wild_estimate_leaves_nothing(wild: float, place: int, app: Crazyflie) -> None:
+    """What is no number would stay for good, and what is far for long."""
+    app.aim(np.zeros(6))
+    flown_since(app, np.zeros(7), 200)
+    state = 0.1 * np.eye(7)[1]
+    state[place] = wild
+    flown_since(app, state, 1)
+    flown_since(app, np.zeros(7), 40)
+    assert app.logged("status") == 0
+    assert app.logged("x") == pytest.approx(0.0, abs=0.02)
+    assert app.logged("vx") == pytest.approx(0.0, abs=0.02)
+
+
 def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_path: Path) -> None:
     """The console names the step and the flag; the firmware then refuses to fly."""
     app = built.app()
