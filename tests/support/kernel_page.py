@@ -135,7 +135,7 @@ class ObservedAxis:
         self.desired = clamp(self.desired + change_m_s, self.numbers.v)
 
     def _begin(self, known: int) -> None:
-        """Step 1: the kind of set-points."""
+        """Velocities or accelerations begin."""
         if known == 0 and self.n == 0:
             self.n, self.h, self.nu = self.numbers.n_f, 0.03, 0.0
             self.cases["velocities begin"] += not self.is_first
@@ -144,7 +144,7 @@ class ObservedAxis:
             self.cases["accelerations begin"] += 1
 
     def _start(self, velocity: float, now: float, later: float, known: int) -> None:
-        """Step 1: the first set-point, and every one with `known` 2."""
+        """Take what is given: the first set-point, and every one with `known` 2."""
         self.cases[f"first, known {known}"] += self.is_first
         before = self.j
         self.a = now if known else 0.0
@@ -154,12 +154,12 @@ class ObservedAxis:
         self.v, self.nu, self.m, self.is_first = velocity, 0.0, 0, False
 
     def _predict(self) -> None:
-        """Step 2."""
+        """Predict a step."""
         v, a, j, s = self.v, self.a, self.j, self.s
         self.v, self.a, self.j = v + (a + (j / 2 + s / 6)), a + (j + s / 2), j + s
 
     def _judge(self, x: float, jump: float) -> str:
-        """Step 3: return whether the set-point is "accepted", "rejected", or a "jump"."""
+        """Return whether the set-point is "accepted", "rejected", or a "jump"."""
         trust, was = jump + 4 * self.h, self.m
         change = min(abs(x - self.nu), trust)
         self.h = min(self.h + self.numbers.gamma * (change - self.h), self.numbers.most_h)
@@ -169,7 +169,7 @@ class ObservedAxis:
         return "accepted" if accepted else "rejected" if was == 0 else "jump"
 
     def _correct_velocity(self, velocity: float) -> None:
-        """Step 4."""
+        """Correct by the velocity."""
         number, has_turned = self.numbers, self.m == 2
         x = 0.0 if has_turned else velocity - self.v
         verdict = self._judge(x, number.jump)
@@ -188,7 +188,7 @@ class ObservedAxis:
         self._limit(number.s)
 
     def _correct_acceleration(self, velocity: float, now: float) -> None:
-        """Step 5."""
+        """Correct by the acceleration."""
         number, x = self.numbers, now - self.a
         self.cases["turned, known 1"] += self.m == 2
         verdict = self._judge(x, number.known_jump)
@@ -214,7 +214,7 @@ class ObservedAxis:
             self.cases[f"largest {name}"] += abs(getattr(self, name)) == most
 
     def _feed(self, known: int) -> None:
-        """Set A_T and J_T: step 6."""
+        """Set A_T and J_T."""
         number = self.numbers
         self.fed_a = number.period_s * self.a
         self.fed_j = number.period_s * self.j + (number.snap_s - 0.025 * (known == 2)) * self.s
