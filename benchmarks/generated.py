@@ -16,7 +16,7 @@ import cffi
 
 from mambo_codegen import kept
 from mambo_codegen.atomic import put
-from mambo_codegen.bundle.digest import kept_digest
+from mambo_codegen.bundle.digest import kept_digest, start_up_test
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
@@ -50,6 +50,7 @@ def preset_results(name: str, scalar: str) -> dict[str, Any]:
         except InvalidSettingsError:
             return {}
         kept_digest(method)
+        start_up_test(method.settings)
     return results
 
 

@@ -8,7 +8,6 @@ in parallel arrays when the C is generated.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -97,14 +96,20 @@ def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
         yield step.state, step.target, step.thrust
 
 
-@lru_cache(maxsize=64)
 def start_up_test(settings: Settings) -> StartUpTest:
-    """Return the self-test at start-up: of some episodes the first with the most rows, uses and ways to end.
+    """Return the self-test at start-up, which is kept: a bundle without the whole digest needs it too."""
+    episode, digests = keep(
+        "start-up test", settings.model_dump(mode="json"), lambda: _choose(method_of(settings))
+    )
+    return StartUpTest(episode, tuple(digests))
+
+
+def _choose(method: Method) -> tuple[int, list[int]]:
+    """Return of some episodes the first with the most rows, uses and ways to end, and its digests.
 
     Its first step has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails.
     """
-    method = method_of(settings)
     run, episodes = _Run(method, _CANDIDATES), Episodes(method, np.arange(_CANDIDATES, dtype=np.uint32))
     run.make_tiny()
     digests, ways, uses = [run.digests], list[NDArray[Any]](), list[NDArray[Any]]()
@@ -116,7 +121,7 @@ def start_up_test(settings: Settings) -> StartUpTest:
     often = np.minimum(np.sum(uses, axis=0), _OFTEN)
     found = (_MOST_USED * np.sum(often > 0, axis=1)) + np.sum(often, axis=1)
     best = int(np.argmax((_FLAGS * found) + kinds))
-    return StartUpTest(best, tuple(int(one[best]) for one in digests))
+    return best, [int(one[best]) for one in digests]
 
 
 class _Run:

@@ -52,7 +52,9 @@ def infix(text: str) -> str:
 
     Lines that come out longer than `COLUMNS` are wrapped.
     """
-    while found := CALL.search(text):
+    place = 0
+    while found := CALL.search(text, place):
+        place = found.start()
         end, arguments = arguments_of(text, found.end())
         product = form(found[1], arguments)
         before, after = text[: found.start()].rstrip(_BLANKS), text[end:].lstrip(_BLANKS)
