@@ -7,7 +7,6 @@ in parallel arrays when the C is generated.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -56,14 +55,6 @@ Outcome = Mapping[str, NDArray[Any]]
 """What calls of n controllers have left, as in `ReferenceController.outcome`."""
 
 
-@dataclass(frozen=True)
-class StartUpTest:
-    """The self-test at start-up: an episode, and the digests of all results up to each of its steps."""
-
-    episode: int
-    digests: tuple[int, ...]
-
-
 def episode_count(method: Method) -> int:
     """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
     states, iterations = method.work
@@ -96,16 +87,16 @@ def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
         yield step.state, step.target, step.thrust
 
 
-def start_up_test(settings: Settings) -> StartUpTest:
-    """Return the self-test at start-up, which is kept: a bundle without the whole digest needs it too."""
-    episode, digests = keep(
-        "start-up test", settings.model_dump(mode="json"), lambda: _choose(method_of(settings))
+def start_up_test(settings: Settings) -> dict[str, Any]:
+    """Return the self-test at start-up: an episode, and the digests up to each of its steps; it is kept."""
+    kept: dict[str, Any] = keep(
+        "start-up test", settings.model_dump(mode="json"), lambda: _start_up_test(method_of(settings))
     )
-    return StartUpTest(episode, tuple(digests))
+    return kept
 
 
-def _choose(method: Method) -> tuple[int, list[int]]:
-    """Return of some episodes the first with the most rows, uses and ways to end, and its digests.
+def _start_up_test(method: Method) -> dict[str, Any]:
+    """Find of some episodes the first with the most rows, uses and ways to end.
 
     Its first step has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails.
@@ -121,7 +112,7 @@ def _choose(method: Method) -> tuple[int, list[int]]:
     often = np.minimum(np.sum(uses, axis=0), _OFTEN)
     found = (_MOST_USED * np.sum(often > 0, axis=1)) + np.sum(often, axis=1)
     best = int(np.argmax((_FLAGS * found) + kinds))
-    return best, [int(one[best]) for one in digests]
+    return {"episode": best, "digests": [int(one[best]) for one in digests]}
 
 
 class _Run:
