@@ -207,6 +207,7 @@ def test_a_command_of_others_moves_the_model() -> None:
     assert used.report_command([[np.nan, 0.1]])[0] == Status.BAD_COMMAND
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize(("values", "largest_m"), [(TWO_MOVES, 5e-4), (ONE_MOVE, 1.1e-3)])
 def test_a_target_on_a_circle_is_followed_closely(values: Values, largest_m: float) -> None:

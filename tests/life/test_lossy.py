@@ -189,6 +189,7 @@ def fly_to_the_end(one: LossyFlight, happens: Callable[[LossyFlight], None]) -> 
     return "" if one.life.end is None else one.life.end.sentence
 
 
+@pytest.mark.sampled(6)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("delay_s", DELAYS_S)
 @pytest.mark.parametrize("lost", LOST)

@@ -40,6 +40,7 @@ def test_no_angle_exceeds_the_stated_error(scalar: str, tmp_path: Path) -> None:
     assert 0.8 * SINE_ERRORS[scalar] < largest <= SINE_ERRORS[scalar]
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     ("coefficients", "first_power", "exact", "largest"),
     [

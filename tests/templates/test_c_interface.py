@@ -300,6 +300,7 @@ def test_the_estimate_is_in_si_units() -> None:
     assert np.all(disturbances != 0)
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", CORNERS)

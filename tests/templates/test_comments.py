@@ -27,6 +27,7 @@ def test_what_fits_stays() -> None:
     assert fitted(text) == text
 
 
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize("name", OPTIONS)
 def test_no_comment_of_a_bundle_is_too_long(name: str) -> None:
     """Of any option."""

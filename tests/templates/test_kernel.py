@@ -81,6 +81,7 @@ int main(void)
 """
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(("compiler", "settings"), MANY)
 def test_a_compiler_reads_the_kernel_as_it_stands(compiler: str, settings: Settings, tmp_path: Path) -> None:
     """Beside header and other chapters of a shape, without a word, with the bits of the reference."""
@@ -126,6 +127,7 @@ def kept(text: str, parts: Mapping[str, bool]) -> str:
     return "".join(done.stdout.split())
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("chapter", CHAPTERS, ids=lambda path: f"{path.parent.name} {path.stem}")
 def test_jinja_and_the_preprocessor_keep_the_same_lines(chapter: Path) -> None:
     """With any parts, together or not."""

@@ -84,6 +84,7 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
     assert float(np.max(np.abs(cosine - np.cos(exact)))) < SINE_ERRORS[scalar]
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)

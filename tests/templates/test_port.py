@@ -25,6 +25,7 @@ def kept_numbers(port: ControllerPort, record: str, before: str = "") -> Iterato
                 yield from kept_numbers(port, row.kind, f"{place}.")
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", OPTIONS)
 def test_numbers_lie_where_the_table_has_them(name: str, tmp_path: Path) -> None:
     """Of what is taken one behind the other, integers last; with a quadratic cost of what is kept too."""

@@ -111,6 +111,7 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
     compare(Estimate(*[np.zeros((1, 2), blocks.scalar)] * 3))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)

@@ -136,6 +136,7 @@ def test_the_first_step_with_a_wrong_output_is_named(scalar: str, tmp_path: Path
     assert Bench(scalar, tmp_path).passes()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_every_fault_of_the_comparisons_is_noticed(scalar: str, tmp_path: Path) -> None:

@@ -19,9 +19,9 @@ from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.strategies import any_settings, settings_in
 from tests.support.strict_builds import built
 
-SHARDS = range(6)
-VALID_EACH = 12
-"""More than 10: some are drawn twice, such as the simplest settings, with which every shard begins."""
+SHARDS = range(12)
+VALID_EACH = 6
+"""More than 5: some are drawn twice, such as the simplest settings, with which every shard begins."""
 
 STEPS = 4
 USUAL_WORK = 10_000
@@ -80,7 +80,7 @@ def test_broken_settings_are_refused_in_words(text: str, fault: str, tmp_path: P
     assert [path.name for path in tmp_path.iterdir()] == ["own.toml"]
 
 
-@pytest.mark.sampled(6)
+@pytest.mark.sampled(12)
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_sixty_settings_go_the_whole_way(shard: int) -> None:

@@ -54,7 +54,7 @@ MANY_SETTINGS = [
 ]
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(("method", "index", "scalar"), FEW_SETTINGS)
 def test_steps_equal_the_reference(method: str, index: int, scalar: str) -> None:
@@ -108,7 +108,7 @@ def libraries(settings: Settings, builds: Sequence[tuple[str, str]] = BUILDS) ->
     }
 
 
-@pytest.mark.sampled(8)
+@pytest.mark.sampled(16)
 @pytest.mark.long
 @pytest.mark.parametrize(("method", "index", "scalar"), MANY_SETTINGS)
 def test_steps_by_the_thousand_equal_the_reference_in_every_build(

@@ -196,6 +196,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
     assert len(np.unique(outcomes["thrust_m_s2"])) > 200
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     ("corner", "scalar"),
     [
@@ -210,7 +211,7 @@ def test_random_calls_have_the_bits_of_the_reference(corner: str, scalar: str, t
     assert played_fault(subject(settings, tmp_path), "-O0", played=played(settings)) is None
 
 
-@pytest.mark.sampled(2)
+@pytest.mark.sampled(4)
 @pytest.mark.parametrize(
     ("corner", "fault"),
     [

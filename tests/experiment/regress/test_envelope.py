@@ -55,6 +55,7 @@ def test_the_envelope_of_every_preset_is_known() -> None:
     assert set(KNOWN) == {*presets.names(), PD_FEEDFORWARD}
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("controller", KNOWN)
 def test_a_controller_fails_where_it_is_known_to(controller: str) -> None:

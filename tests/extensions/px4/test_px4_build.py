@@ -95,6 +95,7 @@ def compiled(name: str, folder: Path) -> dict[str, Path]:
     return objects
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_px4_s_flags_build_it_without_a_word_and_its_own_keep_the_bits(name: str, tmp_path: Path) -> None:

@@ -56,6 +56,7 @@ def flown(settings: Settings, drone: VehicleFile, curve: CurveName, *, noisy: bo
     return trace
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", vehicle_toml.names())
 def test_a_shipped_drone_flies_well_with_them(name: str) -> None:

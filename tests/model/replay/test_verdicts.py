@@ -83,7 +83,7 @@ def lost_rows(rows: int, share: float, kind: str, seed: int) -> list[int]:
     return [k for start in starts for k in range(start, start + length)]
 
 
-@pytest.mark.sampled(25)
+@pytest.mark.sampled(50)
 @pytest.mark.parametrize("seed", range(100))
 def test_a_log_that_lost_rows_tells_its_controller_from_others(seed: int) -> None:
     """No wrong yes and no wrong no, with 0 to 20 % of the rows lost; only hovers may leave it open."""
