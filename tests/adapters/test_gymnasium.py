@@ -241,6 +241,7 @@ def test_many_are_seen_through_cameras_in_wind() -> None:
         many.step(np.zeros(2))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("vehicle", "sensors"),

@@ -43,6 +43,7 @@ def test_shipped_results_are_of_this_source() -> None:
     assert len(shipped()) >= len(presets.names())
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", presets.names())
 def test_shipped_results_are_what_the_source_computes(name: str) -> None:

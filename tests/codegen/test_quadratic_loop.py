@@ -108,6 +108,7 @@ def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> N
     assert np.abs(drone.states[:, :2]).max() < max(1e-6, 0.5 * early)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize(
     "yaw_rad", [0.8, *(pytest.param(yaw, marks=pytest.mark.long) for yaw in (0.0, -2.5))]
 )

@@ -114,6 +114,7 @@ def tilt_change_deg(one: Array, other: Array) -> float:
     return float(np.degrees(np.abs(one - other)[JUMPS_AT:, :2].max()))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("name", ["height", "mambo", "mambo-1norm"])

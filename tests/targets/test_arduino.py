@@ -72,6 +72,7 @@ def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Pat
     assert refused == 0
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_core_of_debian_builds_and_links_the_example_for_the_mega(name: str, tmp_path: Path) -> None:

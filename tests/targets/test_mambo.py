@@ -203,6 +203,7 @@ def test_the_thrust_is_taken_over_in_the_air(tmp_path: Path) -> None:
                 np.testing.assert_allclose(found[4:], [-thrust_n, begun], atol=1e-5)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("optimisation", ["-O0", "-O3"])
 @pytest.mark.parametrize("name", SUBJECTS)

@@ -187,6 +187,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path) -> None:
     assert not (tmp_path / "build").exists()
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "settings",

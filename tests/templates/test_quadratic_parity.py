@@ -66,6 +66,7 @@ class SubBlocks:
         return self.pointer("nmpc_real_t", values)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
@@ -164,6 +165,7 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         compare(model.steady(angles))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)

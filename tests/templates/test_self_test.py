@@ -164,6 +164,7 @@ def test_the_self_test_notices_a_broken_line_of_every_function(tmp_path: Path) -
     assert [one.wrong_line for one, by in noticed.items() if by is Noticed.NEVER] == []
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", TABLED)
 def test_the_self_test_at_start_up_uses_every_number_of_every_table(name: str, tmp_path: Path) -> None:

@@ -190,6 +190,7 @@ def it_blocks(image: Image) -> dict[int, list[int]]:
     return blocks
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_counting_blocks_agrees_with_counting_instructions(name: str, tmp_path: Path) -> None:

@@ -179,6 +179,7 @@ def test_a_tiny_budget_is_exceeded_everywhere() -> None:
     assert "nmpc_step" in largest[1]
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("name", "scalar", "wrong", "kind"),

@@ -112,6 +112,7 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
     assert len({*digests, self_test_digest(OneNorm(MAMBO), 4)}) == len(digests) + 1
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", [0, 3, 7, 9])

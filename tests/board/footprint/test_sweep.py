@@ -148,6 +148,7 @@ def test_points_read_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read, list(expected.values()))
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "points", [[POINT], [UNMEASURED], [POINT, point(20, 2, 1.0, fits=False)], [REFUSED], [POINT, REFUSED]]

@@ -178,6 +178,7 @@ main()
 """
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("stop", "code"),

@@ -66,6 +66,7 @@ NEAR = 1.0 + 1e-3 * np.linspace(-1.0, 1.0, 801)
 """Factors on frequencies at which python-control, which interpolates between points, needs many."""
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
 @pytest.mark.parametrize(("name", "drone"), PAIRS)

@@ -49,6 +49,7 @@ SUBJECTS = {
 }
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path) -> None:

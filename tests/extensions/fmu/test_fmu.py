@@ -160,6 +160,7 @@ def same(left: Sequence[Any], right: Sequence[Any]) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(left, right, strict=True))
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", ["mambo", *(pytest.param(name, marks=pytest.mark.long) for name in OTHERS)])
 def test_both_units_fly_with_the_bits_of_the_controller_alone(
     name: str, unit_file: Callable[[str, str], Path], unpacked: Callable[[str, str], Path]

@@ -326,6 +326,7 @@ def test_the_pilots_switch_takes_the_drone() -> None:
     assert {type(order) for order in flight.autopilot.orders} <= {SetAttitude}
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.long
 @pytest.mark.parametrize("stack", BOTH)
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0])

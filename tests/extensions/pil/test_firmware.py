@@ -82,6 +82,7 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
     demand_same_bits(summary, 21, names[board])
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "scalar"),

@@ -63,6 +63,7 @@ def test_elementary_functions(engine: Path) -> None:
     assert unified(tabulate(engine)) == unified(expected)
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("derotated", [False, True])
 @pytest.mark.parametrize("noise_scale", [0.0, 1.0])

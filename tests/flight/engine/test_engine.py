@@ -146,6 +146,7 @@ def test_every_build_has_the_same_bits(build: Toolchain, lanes: int, known: list
     assert digests(engine) == known
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 4)) for lanes in LANES]
 )
@@ -168,6 +169,7 @@ def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> Non
     assert not re.search(r"\bvf(n?m)(add|sub)", code)
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize(
     "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 1)) for lanes in LANES]
 )

@@ -69,6 +69,7 @@ OTHERS: Final = {
 }
 
 
+@pytest.mark.sampled(3)
 @pytest.mark.parametrize("name", RIGHT)
 def test_what_a_file_or_a_radio_loses_is_no_other_controller(
     name: str, flight: tuple[Columns, Settings], tmp_path: Path

@@ -68,6 +68,7 @@ def test_settings_for_cameras_are_worse_over_a_flow_deck(name: str, app: Path) -
     assert measures["lost_s"] == 0.0
 
 
+@pytest.mark.sampled(2)
 @pytest.mark.parametrize("name", sorted({*events_file.EVENTS.names()} - {*NOT_THE_PRESETS}))
 def test_an_event_keeps_its_bounds_with_the_preset(name: str, preset_app: Path) -> None:
     """Which leaves the height to the firmware's PID controller."""
