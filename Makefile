@@ -45,7 +45,8 @@ CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/r
 # Beside them, with the least versions: the text of the bundles, the commands that derive, generate, fly and judge, and the
 # disassembler and emulator. It leaves out what compares bits of C and reference in every build, and what wants optional packages.
 LOWEST = build/lowest
-LOWEST_TESTED = $(filter-out tests/test_house.py tests/codegen/test_sbom.py tests/drone/plant,$(CHECKED)) tests/templates/test_generated.py tests/templates/test_parity.py \
+LOWEST_TESTED = $(filter-out tests/test_house.py tests/board/firmware tests/drone/plant \
+        $(addprefix tests/codegen/test_,kernel_page.py prefixes.py sbom.py),$(CHECKED)) tests/templates/test_generated.py tests/templates/test_parity.py \
     tests/cli/test_design.py tests/cli/test_fly.py tests/cli/test_identify.py \
     tests/experiment/margins/test_command.py tests/verify/test_replay.py tests/board/footprint/test_counts.py
 
