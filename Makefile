@@ -27,11 +27,12 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -
 # Compilers, emulators and analysers that the tests want: Debian's packages, and the commands that show them.
 TOOL_PACKAGES = gcc g++ clang make cmake binutils python3-dev \
     gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc arduino-core-avr \
-    qemu-system-misc qemu-system-arm qemu-user simavr \
+    qemu-system-misc qemu-system-arm qemu-user libsimavr-dev \
     frama-c-base cppcheck libclang-rt-14-dev lld chromium
 TOOL_COMMANDS = gcc g++ clang make cmake nm \
-    arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr qemu-system-arm qemu-arm simavr \
+    arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr qemu-system-arm qemu-arm \
     frama-c cppcheck wasm-ld chromium
+SIMAVR = /usr/include/simavr/sim_avr.h
 
 ifeq ($(CI),true)
 MARKED = -m "not thorough"
@@ -98,6 +99,7 @@ proofs: $(SETUP_TEST)
 # As root on a system with apt, install all packages if a command is missing; elsewhere name them.
 tools:
 	@missing=""; for tool in $(TOOL_COMMANDS); do command -v $$tool >/dev/null || missing="$$missing $$tool"; done; \
+	[ -e $(SIMAVR) ] || missing="$$missing $(SIMAVR)"; \
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	echo "missing on this system:$$missing"; \
 	if [ "$(TOOLS)" != no ] && command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \

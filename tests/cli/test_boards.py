@@ -117,7 +117,7 @@ def test_a_missing_emulator_is_named(
     board_builder("mega")
     monkeypatch.setenv("PATH", only(tmp_path_factory.mktemp("bin"), "avr-*"))
     said, talk = run(*command, code=2 if command[0] == "fly" else 0)
-    assert "qemu-system-avr, needed to emulate an ATmega2560, is missing" in unwrapped(said + talk)
+    assert "simavr, needed to emulate an ATmega2560, cannot be built here" in unwrapped(said + talk)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_the_doctor_answers() -> None:
     assert "apt install" in run("doctor")[0]
     findings = json.loads(run("doctor", "--json")[0])
     tools = {tool for finding in findings for tool in finding["tool"].split(" or ")}
-    assert {"arm-none-eabi-gcc", "qemu-system-avr", "unicorn"} <= tools
+    assert {"arm-none-eabi-gcc", "libsimavr", "unicorn"} <= tools
 
 
 NAMES_THE_EXTRA = (

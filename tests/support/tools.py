@@ -62,7 +62,7 @@ def board_builder(name: str) -> Builder:
     if not any(shutil.which(command) for command in board.compiler.candidates):
         require(board.compiler.candidates[0], " and ".join(board.compiler.packages))
     if board.emulated_core.value == "avr":
-        require("qemu-system-avr", "qemu-system-misc")
+        require_file(Path("/usr/include/simavr/sim_avr.h"), "libsimavr-dev")
     return builder(board)
 
 

@@ -1,10 +1,7 @@
-"""AVR: self-test on an emulated ATmega2560, life of the emulator process, stack analysis of AVR code."""
+"""AVR: self-test on an emulated ATmega2560, faults of programs, stack analysis of AVR code."""
 
+import itertools
 import os
-import re
-import select
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +14,7 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest, digest_emulated
-from mambo_sil.board.emulation.avr_machine import AvrMachine, Long
+from mambo_sil.board.emulation.avr_machine import Long
 from mambo_sil.board.emulation.machine import start
 from mambo_sil.board.firmware.elf import FootprintError, load
 from mambo_sil.board.firmware.firmware_build import Builder
@@ -25,10 +22,9 @@ from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.errors import EmulationError, EmulatorError
 from mambo_sil.flight.controllers.controller_library import batch_source
 from tests.support.cases import settings_case
-from tests.support.height import height_case
-from tests.support.linking import link, run_in_simavr
+from tests.support.linking import link
 from tests.support.one_norm import ONE_NORM
-from tests.support.tools import board_builder, only
+from tests.support.tools import board_builder
 
 SELF_TEST = """
 #include "nmpc_self_test.h"
@@ -38,25 +34,6 @@ long run(void) { return nmpc_self_test(&scratch); }
 """
 EFFORT = "return (weight.tracking * distance_m) + (weight.effort * variation_rad);"
 WRONG = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
-DIGEST = """
-#include "nmpc_self_test.h"
-unsigned long run(void);
-unsigned long run(void)
-{
-    static nmpc_t scratch;
-    return nmpc_self_test_episode(&scratch, 1, nmpc_self_test_episode(&scratch, 0, 0UL));
-}
-"""
-COMPARISON = "#define NMPC_COMPARISON static\n"
-ABANDONED = """
-import sys
-from pathlib import Path
-from mambo_sil.board.emulation.machine import start
-machine = start(Path(sys.argv[1]), "avr")
-print(machine._stub._process.pid, flush=True)
-sys.stdin.read()
-"""
-"""A Python program that starts an emulator and waits."""
 
 
 @pytest.fixture
@@ -138,43 +115,21 @@ long run(void)
         machine.call("run")
 
 
-def test_a_killed_emulator_is_reported(one: Path) -> None:
-    """The next call raises an error instead of waiting."""
-    machine = start(one, "avr")
-    assert isinstance(machine, AvrMachine)
-    machine._stub._process.kill()
-    machine._stub._process.wait()
-    with pytest.raises(EmulationError, match="the emulator ended"):
-        machine.call("run")
-
-
-def test_the_emulator_dies_with_its_owner(one: Path) -> None:
-    """If the Python process is killed, its emulator ends too."""
-    with subprocess.Popen(
-        [sys.executable, "-c", ABANDONED, str(one)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as owner:
-        assert owner.stdout is not None
-        emulator = os.pidfd_open(int(owner.stdout.readline()))
-        assert not select.select([emulator], [], [], 0)[0]
-        owner.kill()
-        assert select.select([emulator], [], [], 10)[0]
-    os.close(emulator)
-
-
 @pytest.mark.parametrize(
-    ("here", "tool", "package"),
+    ("compiler", "message"),
     [
-        ("setpriv", "qemu-system-avr", "qemu-system-misc"),
-        ("qemu-system-avr", "setpriv", "util-linux"),
-        ("[qs]e[mt]*", "avr-objdump", "binutils-avr"),
+        ("gcc -nostdinc", "simavr, .* cannot be built here \\(Debian: libsimavr-dev\\): .*simavr/sim_avr.h"),
+        ("", "no C"),
     ],
+    ids=["simavr", "compiler"],
 )
-def test_a_missing_tool_is_named(
-    here: str, tool: str, package: str, one: Path, monkeypatch: pytest.MonkeyPatch
+def test_what_is_missing_is_named(
+    compiler: str, message: str, one: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message names tool and Debian package."""
-    monkeypatch.setenv("PATH", only(one.parent, here))
-    with pytest.raises(EmulatorError, match=rf"^{tool}, .*is missing \(Debian: {package}\)"):
+    """The message names library and Debian package, or the compilers that were looked for."""
+    monkeypatch.setenv("PATH", os.environ["PATH"] if compiler else str(one.parent))
+    monkeypatch.setenv("CC", compiler)
+    with pytest.raises(EmulatorError, match=f"(?s){message}"):
         start(one, "avr")
 
 
@@ -215,7 +170,7 @@ def test_a_program_for_another_part_is_refused(tmp_path: Path) -> None:
 
 
 SKIPPING = """
-__attribute__((naked)) unsigned long run(void)
+__attribute__((naked)) unsigned long {name}(void)
 {{
     __asm volatile ("ldi r22, 7\\n ldi r23, 0\\n ldi r24, 1\\n ldi r25, 1\\n" "{skip}\\n {skipped}\\n"
                     "ldi r22, 42\\n ldi r24, 0\\n ldi r25, 0\\n ret");
@@ -224,52 +179,34 @@ __attribute__((naked)) unsigned long run(void)
 """A function that returns 42 if the instruction `skip`, whose condition holds, skips `skipped`."""
 
 
-@pytest.mark.first_is_quick
-@pytest.mark.parametrize("skipped", ["ret", "icall"])
-@pytest.mark.parametrize("skip", ["sbrs r24, 0", "sbrc r24, 1", "cpse r24, r25", "sbic 0x1e, 1"])
-def test_a_skip_over_a_return_or_an_indirect_call_is_not_emulated(
-    skip: str, skipped: str, mega: Builder, tmp_path: Path
-) -> None:
-    """QEMU 7.2 repeats what is before it; the message has place, pair and remedy."""
-    elf = mega.guest({}, SKIPPING.format(skip=skip, skipped=skipped), ("run",), tmp_path)
-    with pytest.raises(EmulatorError) as refused:
-        start(elf, "avr")
-    pair = re.escape(f"`{skip}; {skipped}` in run+0x8: ")
-    assert re.search(rf"^program\.elf: {pair}.*QEMU repeats.*-fno-reorder-blocks", str(refused.value))
+def test_what_is_skipped_is_not_executed(mega: Builder, tmp_path: Path) -> None:
+    """Of a return or an indirect call QEMU 7.2 does otherwise, of some adiw and sbiw simavr 1.6 itself."""
+    skips = ("sbrs r24, 0", "sbrc r24, 1", "cpse r24, r25", "sbic 0x1e, 1")
+    words = (
+        "ret",
+        "icall",
+        "push r24",
+        "rjmp .+8",
+        "adiw r24, 12",
+        "sbiw r24, 63",
+        "call run0",
+        "lds r22, 512",
+    )
+    functions = {f"run{i}": pair for i, pair in enumerate(itertools.product(skips, words))}
+    text = "".join(SKIPPING.format(name=name, skip=a, skipped=b) for name, (a, b) in functions.items())
+    machine = start(mega.guest({}, text, tuple(functions), tmp_path), "avr")
+    assert [pair for name, pair in functions.items() if machine.call(name) != 42] == []
 
 
-@pytest.mark.parametrize(
-    ("skipped", "returned"), [("push r24", 42), ("rjmp .+8", 42), ("nop\\n ret", 0x01010007)]
-)
-def test_other_skips_are_emulated(skipped: str, returned: int, mega: Builder, tmp_path: Path) -> None:
-    """Over a push, a jump, or a return that is not directly behind."""
-    elf = mega.guest({}, SKIPPING.format(skip="sbrs r24, 0", skipped=skipped), ("run",), tmp_path)
-    assert start(elf, "avr").call("run") == returned
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "optimisation"), [("mambo", "-O2"), ("mambo-1norm", "-Os")])
-def test_a_second_emulator_has_the_digest_of_the_reference(
-    name: str, optimisation: str, tmp_path: Path
-) -> None:
-    """simavr, which has nothing in common with QEMU, starts the program from reset with avr-libc's code."""
-    settings = presets.load(name)
-    files = render(settings, with_digest=False) | {"digest.c": DIGEST}
-    assert run_in_simavr(files, optimisation, tmp_path) == self_test_digest(method_of(settings), 2)
-
-
-@pytest.mark.long
-def test_a_controller_that_qemu_would_not_run_is_refused_and_right(mega: Builder, tmp_path: Path) -> None:
-    """With comparisons as functions that return from two places; simavr has the digest of the reference."""
-    settings = height_case(1, "fixed")
-    files = render(settings, with_digest=False)
-    assert files["nmpc.c"].count(COMPARISON) == 1
-    files["nmpc.c"] = files["nmpc.c"].replace(COMPARISON, "#define NMPC_COMPARISON NMPC_INLINE\n")
-    elf = mega.guest(files, batch_source(), GUEST, tmp_path / "guest")
-    with pytest.raises(EmulatorError, match=r"`sbrs r25, 7; ret` in (absolute|larger)"):
-        EmulatedController(settings, elf, "avr")
-    found = run_in_simavr(files | {"digest.c": DIGEST}, "-O2", tmp_path / "simavr")
-    assert found == self_test_digest(method_of(settings), 2)
+def test_an_instruction_that_the_part_lacks_is_reported(mega: Builder, tmp_path: Path) -> None:
+    """Erased flash, and words without a meaning, with their place."""
+    words = {"run0": "0xFFFF", "run1": "0x0001", "run2": "0x9404"}
+    line = 'long {}(void) {{ __asm volatile (".word {}"); return 1; }}\n'
+    text = "".join(line.format(*item) for item in words.items())
+    machine = start(mega.guest({}, text, tuple(words), tmp_path), "avr")
+    for name in words:
+        with pytest.raises(EmulationError, match=rf"{name} faulted at address 0x\w+: illegal instruction"):
+            machine.call(name)
 
 
 def bound_assembly(assembly: str, folder: Path) -> StackReport:

@@ -1,6 +1,7 @@
 """The doctor reports tools with purpose and package; a compiler of another core is told the rule."""
 
 import shutil
+from ctypes.util import find_library
 from importlib import metadata
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.board.firmware import tool_report
 from mambo_sil.board.firmware.firmware_build import Builder
-from mambo_sil.board.firmware.tool_report import LIBFUZZER, Finding, doctor_text, examine
+from mambo_sil.board.firmware.tool_report import LIBFUZZER, LIBSIMAVR, Finding, doctor_text, examine
 
 ENDLESS = "while :; do :; done"
 
@@ -52,6 +53,8 @@ def test_installed_tools_are_found_with_their_version() -> None:
             assert finding.here == (finding.tool in installed)
         elif finding.tool == LIBFUZZER:
             assert not finding.here or shutil.which("clang") is not None
+        elif finding.tool == LIBSIMAVR:
+            assert not finding.here or find_library("simavr") is not None
         else:
             commands = finding.tool.split(" or ")
             assert finding.here == any(shutil.which(command) is not None for command in commands)

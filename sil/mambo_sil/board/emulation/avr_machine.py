@@ -1,38 +1,28 @@
-"""An ATmega2560 emulated by QEMU, controlled over GDB's remote protocol; a plugin counts instructions."""
+"""An ATmega2560 emulated by simavr, in this process, which counts instructions and clock cycles."""
 
-import hashlib
-import itertools
-import mmap
-import os
-import re
-import shutil
-import subprocess
 from collections import Counter
+from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import cffi
 import numpy as np
 from elftools.elf.elffile import ELFFile
 from numpy.typing import NDArray
 
 from mambo_codegen.errors import BuildError
-from mambo_codegen.toolchain import Toolchain, host_toolchain
+from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.emulation.core import Arena, Executed
-from mambo_sil.board.emulation.gdb import GdbStub
-from mambo_sil.board.firmware.avr import DISASSEMBLER, SKIPS, decode
-from mambo_sil.board.firmware.elf import load
 from mambo_sil.errors import EmulationError, EmulatorError
-from mambo_sil.results.build_folders import build_cached
+from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 
-_EMULATOR: Final = "qemu-system-avr"
-_TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux", DISASSEMBLER: "binutils-avr"}
 _PART: Final = "an ATmega2560"
 
 _FLASH_BYTES: Final = 0x40000
 _RETURN_ADDRESS: Final = _FLASH_BYTES - 0x1000
 _DATA_SPACE: Final = 0x800000
-"""Offset of data addresses in ELF files and in GDB's protocol."""
+"""Offset of data addresses in ELF files."""
 _RAM: Final = range(0x200, 0x2200)
 _STACK_BYTES: Final = 3072
 _GUARD: Final = b"\x5a" * 32
@@ -41,22 +31,25 @@ _ALIGNMENT: Final = 2
 _AVR6: Final = 6
 """Machine in the ELF flags of AVR parts with more than 128 KiB of flash."""
 
-_REGISTER_BYTES: Final = 39
-_STACK_POINTER: Final = slice(33, 35)
-_PROGRAM_COUNTER: Final = slice(35, 39)
-_RESULT: Final = slice(22, 26)
+_STACK_POINTER: Final = 0x5D
+_RESULT: Final = 22
 _ARGUMENTS: Final = range(8, 26)
-"""Registers of arguments, allocated from the highest down (avr-gcc, calling convention)."""
+"""Registers, the first bytes of data memory: of the result, and of arguments, allocated from the highest down
+(avr-gcc, calling convention)."""
+_CYCLES_PER_S: Final = 1e8
+"""Cycles that count as a second of the time limit: about what simavr takes in one."""
 
-_TWO_WORDS: Final = ((0xFE0F, 0x9000), (0xFE0F, 0x9200), (0xFE0E, 0x940C), (0xFE0E, 0x940E))
-"""Mask and opcode of the instructions of two words: lds, sts, jmp, call (DS40002198)."""
-_NOT_SKIPPED: Final = frozenset({"ret", "reti", "ijmp", "eijmp", "icall", "eicall"})
-"""Instructions over which QEMU 7.2 does not skip: it executes the basic block before them again.
-
-Where such an instruction is skipped, the translator leaves the program counter at the start of the block
-(target/avr/translate.c, `avr_tr_translate_insn`: no case for DISAS_LOOKUP and DISAS_EXIT).
+_DECLARATIONS: Final = """
+    void *machine_create(void);
+    void machine_destroy(void *avr);
+    uint8_t *machine_flash(void *avr);
+    uint8_t *machine_data(void *avr);
+    uint32_t machine_place(const void *avr);
+    int machine_run(void *avr, uint32_t start, uint32_t end, uint64_t limit_cycles,
+                    uint64_t *times, uint64_t *cycles);
 """
-_COUNTING_SLOWDOWN: Final = 3
+_FAULTED: Final = 1
+_LATE: Final = 2
 
 
 class Long(int):
@@ -64,16 +57,12 @@ class Long(int):
 
 
 class AvrMachine:
-    """A `Machine` in a QEMU process."""
+    """A `Machine` in this process."""
 
     word_bytes: Final = 2
 
-    def __init__(self, elf: Path, time_limit_s: float, *, counting: bool = False) -> None:
-        for tool, package in _TOOLS.items():
-            if shutil.which(tool) is None:
-                raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
+    def __init__(self, elf: Path, time_limit_s: float) -> None:
         flash, data, self._symbols = _read_program(elf)
-        demand_skips(elf)
         used = max((start + len(content) for start, content in data), default=_RAM.start)
         self.arena = Arena(used, self.stack.start - len(_GUARD), _ALIGNMENT)
         if self.arena.free_bytes < 0:
@@ -81,23 +70,12 @@ class AvrMachine:
             raise EmulatorError(
                 f"{size} B of data and {stack} B of stack do not fit the {len(_RAM)} B of {_PART}"
             )
-        self._time_limit_s = time_limit_s * (_COUNTING_SLOWDOWN if counting else 1)
-        files = [_open_memory_file("flash", flash)]
-        options = ["-bios", f"/proc/self/fd/{files[0]}"]
-        if counting:
-            tables = _count_tables(flash)
-            files.append(_open_memory_file("counts", tables.tobytes()))
-            shared = mmap.mmap(files[1], tables.nbytes)
-            self._times, self._taken, _ = np.frombuffer(shared, np.uint64).reshape(tables.shape)
-            options += ["-plugin", f"{_build_plugin()},counts={files[1]}"]
-        quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
-        command = [_EMULATOR, "-M", "mega2560", "-S", "-gdb", "stdio", *quiet, *options]
-        try:
-            self._stub = GdbStub(command, files)
-        finally:
-            for file in files:
-                os.close(file)
-        self._stub.set_breakpoint(_RETURN_ADDRESS)
+        self._time_limit_s = time_limit_s
+        self._ffi, self._library = _interface(), _load_simavr()
+        self._avr = self._ffi.gc(self._library.machine_create(), self._library.machine_destroy)
+        self._ffi.memmove(self._library.machine_flash(self._avr), flash, len(flash))
+        self._data = self._ffi.buffer(self._library.machine_data(self._avr), _RAM.stop)
+        self._times, self._cycles = np.zeros((2, _FLASH_BYTES // 2), np.uint64)
         for start, content in data:
             self.write(start, content)
         self.write(self.stack.start - len(_GUARD), _GUARD)
@@ -109,22 +87,24 @@ class AvrMachine:
 
     def write(self, address: int, content: bytes) -> None:
         """Write data memory; `address` with or without the offset of ELF files."""
-        self._stub.write(address | _DATA_SPACE, content)
+        start = address % _DATA_SPACE
+        self._data[start : start + len(content)] = content
 
     def read(self, address: int, size: int) -> bytes:
         """Read data memory; `address` with or without the offset of ELF files."""
-        return self._stub.read(address | _DATA_SPACE, size)
+        start = address % _DATA_SPACE
+        return bytes(self._data[start : start + size])
 
     def take_executed(self) -> Executed:
-        """Return what was executed since the last call, without blocks and reads of flash."""
-        return Executed(_take(self._times), _take(self._taken))
+        """Return what was executed since the last call, and its cycles."""
+        return Executed(_take(self._times), cycles=_take(self._cycles))
 
     def call(self, function: str, *arguments: int) -> int:
         """Call `function` with arguments of type int, pointer or Long; returns an unsigned long.
 
         Raises EmulationError if it faults or exceeds the time limit; the machine stays usable.
         """
-        registers = bytearray(_REGISTER_BYTES)
+        registers = bytearray(32)
         pushed = (_RETURN_ADDRESS // 2).to_bytes(3, "big")
         free = _ARGUMENTS.stop
         for argument in arguments:
@@ -134,36 +114,26 @@ class AvrMachine:
                 registers[free : free + len(content)] = content
             else:
                 pushed += content
+        self.write(0, bytes(registers))
         self.write(_RAM.stop - len(pushed), pushed)
-        registers[_STACK_POINTER] = (_RAM.stop - len(pushed) - 1).to_bytes(2, "little")
-        registers[_PROGRAM_COUNTER] = self._symbols[function].to_bytes(4, "little")
-        self._stub.set_registers(bytes(registers))
-        stopped = self._stub.run(self._time_limit_s)
-        after = self._stub.registers()
-        place = int.from_bytes(after[_PROGRAM_COUNTER], "little")
-        if not stopped:
+        self.write(_STACK_POINTER, (_RAM.stop - len(pushed) - 1).to_bytes(2, "little"))
+        ended = self._run(self._symbols[function])
+        place = self._library.machine_place(self._avr)
+        if ended == _LATE:
             raise EmulationError(
                 f"{function} did not return within {self._time_limit_s:g} s, at address {place:#x}"
             )
-        if place != _RETURN_ADDRESS:
-            raise EmulationError(f"{function} faulted at address {place:#x}: illegal instruction")
+        if ended == _FAULTED:
+            raise EmulationError(f"{function} faulted at address {place:#x}: illegal instruction or address")
         if self.read(self.stack.start - len(_GUARD), len(_GUARD)) != _GUARD:
             raise EmulationError(f"{function} overflowed its stack of {_STACK_BYTES} B")
-        return int.from_bytes(after[_RESULT], "little")
+        return int.from_bytes(self.read(_RESULT, 4), "little")
 
-
-def demand_skips(elf: Path) -> None:
-    """Raise EmulatorError if an AVR program has a skip directly before an instruction of `_NOT_SKIPPED`."""
-    image = load(elf)
-    lines = decode(image)
-    for line, after in itertools.pairwise(lines):
-        if line.mnemonic in SKIPS and after.mnemonic in _NOT_SKIPPED:
-            raise EmulatorError(
-                f"{elf.name}: `{line.text}; {after.text}` in {image.name_of(line.address)}: where the first "
-                "instruction skips the second, QEMU repeats what is before them, so it is not emulated; "
-                f"{_PART} and simavr run it. Another optimisation, such as -Os, or -fno-reorder-blocks in "
-                "compiler.flags of the board's file may avoid the pair"
-            )
+    def _run(self, start: int) -> int:
+        """Run from an address until the function there returns; returns how it ended."""
+        tables = [self._ffi.from_buffer("uint64_t[]", table) for table in (self._times, self._cycles)]
+        limit = round(self._time_limit_s * _CYCLES_PER_S)
+        return int(self._library.machine_run(self._avr, start, _RETURN_ADDRESS, limit, *tables))
 
 
 def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, int]]:
@@ -189,14 +159,6 @@ def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, 
     return bytes(flash), data, symbols
 
 
-def _count_tables(flash: bytes) -> NDArray[np.uint64]:
-    """Return the plugin's tables (3, words of flash) before the first step: 0, 0, lengths in words."""
-    words = np.frombuffer(flash, "<u2")
-    tables = np.zeros((3, len(words)), np.uint64)
-    tables[2] = 1 + np.any([words & mask == opcode for mask, opcode in _TWO_WORDS], axis=0)
-    return tables
-
-
 def _take(table: NDArray[np.uint64]) -> Counter[int]:
     """Return the numbers of a table by byte address, and set them to 0."""
     words = np.flatnonzero(table)
@@ -205,33 +167,21 @@ def _take(table: NDArray[np.uint64]) -> Counter[int]:
     return taken
 
 
-def _open_memory_file(name: str, content: bytes) -> int:
-    """Write `content` to an anonymous file in memory; returns its descriptor."""
-    descriptor = os.memfd_create(name)
-    with os.fdopen(os.dup(descriptor), "wb") as file:
-        file.write(content)
-    return descriptor
+@cache
+def _interface() -> Any:
+    ffi = cffi.FFI()
+    ffi.cdef(_DECLARATIONS)
+    return ffi
 
 
-def _build_plugin() -> Path:
-    """Return QEMU's plugin that counts instructions; compiled for the installed QEMU and cached."""
-    source = resources.files("mambo_sil.board.emulation").joinpath("qemu_count.c").read_text("utf-8")
-    output = subprocess.run([_EMULATOR, "--version"], capture_output=True, text=True, check=False).stdout
-    version = re.search(r"version (\d+)", output)
-    if version is None:
-        raise EmulatorError(f"{_EMULATOR} --version prints no version")
-    interface = 1 if int(version[1]) < 9 else 2  # QEMU 9 requires at least 2
+def _load_simavr() -> Any:
+    """Return the library of simavr.c; compiled for the installed simavr and cached."""
+    text = resources.files("mambo_sil.board.emulation").joinpath("simavr.c").read_text("utf-8")
+    files = {"simavr.c": text}
+    source = LibrarySource("simavr", text, lambda: files, ("-O2",), _interface(), ("-lsimavr",))
     try:
-        toolchain = host_toolchain()
+        return load_shared_library(source, host_toolchain())
     except BuildError as error:
-        raise EmulatorError(f"cannot compile the instruction counter for {_PART}: {error}") from error
-    contents = "\n".join([source, str(interface), toolchain.identity()])
-    name = f"qemu-count-{hashlib.sha256(contents.encode()).hexdigest()[:32]}.so"
-    return build_cached(name, lambda folder: _compile_plugin(source, interface, toolchain, folder))
-
-
-def _compile_plugin(source: str, interface: int, toolchain: Toolchain, folder: Path) -> Path:
-    (folder / "count.c").write_text(source, "utf-8")
-    flags = ["-O2", "-shared", "-fPIC", f"-DQEMU_PLUGIN_INTERFACE={interface}"]
-    toolchain.run([*flags, "count.c", "-o", "count.so"], folder)
-    return folder / "count.so"
+        raise EmulatorError(
+            f"simavr, needed to emulate {_PART}, cannot be built here (Debian: libsimavr-dev): {error}"
+        ) from error

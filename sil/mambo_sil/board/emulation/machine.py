@@ -1,8 +1,7 @@
 """Emulated cores: load a program, call its functions by name, count its instructions.
 
-Unicorn, an optional package, emulates ARM and RISC-V in this process, QEMU emulates AVR in a process of its
-own. A call that faults or exceeds its time limit raises EmulationError and leaves the machine usable; no
-process outlives it.
+Unicorn, an optional package, emulates ARM and RISC-V, simavr AVR, both in this process. A call that faults or
+exceeds its time limit raises EmulationError and leaves the machine usable.
 """
 
 from importlib.util import find_spec
@@ -41,7 +40,7 @@ def start(elf: Path, core: str, time_limit_s: float = TIME_LIMIT_S, *, counting:
     Raises EmulatorError if the emulator is missing or the program does not fit into memory.
     """
     if core == AVR:
-        return AvrMachine(elf, time_limit_s, counting=counting)
+        return AvrMachine(elf, time_limit_s)
     demand_emulator(core)
     from mambo_sil.board.emulation.unicorn_machine import UnicornMachine  # noqa: PLC0415 - an extra
 

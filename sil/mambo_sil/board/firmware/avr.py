@@ -41,7 +41,7 @@ _LINE: Final = re.compile(r"^ *([0-9a-f]+):\t((?:[0-9a-f]{2} )+) *\t(\S+)(?:\t([
 _PLACE: Final = re.compile(r"(-?)([XYZ])(\+?)(\d*)")
 
 _POINTERS: Final = {"X": 26, "Y": 28, "Z": 30}
-SKIPS: Final = frozenset({"cpse", "sbrc", "sbrs", "sbic", "sbis"})
+_SKIPS: Final = frozenset({"cpse", "sbrc", "sbrs", "sbic", "sbis"})
 _BRANCH: Final = re.compile(r"br\w\w")
 _NO_EFFECT: Final = re.compile(r"cp|cpc|cpi|(cl|se)[cnzvshti]|bst|sts|sbi|cbi|nop|break|wdr|sleep")
 """Instructions that change no register: comparisons, flags, stores to fixed addresses."""
@@ -85,11 +85,6 @@ def disassemble(image: Image) -> tuple[dict[int, Instruction], Convention]:
     preserved = {_RETURN, *(f"r{index}" for index in (*range(2, 18), 28, 29))}
     convention = Convention(_RETURN, frozenset(preserved), 1, return_bytes, _EXCEPTIONS)
     return instructions, convention
-
-
-def decode(image: Image) -> list[Line]:
-    """Return the instructions of a program by rising address; raises FootprintError as `disassemble` does."""
-    return _lines(_objdump(image))
 
 
 def _lines(text: str) -> list[Line]:
@@ -136,8 +131,8 @@ def _instructions(lines: list[Line], return_bytes: int) -> Iterator[Instruction]
             continue
         effects = _effects(line, return_bytes)
         flow: Flow = "next"
-        conditional = line.mnemonic in SKIPS or _BRANCH.fullmatch(line.mnemonic) is not None
-        if line.mnemonic in SKIPS:
+        conditional = line.mnemonic in _SKIPS or _BRANCH.fullmatch(line.mnemonic) is not None
+        if line.mnemonic in _SKIPS:
             effects, flow = ((Assign(PC, None, after.next_address),) if after else (Clobber(PC),)), "jump"
         elif conditional or line.mnemonic in {"rjmp", "jmp", "ijmp", "eijmp", "ret"}:
             flow = "jump"

@@ -19,7 +19,8 @@ from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.results.terminal import sentence, table
 
 LIBFUZZER: Final = "libFuzzer"
-"""Clang's library for fuzzing; not a command."""
+LIBSIMAVR: Final = "libsimavr"
+"""Clang's library for fuzzing, and simavr's; not commands."""
 
 TIME_LIMIT_S: Final = 5.0
 """Time limit of one tool's --version, in seconds."""
@@ -82,8 +83,7 @@ def _needs() -> list[Finding]:
             for (tool, packages), names in builder_of.items()
         ),
         _need("emulator", "unicorn", f"the extra emulation: runs the C for {', '.join(on_others)}"),
-        _need("emulator", "qemu-system-avr", f"emulates {', '.join(on_avr)}", "qemu-system-misc"),
-        _need("emulator", "simavr", "make test: a second AVR", "simavr"),
+        _need("emulator", LIBSIMAVR, f"emulates {', '.join(on_avr)}", "libsimavr-dev"),
         _need("analyser", "pyelftools", "footprint: flash and RAM"),
         _need("analyser", "capstone", "footprint: stack bound"),
         _need("analyser", "nm", "make test: symbols of a build", "binutils"),
@@ -131,7 +131,13 @@ def _package_version(package: str) -> str | None:
 def command_version(candidate: str) -> str | None:
     """Return the version that the command prints, "" if it prints none in time, None if it is missing."""
     if candidate == LIBFUZZER:
-        return _libfuzzer_version()
+        return (
+            command_version("clang")
+            if _has_library("clang", f"libclang_rt.fuzzer-{platform.machine()}.a")
+            else None
+        )
+    if candidate == LIBSIMAVR:
+        return "" if _has_library(_host_compiler(), "libsimavr.so") else None
     command = shlex.split(candidate)
     if shutil.which(command[0]) is None:
         return None
@@ -141,14 +147,10 @@ def command_version(candidate: str) -> str | None:
     return number[0] if number else ""
 
 
-def _libfuzzer_version() -> str | None:
-    """Return the version of clang if it has the library, else None."""
-    clang = shutil.which("clang")
-    if clang is None:
-        return None
-    name = f"libclang_rt.fuzzer-{platform.machine()}.a"
-    library = _capture_stdout([clang, f"-print-file-name={name}"])
-    return command_version("clang") if library and Path(library.strip()).is_file() else None
+def _has_library(compiler: str, name: str) -> bool:
+    """Say whether a compiler finds a library."""
+    path = _capture_stdout([*shlex.split(compiler), f"-print-file-name={name}"])
+    return path is not None and Path(path.strip()).is_file()
 
 
 def _capture_stdout(command: Sequence[str]) -> str | None:

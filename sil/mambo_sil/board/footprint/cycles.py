@@ -11,21 +11,24 @@ from typing import Final
 from mambo_codegen.boards import FlashWait
 from mambo_sil.board.emulation.core import Executed
 from mambo_sil.board.firmware.elf import Image
-from mambo_sil.board.footprint.timing import Cycles, Timing, atmega2560, cortex_m0plus, cortex_m4
+from mambo_sil.board.footprint.timing import Cycles, Timing, cortex_m0plus, cortex_m4, exactly
 
 
 @dataclass(frozen=True)
 class TimingSource:
-    """Where the cycles of a core's instructions are from, and the function that returns them by address."""
+    """Where the cycles of a core's instructions are from, and the function that returns them by address.
+
+    The function is None of a core whose emulator counts cycles.
+    """
 
     source: str
-    timings: Callable[[Image], Mapping[int, Timing]]
+    timings: Callable[[Image], Mapping[int, Timing]] | None
 
 
 MODELS: Final = {
     "cortex-m4": TimingSource("Cortex-M4 TRM, ARM DDI 0439D", cortex_m4),
     "cortex-m0": TimingSource("Cortex-M0+ TRM, ARM DDI 0484C", cortex_m0plus),
-    "avr": TimingSource("AVR Instruction Set Manual, DS40002198", atmega2560),
+    "avr": TimingSource("simavr, which emulates cycle by cycle", None),
 }
 """Models by emulated core. The other cores are estimated.
 
@@ -51,11 +54,14 @@ class CycleModel:
     """The modelled cycles of a program on a core; `flash` is None if its flash has no wait states."""
 
     def __init__(self, image: Image, core: str, flash: FlashWait | None) -> None:
-        self._timings = MODELS[core].timings(image)
+        timings = MODELS[core].timings
+        self._timings = None if timings is None else timings(image)
         self._flash = flash
 
     def cycles(self, executed: Executed) -> ModelledCycles:
         """Add up the cycles of what was executed."""
+        if self._timings is None:
+            return ModelledCycles(exactly(executed.cycles.total()), 0)
         fewest = usual = most = 0  # plain numbers: this loop takes a fifth of the time of a count
         for address, times in executed.times.items():
             timing = self._timings[address]

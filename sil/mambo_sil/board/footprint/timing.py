@@ -1,7 +1,7 @@
-"""Cycles of the instructions of a program, as the manuals of three cores give them, all without wait states.
+"""Cycles of the instructions of a program, as the manuals of two cores give them, both without wait states.
 
 Cortex-M4F: ARM DDI 0439D, tables 3-1 and 7-1, and section 3.3.2 on neighbouring loads and stores; Cortex-M0+:
-ARM DDI 0484C, table 3-1; ATmega2560: DS40002198, AVRe+, with a program counter of 22 bits.
+ARM DDI 0484C, table 3-1.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,7 +11,6 @@ from typing import Any, Final, NamedTuple
 from capstone import arm_const as arm
 
 from mambo_sil.board.firmware.arm import ALWAYS
-from mambo_sil.board.firmware.avr import SKIPS, Line, decode
 from mambo_sil.board.firmware.disassembly import decode_arm
 from mambo_sil.board.firmware.elf import Image
 
@@ -207,45 +206,3 @@ def _cycles_m0plus(insn: Any, _after: Any) -> Cycles:
 
 def _taken_m0plus(insn: Any) -> Cycles:
     return exactly(2 if insn.id == arm.ARM_INS_POP else 1)
-
-
-_JUMPS: Final = {
-    **dict.fromkeys(("rjmp", "ijmp", "eijmp"), 2),
-    **dict.fromkeys(("rcall", "icall", "eicall"), 4),
-    "jmp": 3,
-    **dict.fromkeys(("call", "ret", "reti"), 5),
-}
-_TWO_CYCLES: Final = frozenset(
-    {"adiw", "sbiw", "mul", "muls", "mulsu", "fmul", "fmuls", "fmulsu", "push", "pop", "sbi", "cbi"}
-    | {"ld", "ldd", "lds", "st", "std", "sts"}
-)
-_THREE_CYCLES: Final = frozenset({"lpm", "elpm"})
-_NOWHERE: Final = (".+0",)
-"""Operand of a jump or call to the instruction behind it, which takes its time but is not seen as taken."""
-
-
-def atmega2560(image: Image) -> dict[int, Timing]:
-    """Return the timing of every instruction of a program on an ATmega2560, by address.
-
-    An instruction that is skipped takes a cycle for each of its words.
-    """
-    skipped: set[int] = set()
-    timings = {}
-    for line in decode(image):
-        timings[line.address] = _timing(line, skippable=line.address in skipped)
-        if line.mnemonic in SKIPS:
-            skipped.add(line.next_address)
-    return timings
-
-
-def _timing(line: Line, *, skippable: bool) -> Timing:
-    words = line.size_bytes // 2
-    if line.mnemonic in _JUMPS:
-        cycles = _JUMPS[line.mnemonic]
-        if line.operands == _NOWHERE:
-            return Timing(exactly(cycles), NONE)
-        return Timing(exactly(words), exactly(cycles - words))
-    if line.mnemonic.startswith("br"):
-        return Timing(exactly(1), exactly(1))
-    cycles = 2 if line.mnemonic in _TWO_CYCLES else 3 if line.mnemonic in _THREE_CYCLES else 1
-    return Timing(Cycles(min(words, cycles) if skippable else cycles, cycles, cycles), NONE)

@@ -14,7 +14,6 @@ from typing import Final
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import find_target
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.emulation.avr_machine import demand_skips
 from tests.support.bundles import place
 from tests.support.tools import require, require_module
 
@@ -90,8 +89,6 @@ def command_of(elf: Path) -> list[str]:
     if board not in EMULATORS:
         return [str(elf)]
     (emulator, package), arguments = EMULATORS[board]
-    if board == "mega":
-        demand_skips(elf)
     return [require(emulator, package), *(word.replace("{elf}", str(elf)) for word in arguments)]
 
 
