@@ -46,11 +46,12 @@ def preset_results(name: str, scalar: str) -> dict[str, Any]:
     """Return all kept results of a preset with a scalar type, computed; none if they do not go together."""
     with kept.record() as results:
         try:
-            method = method_of(with_option(presets.preset(name), "code.scalar", scalar))
+            settings = with_option(presets.preset(name), "code.scalar", scalar)
+            method = method_of(settings)
         except InvalidSettingsError:
             return {}
         kept_digest(method)
-        start_up_test(method.settings)
+        start_up_test(settings)
     return results
 
 
