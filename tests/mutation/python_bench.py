@@ -95,8 +95,12 @@ ROOMS: Final = {
         ),
         without=(
             *("tracker_constants.py", "limits_constants.py", "height_constants.py"),
-            "tilt_gain_constants.py",
+            *("target_observer_constants.py", "tilt_gain_constants.py"),
         ),
+    ),
+    "target observer": Room(
+        source=(f"{_METHODS}/target_observer_constants.py",),
+        tests=(f"{_CONSTANTS}/test_target_observer_constants.py", "tests/codegen/test_target_observer.py"),
     ),
     "reach": Room(
         source=("codegen/mambo_codegen/numbers/reach.py",),

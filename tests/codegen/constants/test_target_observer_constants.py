@@ -11,6 +11,7 @@ from mambo_codegen.methods.quadratic.target_observer_constants import TargetObse
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from tests.support.benedict_bordner import no_pair_is_better
 from tests.support.height_settings import height_settings
 from tests.support.quadratic import ONE_MOVE, TWO_MOVES, Array, Axis, axis_of, settings_of
 from tests.support.strategies import Values
@@ -89,6 +90,13 @@ def test_memories_are_times(update_s: float) -> None:
     assert counts == tuple(np.maximum(nearest, least))
     assert found.least <= found.first <= found.longest
     assert found.least <= found.slow <= found.longest
+
+
+def test_the_desired_velocity_is_filtered_as_benedict_and_bordner_do() -> None:
+    """With a gain of 0.58 no other pair of gains is better in both, noise and the error of a ramp."""
+    found = at_period(0.01)
+    assert found.desired_gain == 0.58
+    assert no_pair_is_better(found.desired_gain, found.desired_jerk_gain)
 
 
 def test_memories_are_bounded_at_the_ends() -> None:

@@ -1,10 +1,9 @@
 """The constants of the target tracker are those of their definitions, over a table of settings."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import linprog
 
 from mambo_codegen.methods import method_of
@@ -14,6 +13,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
+from tests.support.benedict_bordner import no_pair_is_better
 from tests.support.quadratic import TWO_MOVES, settings_of
 
 ONE_NORM: Final = with_option(presets.preset("mambo-1norm"), "horizon.prediction_step_s", 0.15)
@@ -63,14 +63,7 @@ def test_constants_are_those_of_their_definitions(values: dict[str, float]) -> N
     assert found is not None
     expected = defined(settings)
     assert {name: getattr(found, name) for name in expected} == pytest.approx(expected, rel=1e-9)
-    pair, change = np.array([found.gain, found.jerk_gain]), 1e-5 * np.eye(2)
-    noise, error = (
-        np.array([cost(*(pair + one)) - cost(*(pair - one)) for one in change])
-        for cost in (_variance, _transient)
-    )
-    across = noise[0] * error[1] - noise[1] * error[0]
-    assert abs(across) < 1e-4 * np.linalg.norm(noise) * np.linalg.norm(error)
-    assert noise @ error < 0
+    assert no_pair_is_better(found.gain, found.jerk_gain)
 
 
 def test_the_limit_of_a_target_within_limits_is_what_the_drone_follows_or_the_range() -> None:
@@ -80,25 +73,3 @@ def test_the_limit_of_a_target_within_limits_is_what_the_drone_follows_or_the_ra
     assert target_limit_m_s2(quadratic) == pytest.approx(1.5 * largest_m_s2(quadratic), rel=1e-12)
     weak = with_option(quadratic, "ranges.thrust_acceleration_min_m_s2", 1.0)
     assert target_limit_m_s2(with_option(weak, "ranges.thrust_acceleration_max_m_s2", 6.0)) == 6.0
-
-
-def _filter(gain: float, jerk_gain: float) -> tuple[Any, Any]:
-    """Return transition (2, 2) and input (2,) of [acceleration, jerk]; the input is the measurement."""
-    transition = np.array([[1 - gain, 1 - gain], [-jerk_gain, 1 - jerk_gain]])
-    return transition, np.array([gain, jerk_gain])
-
-
-def _variance(gain: float, jerk_gain: float) -> float:
-    """Return the variance of the acceleration under white noise of variance 1."""
-    transition, by = _filter(gain, jerk_gain)
-    return float(solve_discrete_lyapunov(transition, np.outer(by, by))[0, 0])
-
-
-def _transient(gain: float, jerk_gain: float) -> float:
-    """Return the sum of squared errors of the predicted acceleration after a change of jerk by 1."""
-    transition, by = _filter(gain, jerk_gain)
-    state, total = np.zeros(2), 0.0
-    for step in range(4000):
-        total += (step - state[0]) ** 2
-        state = transition @ state + by * (step + 1)
-    return total
