@@ -2,6 +2,7 @@
 
 import os
 import re
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,17 @@ def test_waypoints_are_joined_by_straight_lines_and_held() -> None:
         [4.0, 1.0, 0.0, 0.0],
     ]
     np.testing.assert_allclose(targets, expected, rtol=1e-15)
+
+
+def test_a_target_of_many_waypoints_is_as_cheap_as_of_few() -> None:
+    """A pilot asks for hundreds a second: the points are not copied for each."""
+    waypoints = Waypoints(tuple((0.01 * number, 0.0, 0.0) for number in range(5000)))
+    waypoints.target(0.0)
+    tracemalloc.start()
+    waypoints.target(20.0)
+    most_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most_bytes < 5000
 
 
 def test_waypoints_are_read_from_a_file_by_column_name(tmp_path: Path) -> None:
