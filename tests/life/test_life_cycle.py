@@ -9,6 +9,7 @@ import pytest
 from mambo_codegen.settings.presets import preset
 from mambo_sil.api.api_controller import Controller
 from mambo_sil.errors import LinkError
+from mambo_sil.life.checks import Preflight
 from mambo_sil.life.courses import Place
 from mambo_sil.life.life_cycle import ARM_S, CHECK_S, CONNECT_S, LifeCycle
 from mambo_sil.life.phases import Phase
@@ -239,6 +240,15 @@ def test_a_link_with_a_long_delay_is_refused(trip_s: float, flies: bool) -> None
         assert ground.life.delay_s == pytest.approx(0.11, abs=0.006)
     else:
         assert "a message takes 130 ms each way; with more than 120 ms the drone may swing" in ground.sentence
+
+
+def test_states_are_carried_ahead_rather_too_little_than_too_far() -> None:
+    """Over 20 to 80 ms each way, by the quickest quarter of the answers: carried too far, a drone swings."""
+    preflight = Preflight(ARDUCOPTER, 0.01)
+    for number, trip_s in enumerate(np.linspace(0.04, 0.16, 21).tolist(), 1):
+        preflight.ping(0.0)
+        preflight.receive(Echo(number), trip_s)
+    assert preflight.delay_s == pytest.approx(0.035)
 
 
 def test_a_low_battery_is_refused() -> None:

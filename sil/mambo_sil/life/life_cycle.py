@@ -46,7 +46,7 @@ REFUSED_S: Final = 0.5
 """How long the controller may refuse the state before the pilot lands."""
 PUSHED_S: Final = 2.0
 """How long the drone may be pushed with all that the controller learns before the pilot lands."""
-ASK_S, BEAT_S, PING_S = 0.5, 1.0, 0.1
+ASK_S, BEAT_S, PING_S = 0.5, 1.0, 0.02
 """Periods of repeated requests, of heartbeats, and of what measures the delay of the link."""
 FARTHEST_M: Final = 20.0
 """Distance from the drone to its target beyond which the pilot lands, unless it is given another."""
