@@ -15,6 +15,7 @@ from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from mambo_sil.model.identify.dataflash import FOLLOWS_S
 from mambo_sil.model.identify.signals import FlightLog, Signal
 from mambo_sil.model.identify.ulog import TRAJECTORY
 
@@ -386,6 +387,12 @@ def _quaternion(roll: Array, pitch: Array, yaw: Array) -> list[Array]:
     ]
 
 
+def heading_later_rad(columns: Mapping[str, Array]) -> Array:
+    """Return the heading that a drone has when it follows the command of each row."""
+    time_s = columns["time_s"]
+    return columns["yaw_rad"][np.searchsorted(time_s, time_s + FOLLOWS_S + 1e-6, side="right") - 1]
+
+
 def dataflash(
     columns: Mapping[str, Array],
     *,
@@ -396,7 +403,8 @@ def dataflash(
     """Return a log in ArduPilot's format DataFlash: set-points if guided, angles, motion.
 
     The angles come in every n-th row, beside a rare ATT; their DesRoll and DesPitch follow the drone. The
-    motion is that of two estimators. A row a second before the set-points is of something else.
+    motion is that of two estimators. A row a second before the set-points is of something else. A commanded
+    heading is that of the set-point, by default the one at which the drone follows it.
     """
     des, labels = "Qfffff", "TimeUS,DesRoll,Roll,DesPitch,Pitch,Yaw"
     kinds = {
@@ -417,6 +425,7 @@ def dataflash(
         parts.append(b"\xa3\x95\x80" + head)
     names = ("roll_command_rad", "pitch_command_rad", "roll_rad", "pitch_rad", "yaw_rad")
     to_roll, to_pitch, roll, pitch, yaw = (np.degrees(columns[name]) for name in names)
+    to_yaw = np.degrees(columns.get("yaw_command_rad", heading_later_rad(columns)))
     level = np.zeros_like(columns["time_s"])
     motion = [columns.get(name, level) for name in ("vx_m_s", "vy_m_s", "x_m", "y_m", "z_m")]
     throttle = columns.get("thrust_command", level + 0.4)
@@ -425,7 +434,7 @@ def dataflash(
     for row, time_s in enumerate(columns["time_s"].tolist()):
         stamp = round(1e6 * time_s) + 10**7
         if guided:
-            parts.append(message(132, stamp, 6, to_roll[row], to_pitch[row], yaw[row], throttle[row]))
+            parts.append(message(132, stamp, 6, to_roll[row], to_pitch[row], to_yaw[row], throttle[row]))
         attitude = roll[row], roll[row], pitch[row], pitch[row], yaw[row] % 360.0
         if row % every == 0:
             parts.append(message(129, stamp, *attitude))

@@ -18,7 +18,7 @@ from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.identify.identify_report import vehicle_text
 from mambo_sil.model.identify.signals import POSITION, SEEN, THRUST, THRUST_COMMAND, FlightLog, Signal
 from mambo_sil.results.terminal import result_text
-from tests.support.logs import Flown, Lifting, Truth, dataflash, fly, lift, log_of, ulog
+from tests.support.logs import Flown, Lifting, Truth, dataflash, fly, heading_later_rad, lift, log_of, ulog
 
 TRUTH = Truth()
 FLOWN = fly(TRUTH, Flown(duration_s=20.0, yaw_rate_rad_s=0.4), 1)[0]
@@ -55,17 +55,23 @@ def test_a_dataflash_log_is_read(angles: str, tmp_path: Path) -> None:
     assert abs(found.roll.fitted.gain.value - wanted.roll.fitted.gain.value) < 1e-3
 
 
-def test_commands_of_px4_are_read_at_the_heading_of_the_drone(tmp_path: Path) -> None:
-    """It lags that of the set-point, by up to 1.5 rad here, to which roll and pitch of the log belong."""
+@pytest.mark.parametrize("kind", ["ulg", "bin"])
+def test_commands_are_read_at_the_heading_of_the_drone(kind: str, tmp_path: Path) -> None:
+    """It lags that of the set-point, by up to 1.5 rad here, to which roll and pitch of the log belong.
+
+    With ArduPilot it is the one at which the drone follows.
+    """
     lead_rad = 1.5 * np.sin(FLOWN["time_s"])
     tilts = zip(FLOWN["roll_command_rad"], FLOWN["pitch_command_rad"], lead_rad, strict=True)
     names = ("roll_command_rad", "pitch_command_rad")
     sent = dict(zip(names, np.array([turned_tilt(*one) for one in tilts]).T, strict=True))
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog(FLOWN | sent | {"yaw_command_rad": FLOWN["yaw_rad"] + lead_rad}, quaternion=True))
+    heading_rad = heading_later_rad(FLOWN) if kind == "bin" else FLOWN["yaw_rad"]
+    flown = FLOWN | sent | {"yaw_command_rad": heading_rad + lead_rad}
+    path = tmp_path / f"log.{kind}"
+    path.write_bytes(dataflash(flown) if kind == "bin" else ulog(flown, quaternion=True))
     (log,), _ = read_logs([path], {})
     for name in names:
-        np.testing.assert_allclose(log.signals[name].value, FLOWN[name], atol=1e-6)
+        np.testing.assert_allclose(log.signals[name].value, FLOWN[name], atol=2e-6)
 
 
 def test_the_thrust_is_over_mass_where_hover_is_estimated(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_dataflash_log_without_a_field_is_refused_in_one_sentence(
 ) -> None:
     """Each field that is read."""
     content = dataflash(WHOLE)
-    unread = {"DesRoll", "DesPitch", "C", "Type"} | ({"Yaw"} if kind == "GUIA" else set())
+    unread = {"DesRoll", "DesPitch", "C", "Type"}
     for field in labels.split(","):
         lost = f"{labels},".replace(f",{field},", f",{field[:-1]}q,").removesuffix(",")
         lost = lost.replace("TimeUS", "Timeus") if field == "TimeUS" else lost

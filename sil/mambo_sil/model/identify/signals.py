@@ -1,13 +1,14 @@
 """The signals of a flight log, and the record of a log: what the readers write and the fits read."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.frames import turned_tilt
 from mambo_sil.model.identify.resolution import Resolution
 
 DEGREE: Final = math.pi / 180.0
@@ -96,6 +97,20 @@ def stamped(time_us: FloatArray, values: FloatArray, column: str) -> Signal:
     """Return the finite values of a field over its time stamps."""
     there = np.isfinite(values)
     return Signal(1e-6 * time_us[there], values[there], column)
+
+
+def tilts_at_heading(
+    set_point_rad: Sequence[FloatArray], clock: FloatArray, yaw_rad: FloatArray, yaw_clock: FloatArray
+) -> FloatArray:
+    """Return roll and pitch (2, k) of set-points, roll, pitch and yaw (3, k), at the newest heading.
+
+    Roll and pitch of a set-point are those of its own heading, which that of the drone, yaw_rad, lags.
+    """
+    roll, pitch, yaw = set_point_rad
+    newest = np.maximum(np.searchsorted(yaw_clock, clock, side="right") - 1, 0)
+    turns = np.nan_to_num(yaw_rad[newest] - yaw)
+    known = [np.where(np.isfinite(each), each, np.nan).tolist() for each in (roll, pitch, turns)]
+    return np.array([turned_tilt(*one) for one in zip(*known, strict=True)]).reshape(-1, 2).T
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
-from mambo_sil.flight.frames import turned_tilt
 from mambo_sil.model.identify.csv_log import LONGEST_PERIOD_S, demand_one_clock, reading
 from mambo_sil.model.identify.signals import (
     GROUNDED,
@@ -29,6 +28,7 @@ from mambo_sil.model.identify.signals import (
     FlightLog,
     Signal,
     stamped,
+    tilts_at_heading,
 )
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
@@ -226,16 +226,9 @@ def _commands(
     if roll is None or pitch is None or not (np.isfinite(roll).any() and np.isfinite(pitch).any()):
         roll, pitch, yaw = _euler_rad([setpoint[f"q_d[{i}]"] for i in range(4)])
     if yaw is not None and attitude[_CLOCK].size:
-        turns = np.nan_to_num(_yaw_at(setpoint[_CLOCK], attitude) - yaw)
-        known = [np.where(np.isfinite(each), each, np.nan).tolist() for each in (roll, pitch, turns)]
-        roll, pitch = np.array([turned_tilt(*one) for one in zip(*known, strict=True)]).reshape(-1, 2).T
+        yaw_rad = _euler_rad([attitude[f"q[{i}]"] for i in range(4)])[2]
+        roll, pitch = tilts_at_heading((roll, pitch, yaw), setpoint[_CLOCK], yaw_rad, attitude[_CLOCK])
     return {"roll": roll, "pitch": pitch}
-
-
-def _yaw_at(clock: FloatArray, attitude: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the heading (k,) that was the newest at each time (k,)."""
-    yaw_rad = _euler_rad([attitude[f"q[{i}]"] for i in range(4)])[2]
-    return yaw_rad[np.maximum(np.searchsorted(attitude[_CLOCK], clock, side="right") - 1, 0)]
 
 
 def _thrust(setpoint: Mapping[str, FloatArray], hover: Mapping[str, FloatArray] | None) -> dict[str, Signal]:
