@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods.quadratic.method import Quadratic
-from mambo_codegen.methods.quadratic.target_observer_constants import TargetObserverConstants
+from mambo_codegen.methods.quadratic.target_observer_constants import (
+    TargetObserverConstants,
+    largest_velocities,
+)
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -130,11 +133,11 @@ def test_noise_of_the_same_density_asks_for_the_same_time(update_s: float) -> No
     assert changes == pytest.approx(1.0 * expected_s, rel=0.01), "the same noise, of accelerations"
 
 
-@pytest.mark.parametrize("update_s", [*PERIODS_S, 0.1])
+@pytest.mark.parametrize("update_s", [*PERIODS_S, 0.1, 0.2])
 def test_the_noise_is_a_mean_over_a_sixth_of_a_second(update_s: float) -> None:
     """Its share of the latest change is the period over that; it begins at 30 mm/s."""
     found = at_period(update_s)
-    assert found.noise_share == pytest.approx(6 * update_s, rel=1e-12)
+    assert found.noise_share == pytest.approx(min(1.0, 6 * update_s), rel=1e-12)
     assert (found.first_noise, found.update_s) == (0.03, update_s)
     assert found.ahead_share == pytest.approx(update_s / 0.05, rel=1e-12)
     assert found.snap_share == pytest.approx(min(1.0, update_s / 0.1), rel=1e-12)
@@ -191,6 +194,35 @@ def test_limits_keep_within_ranges() -> None:
     assert (slow.velocity_range, slow.level.jump) == (0.5, 0.5)
     assert slow.level.acceleration == pytest.approx(0.15 * GRAVITY_M_S2 * 0.5, rel=1e-12)
     assert slow.level.jerk == pytest.approx(slow.level.acceleration, rel=1e-12)
+
+
+def test_at_the_slowest_updates_every_derivative_may_change_by_the_acceleration_and_no_more() -> None:
+    """In a step of 0.8 s; a mean has no more than the latest change in it."""
+    found = constants_of(settings_of(ONE_MOVE | {"horizon.update_period_s": 0.8}))
+    limits = found.level
+    assert [limits.jerk, limits.snap, limits.known_snap] == [limits.acceleration] * 3
+    assert (found.noise_share, found.snap_share) == (1.0, 1.0)
+
+
+def test_tables_end_with_the_longest_memory_and_memories_are_drawn_from_one_below_the_least() -> None:
+    """A row each; a memory grows by one before it is used."""
+    found = at_period(0.01)
+    assert (found.least + found.last_row, found.known_least + found.known_last_row) == (76, 20)
+    assert found.least_drawn == 17
+
+
+def test_no_prediction_and_no_change_of_what_is_new_exceeds_its_bound() -> None:
+    """Of any fit within limits; and of set-points at the ends of their range, with the largest noise."""
+    found = constants_of(height_settings())
+    random, bounds = np.random.default_rng(6), largest_velocities(found)
+    for limits, (predicted, changed) in zip(found.limits, np.reshape(bounds, (2, 2)), strict=True):
+        most = [found.velocity_range, limits.acceleration, limits.jerk, limits.snap]
+        fits = random.choice([-1.0, 1.0], (1000, 4)) * most
+        largest = max(abs(step_later(fit)[0]) for fit in fits)
+        assert largest < predicted
+        assert predicted == pytest.approx(found.velocity_range + 3 * limits.acceleration, rel=1e-12)
+        trusted = limits.jump + 4 * found.most_noise
+        assert changed == pytest.approx(2 * found.velocity_range + trusted, rel=1e-12)
 
 
 def test_without_a_height_there_are_no_limits_of_one() -> None:

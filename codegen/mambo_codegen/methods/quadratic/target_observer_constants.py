@@ -46,9 +46,6 @@ NOISE_MEMORY_S: Final = 1 / 6
 """The time over which the noise is a mean."""
 FIRST_NOISE_M_S: Final = 0.03
 """What it is taken for at the first set-point."""
-JUMP_NOISES: Final = 4
-"""What is new is a jump if it exceeds the limit by this many times the noise."""
-
 KNOWN_JUMP_SHARE: Final = 0.1
 """A known acceleration has jumped if it changes by this share of its limit in a step."""
 AHEAD_SNAP_S: Final = 0.1
@@ -164,7 +161,8 @@ def target_observer_constants(settings: Sections) -> TargetObserverConstants:
     # Noise that is independent from set-point to set-point counts by its density.
     density = math.sqrt(update_s / _PERIOD_S)
     least, slow, longest, first = (
-        set_points(time_s, update_s) for time_s in (*MEMORY_S, LONGEST_MEMORY_S, FIRST_MEMORY_S)
+        set_points(time_s, update_s, LEAST_SET_POINTS)
+        for time_s in (*MEMORY_S, LONGEST_MEMORY_S, FIRST_MEMORY_S)
     )
     known_least, known_longest = (
         set_points(time_s, update_s, LEAST_KNOWN_SET_POINTS)
@@ -216,8 +214,8 @@ def largest_velocities(found: TargetObserverConstants) -> list[float]:
     ]
 
 
-def set_points(memory_s: float, update_s: float, least: int = LEAST_SET_POINTS) -> int:
-    """Return how many set-points a memory holds."""
+def set_points(memory_s: float, update_s: float, least: int) -> int:
+    """Return how many set-points a memory holds, from `least` on."""
     return min(max(round(memory_s / update_s), least), MOST_SET_POINTS)
 
 
