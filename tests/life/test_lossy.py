@@ -119,6 +119,15 @@ def wind_rises(one: LossyFlight) -> None:
     one.autopilot.push_m_s2 = 0.0
 
 
+def drone_swings(one: LossyFlight) -> None:
+    """Be commanded from limit to limit, by settings that are too quick for the link."""
+    flying(one)
+    for number in range(12):
+        side_rad = (-1.0) ** number * one.life.steering.controller.settings.limits.tilt_rad
+        one.life.steering.swings.watch(np.array([side_rad, 0.0]), one.now_s)
+    one.pass_until(lambda: one.life.phase is not Phase.FLYING)
+
+
 def another_pilot_comes(one: LossyFlight) -> None:
     """Hear another pilot in flight."""
     flying(one)
@@ -169,6 +178,7 @@ ENDS: Final[dict[Callable[[LossyFlight], None], str]] = {
     estimate_jumps: "landed: the estimate has jumped by 10.0 m",
     target_is_far: "landed: the target is 25 m away",
     wind_rises: "landed: pushed away: wind, or a drone that the settings do not describe",
+    drone_swings: "landed: the drone swings between its limits of tilt",
     another_pilot_comes: "landed: another pilot is on the link",
     is_interrupted: "landed: Ctrl-C",
     is_interrupted_while_arming: "(landed|no flight): Ctrl-C",

@@ -16,6 +16,7 @@ from mambo_sil.life.lean import Lean
 from mambo_sil.life.prediction import DelayPrediction
 from mambo_sil.life.records import EstimatedState, SetAttitude
 from mambo_sil.life.steady_frame import FrameJump, SteadyFrame
+from mambo_sil.life.swings import Swings
 from mambo_sil.model.identify.signals import UPDATES
 
 PAUSE_S: Final = 0.1
@@ -78,6 +79,7 @@ class Steering:
         self.pushed_s = 0.0
         """For how long the disturbance has been at the limit of what the controller learns."""
         self.frame = SteadyFrame()
+        self.swings = Swings(controller.settings.limits.tilt_rad)
         most_m_s2 = AT_LIMIT * controller.settings.observer.disturbance_limit_m_s2
         self.lean = Lean(controller.settings.model.drag_1_s, most_m_s2)
         self.prediction = DelayPrediction(controller.settings, controller.settings.height, self.hover_m_s2)
@@ -100,6 +102,7 @@ class Steering:
         self.controller.reset(self._sent_rad, thrust_m_s2=self._sent_m_s2)
         self.prediction.begin(self._sent_rad)
         self.frame.begin(estimate)
+        self.swings.begin()
         self.pushed_s = 0.0
         self._last = self._jump = None
         self._clock_s = estimate.time_s - self.controller.update_period_s
@@ -189,6 +192,7 @@ class Steering:
         if thrust != share:
             self.controller.report_thrust(upright_m_s2)
         self.prediction.sent(estimate.time_s, command_rad, upright_m_s2, passed_s)
+        self.swings.watch(command_rad, estimate.time_s)
         self._sent_rad, self._sent_m_s2 = command_rad, thrust_m_s2
         self.mean_thrust += (thrust - self.mean_thrust) * min(passed_s / LEARNS_S, 1.0)
         self.is_accepted = int(outcome.status) == 0
