@@ -61,7 +61,11 @@ NOT_RUN = {
         "needs the firmware of Bitcraze, and a Crazyflie",
         "needs a Crazyflie",
     ),
-    "tutorials/px4-ardupilot.md": ("needs PX4", "asks for a passphrase, and needs an autopilot"),
+    "tutorials/px4-ardupilot.md": (
+        "needs ArduCopter",
+        "needs PX4",
+        "asks for a passphrase, and needs an autopilot",
+    ),
     "tutorials/own-drone.md": ("takes minutes; tests of their own run every check",),
     "tutorials/race.md": (
         "needs the course",
