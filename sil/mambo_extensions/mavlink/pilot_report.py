@@ -103,12 +103,19 @@ class PilotSummary(ReportedSummary):
         ]
         return CommandResult(self.about, self.good, [self.end], blocks)
 
+    @property
+    def is_judged(self) -> bool:
+        """Whether it flew for longer than `SETTLES_S`."""
+        return self.horizontal_rms_m == self.horizontal_rms_m
+
     def draw(self, trace: Trace, folder: Path) -> None:
         """Write `PICTURES`."""
         from mambo_sil.flight.flight_plots import draw_flight  # noqa: PLC0415 - loaded when drawing
 
-        rms = " and ".join(f"{distance(one)}" for one in (self.horizontal_rms_m, self.vertical_rms_m))
-        message = f"{self.end}; {rms} (rms, in the plane and in height, as estimated) off the target"
+        message = self.end
+        if self.is_judged:
+            rms = " and ".join(f"{distance(one)}" for one in (self.horizontal_rms_m, self.vertical_rms_m))
+            message += f"; {rms} (rms, in the plane and in height, as estimated) off the target"
         about = f"{self.about}; one flight: {self.trajectory}, {self.flown_s:.0f} s"
         draw_flight(trace, message, about, folder / "flight")
 
@@ -167,11 +174,14 @@ def _rows(summary: PilotSummary) -> list[tuple[str, str]]:
     """Return what is told of a flight, name and value."""
     median_s, most_s = summary.interval_s
     rms_cm = 100.0 * summary.horizontal_rms_m, 100.0 * summary.vertical_rms_m
+    judged = [
+        ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
+        ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
+    ]
     return [
         ("set-points", f"{summary.set_points} in {summary.flown_s:.1f} s"),
         ("interval", f"{1e3 * median_s:.0f} ms, 95 % within {1e3 * most_s:.0f} ms"),
-        ("error, rms", f"{rms_cm[0]:.1f} cm in the plane, {rms_cm[1]:.1f} cm in height, as estimated"),
-        ("command", f"moves at {np.degrees(summary.command_rms_rad_s):.0f} degrees/s rms"),
+        *(judged if summary.is_judged else [("error", f"not judged: flown for less than {SETTLES_S:.0f} s")]),
         (
             "thrust of hover",
             f"{summary.mean_thrust:.3f}; {summary.hover_parameter} says {summary.hover_thrust:.3f}",

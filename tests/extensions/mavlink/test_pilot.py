@@ -57,6 +57,16 @@ def test_the_picture_says_which_angles_it_has(tmp_path: Path) -> None:
     assert "angles, both less the lean" in captions[-1]
 
 
+def test_a_flight_too_short_to_be_judged_says_so(tmp_path: Path) -> None:
+    """In place of an error that is no number."""
+    pilot_folder(tmp_path)
+    summary = PilotSummary.model_validate_json((tmp_path / "summary.json").read_text("utf-8"))
+    unknown = dict.fromkeys(("horizontal_rms_m", "vertical_rms_m", "command_rms_rad_s"), float("nan"))
+    said = str(summary.model_copy(update=unknown).result(tmp_path).blocks)
+    assert "not judged: flown for less than 5 s" in said
+    assert "nan" not in said
+
+
 @pytest.mark.usefixtures("settings")
 @pytest.mark.parametrize(
     ("line", "words"),
