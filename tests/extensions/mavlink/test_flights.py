@@ -161,7 +161,7 @@ def test_the_delay_of_a_link_is_counted_on() -> None:
 
 @pytest.mark.long
 def test_a_link_whose_delay_varies_is_flown_as_one_with_their_mean() -> None:
-    """20 to 80 ms and a fifth lost, in place of 50, in the mean of three draws: states are carried to one age.
+    """20 to 80 ms and a fifth lost, in place of 50, mean of three draws: states are carried to one age.
 
     With states of the age at which they come the circle is half as far off again.
     """
