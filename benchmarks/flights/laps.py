@@ -87,8 +87,8 @@ class Judge:
 
     def within(self, figures: Figures, share: float = 1.0) -> PlannedCourse:
         """Return the quickest course within limits."""
-        limits = limits_of(figures, share)
-        return slowed(solve(first_course(self.first, limits), limits), limits)
+        limits, first = limits_of(figures), self.first.within(np.full(self.first.choice.count, share))
+        return slowed(solve(first_course(first, limits), limits), limits)
 
 
 def without_lag(figures: Figures) -> Figures:

@@ -5,7 +5,7 @@ times a power of the time that the pieces beside it take: so other durations lea
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -18,8 +18,9 @@ from mambo_sil.drone.plant.arrays import FloatArray
 
 PLANNED_SHARE: Final = 0.5
 """Of a tolerance, what the plan takes; the rest is for the drone."""
-FORWARD_M_S: Final = 0.2
-"""Least speed along the normal of a gate."""
+FORWARD_M_S: Final = 0.8
+"""Least speed along the normal of a gate: a plan that turns back behind it, at 6 m/s^2, comes 5 cm behind its
+plane, so that drones beside the plan cross it too."""
 START_S_PER_ROOT_M: Final = 1.2
 """First guess of a duration over the root of the distance; it is lengthened until no limit is passed."""
 
@@ -33,6 +34,7 @@ class Choice:
     free:    (n + 1, 4, 3) which values along these axes may change.
     reach_m: (n + 1,) how far from the point the plan may pass.
     normal:  (n + 1, 3) of the gates; 0 of others.
+    allowed: (n,) share of tilt and spare thrust that each piece may take.
     closed:  the last knot is the first.
     """
 
@@ -41,6 +43,7 @@ class Choice:
     free: NDArray[np.bool_]
     reach_m: FloatArray
     normal: FloatArray
+    allowed: FloatArray
     closed: bool
 
     @property
@@ -133,6 +136,10 @@ class PlannedCourse:
         moved = (self.value * before + change) / after
         return PlannedCourse(choice, np.where(choice.free, moved, self.value), duration_s)
 
+    def within(self, allowed: FloatArray) -> "PlannedCourse":
+        """Return the course whose pieces may take other shares (n,) of tilt and spare thrust."""
+        return replace(self, choice=replace(self.choice, allowed=allowed))
+
     def smooth(self, duration_s: FloatArray) -> "PlannedCourse":
         """Return the course of least snap with durations, through the middle of the points."""
         choice = self.choice
@@ -177,7 +184,7 @@ def course_of(points: Sequence[PlanPoint], *, closed: bool) -> PlannedCourse:
                 value[knot, 1, 0], free[knot, 1, 0] = point.speed_m_s, False
     reach_m = PLANNED_SHARE * np.array([point.reach_m for point in through])
     reach_m[~free[:, 0].any(axis=1)] = 0.0
-    choice = Choice(place_m, axes, free, reach_m, normal, closed)
+    choice = Choice(place_m, axes, free, reach_m, normal, np.ones(count - 1), closed)
     return PlannedCourse(choice, value, START_S_PER_ROOT_M * np.sqrt(choice.distance_m))
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.numbers.reach import PLANNED_SHARE, THRUST_LEFT, largest_acceleration_m_s2
@@ -24,8 +25,11 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 LEAST_THRUST_M_S2: Final = 0.3 * GRAVITY_M_S2
 """Least vertical thrust over mass where the settings have no height: roll and pitch need some."""
 
-Rule = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-"""What a quantity (..., 3) takes of its limit, less 1, and the gradient of that (..., 3)."""
+Rule = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""What a quantity (..., 3) takes of its limit, less 1, and the gradient of that (..., 3).
+
+The second argument is the share (...) of tilt and thrust that may be taken.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +47,13 @@ class FlightLimit:
     rule: Rule
     scale: float = 1.0
 
-    def of(self, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return share of the limit less 1, and its gradient, of motions (ORDERS, ..., 3)."""
+    def of(self, motion: FloatArray, allowed: ArrayLike = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return share of the limit less 1, and its gradient, of motions (ORDERS, ..., 3).
+
+        allowed: (...) share of what the weakest drone has beyond its weight, and of the tilt if less.
+        """
         summed = np.einsum("kc,k...c->...c", self.weights, motion)
-        return self.rule(summed + self.offset)
+        return self.rule(summed + self.offset, np.asarray(allowed, np.float64))
 
 
 @dataclass(frozen=True)
@@ -140,13 +147,13 @@ def _walls(settings: Settings) -> tuple[tuple[int, float, float], ...]:
     )
 
 
-def limits_of(figures: Figures, share: float = 1.0) -> list[FlightLimit]:
-    """Return the limits; `share` of what the weakest drone has beyond its weight, and of the tilt if less."""
-    usable_m_s2 = _usable_m_s2(figures, share)
-    spare_share = 1.0 - GRAVITY_M_S2 / usable_m_s2
+def limits_of(figures: Figures) -> list[FlightLimit]:
+    """Return the limits of a drone with these numbers."""
+    spare_m_s2 = _spare_m_s2(figures)
+    spare_share = spare_m_s2 / (GRAVITY_M_S2 + spare_m_s2)
     return [
-        FlightLimit("tilt", *_commanded(figures), _cone(min(share, 1.0) * figures.slope)),
-        FlightLimit("thrust", *_commanded(figures), _ellipsoid(usable_m_s2), spare_share),
+        FlightLimit("tilt", *_commanded(figures), _cone(figures.slope)),
+        FlightLimit("thrust", *_commanded(figures), _ellipsoid(spare_m_s2), spare_share),
         FlightLimit("least thrust", *_commanded(figures), _above(figures.least_thrust_m_s2)),
         *(
             FlightLimit(name, _of(1), np.zeros(3), _below(np.array([0.0, 0.0, sign]), most_m_s))
@@ -168,9 +175,9 @@ def limits_of(figures: Figures, share: float = 1.0) -> list[FlightLimit]:
     ]
 
 
-def _usable_m_s2(figures: Figures, share: float) -> float:
-    most_m_s2 = THRUST_LEFT * figures.thrust_m_s2
-    return GRAVITY_M_S2 + share * max(most_m_s2 - GRAVITY_M_S2, 0.02 * GRAVITY_M_S2)
+def _spare_m_s2(figures: Figures) -> float:
+    """Return what the thrust of the weakest drone leaves beyond its weight."""
+    return max(THRUST_LEFT * figures.thrust_m_s2 - GRAVITY_M_S2, 0.02 * GRAVITY_M_S2)
 
 
 def _commanded(figures: Figures) -> tuple[FloatArray, FloatArray]:
@@ -198,37 +205,37 @@ def _norm(vector: FloatArray) -> FloatArray:
 
 def _cone(slope: float) -> Rule:
     """Bound the horizontal part by `slope` times the vertical one."""
-    most_m_s2 = slope * GRAVITY_M_S2
 
-    def rule(thrust: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rule(thrust: FloatArray, allowed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        most_m_s2 = np.minimum(allowed, 1.0) * slope * GRAVITY_M_S2
         level = thrust * [1.0, 1.0, 0.0]
         size = _norm(level)
-        gradient = level / (most_m_s2 * size[..., np.newaxis])
+        gradient = level / (most_m_s2 * size)[..., np.newaxis]
         gradient[..., 2] = -1.0 / GRAVITY_M_S2
-        return (size - slope * thrust[..., 2]) / most_m_s2, gradient
+        return size / most_m_s2 - thrust[..., 2] / GRAVITY_M_S2, gradient
 
     return rule
 
 
-def _ellipsoid(most_m_s2: float) -> Rule:
+def _ellipsoid(spare_m_s2: float) -> Rule:
     """Bound the thrust, of which the horizontal part may take PLANNED_SHARE of what the height leaves.
 
     The share is that of the thrust beyond the weight.
     """
-    ball, spare = (
-        _ball(most_m_s2, np.array([1.0 / PLANNED_SHARE, 1.0 / PLANNED_SHARE, 1.0])),
-        most_m_s2 - GRAVITY_M_S2,
-    )
+    stretch = np.array([1.0 / PLANNED_SHARE, 1.0 / PLANNED_SHARE, 1.0])
 
-    def rule(thrust: FloatArray) -> tuple[FloatArray, FloatArray]:
-        over, gradient = ball(thrust)
-        return most_m_s2 / spare * over, most_m_s2 / spare * gradient
+    def rule(thrust: FloatArray, allowed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        stretched, most_m_s2 = stretch * thrust, allowed * spare_m_s2
+        size = _norm(stretched)
+        return (size - GRAVITY_M_S2) / most_m_s2 - 1.0, stretch * stretched / (most_m_s2 * size)[
+            ..., np.newaxis
+        ]
 
     return rule
 
 
-def _ball(most: float, stretch: FloatArray | float = 1.0) -> Rule:
-    def rule(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _ball(most: float, stretch: FloatArray) -> Rule:
+    def rule(vector: FloatArray, _: FloatArray) -> tuple[FloatArray, FloatArray]:
         stretched = stretch * vector
         size = _norm(stretched)
         return size / most - 1.0, stretch * stretched / (most * size[..., np.newaxis])
@@ -237,7 +244,7 @@ def _ball(most: float, stretch: FloatArray | float = 1.0) -> Rule:
 
 
 def _above(least_m_s2: float) -> Rule:
-    def rule(thrust: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rule(thrust: FloatArray, _: FloatArray) -> tuple[FloatArray, FloatArray]:
         down = np.broadcast_to(np.array([0.0, 0.0, -1.0 / GRAVITY_M_S2]), thrust.shape)
         return (least_m_s2 - thrust[..., 2]) / GRAVITY_M_S2, down
 
@@ -245,7 +252,7 @@ def _above(least_m_s2: float) -> Rule:
 
 
 def _below(direction: FloatArray, most: float) -> Rule:
-    def rule(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rule(vector: FloatArray, _: FloatArray) -> tuple[FloatArray, FloatArray]:
         return vector @ direction / most - 1.0, np.broadcast_to(direction / most, vector.shape)
 
     return rule
@@ -256,7 +263,7 @@ def _wall(axis: int, side: float, wall_m: float) -> Rule:
     outwards = np.zeros(3)
     outwards[axis] = side
 
-    def rule(position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rule(position: FloatArray, _: FloatArray) -> tuple[FloatArray, FloatArray]:
         return position @ outwards - side * wall_m, np.broadcast_to(outwards, position.shape)
 
     return rule

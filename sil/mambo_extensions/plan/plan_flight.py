@@ -86,7 +86,7 @@ class FlownPlan:
     off_m:     (m, p) least distance from each point that is judged, of a gate where the drone crosses it; in
                the plane where the settings do not hold the height.
     crashed:   (m,).
-    error_m:   largest distance of each from the plan (m,).
+    error_m:   largest distance of each from the plan in each of n pieces (m, n).
     tilt_rad, thrust_m_s2: largest of each on the plan (m,).
     """
 
@@ -159,17 +159,22 @@ class Drones:
         return FlownPlan(
             distances_m(trace.time_s, path_m, passed_points(points, course), passed_s),
             detect_crashes(trace, vehicle.drone),
-            _error_m(trace, judged_s, axes),
+            _error_m(trace, passed_s, axes),
             tilt_rad.max(axis=0),
             trace.thrust_acceleration_m_s2[planned].max(axis=0),
         )
 
 
-def _error_m(trace: Trace, begins_s: float, axes: int) -> FloatArray:
-    """Return the largest distance (n,) from the plan, along the first `axes` of x, y, z."""
+def _error_m(trace: Trace, passed_s: FloatArray, axes: int) -> FloatArray:
+    """Return the largest distance (m, n) from the plan in each piece, along the first `axes` of x, y, z.
+
+    passed_s: (n + 1,) when the pieces begin, and when the last one ends; the rest after it counts as a part
+              of it.
+    """
     target_m = np.concatenate([trace.target[..., :2], -trace.target_height_m[..., np.newaxis]], axis=-1)
     error_m = np.linalg.norm((trace.position_m - target_m)[..., :axes], axis=-1)
-    return np.asarray(error_m[trace.time_s >= begins_s].max(axis=0))
+    begins = np.searchsorted(trace.time_s, passed_s[:-1])
+    return np.asarray(np.maximum.reduceat(error_m, begins, axis=0).T)
 
 
 def passed_points(points: Sequence[PlanPoint], course: PlannedCourse) -> tuple[PassedPoint, ...]:

@@ -31,6 +31,8 @@ class PieceSummary(Summary):
     duration_s: Number
     binding: str
     share: Number
+    allowed: Number
+    """Share of tilt and of the weakest drone's spare thrust that counts as the whole limit."""
 
 
 class PlanSummary(Summary):
@@ -41,7 +43,6 @@ class PlanSummary(Summary):
     vehicle: str
     points: int
     time_s: Number
-    share: Number
     good: bool
     flown: int
     passed: int
@@ -144,7 +145,6 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
         vehicle=drone.name,
         points=len(planned.points),
         time_s=course.time_s,
-        share=planned.share,
         good=planned.good,
         flown=len(misses),
         passed=int((~misses).sum()),
@@ -162,6 +162,7 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
                 duration_s=float(piece_s),
                 binding=names[int(shares[:, piece].argmax())],
                 share=float(shares[:, piece].max()),
+                allowed=float(course.choice.allowed[piece]),
             )
             for piece, piece_s in enumerate(course.duration_s)
         ],

@@ -1,8 +1,7 @@
 """Plan a course through points: limits from the drone, least time, and flights that decide how far to go.
 
-The weakest of the drawn drones follows a plan of share 1 with all that its controller keeps in reserve. A
-larger share is quicker, and some drone then passes a point too far away: the flights find the quickest one
-that all fly.
+The weakest of the drawn drones follows a plan of share 1 with all that its controller keeps in reserve.
+Larger shares are quicker, and some drone then passes a point too far away: flights find each piece's share.
 """
 
 import math
@@ -15,6 +14,7 @@ import numpy as np
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
 from mambo_extensions.plan import LEAST_RATE
+from mambo_extensions.plan.allowance import SURE, Allowance
 from mambo_extensions.plan.course import PlannedCourse, course_of
 from mambo_extensions.plan.heading import first_heading, headings_of
 from mambo_extensions.plan.hermite import motion, pieces_of
@@ -29,17 +29,9 @@ from mambo_sil.errors import PlanError
 from mambo_sil.flight.polynomials import PiecesInSpace
 from mambo_sil.model.derive.derived_flight import chosen_text
 
-SHARES: Final = (0.35, 4.0)
-"""Least and largest share of tilt and spare thrust that a plan takes."""
-STEP: Final = 1.35
-"""Factor between shares, until one is found that drones do not fly."""
 NO_QUICKER: Final = 0.997
-"""Time of a plan over that of one with a smaller share, above which a larger share is of no use."""
-FINE: Final = 1.03
-"""Factor between the largest share that is flown and the next one, which is not, at the end."""
+"""Time of a plan over that of one with smaller shares, above which larger shares are of no use."""
 TRIES: Final = 8
-SURE: Final = 0.85
-"""Of a tolerance, what the flown drones must not leave: others fly a little wider."""
 SLOWER: Final = np.concatenate([np.arange(0.99, 0.1, -0.01), 0.1 * 0.9 ** np.arange(40.0)])
 """Speeds of a plan at which it may keep the limits, over that at which it does not."""
 DENSE: Final = (np.arange(65) / 64.0).astype(np.float64)
@@ -53,14 +45,13 @@ Progress = Callable[[str, float], None]
 class Planned:
     """A course and how it was flown.
 
-    limits: what the course keeps, `share` of what the weakest drawn drone is sure to follow.
+    limits: what the course keeps.
     flown:  by the drone of the file, the drawn ones, and those at the ends of [uncertainty].
     """
 
     points: tuple[PlanPoint, ...]
     course: PlannedCourse
     limits: list[FlightLimit]
-    share: float
     flown: FlownPlan
     yaw: FloatArray
     height_judged: bool
@@ -90,7 +81,8 @@ def reach_of(points: Sequence[PlanPoint], course: PlannedCourse) -> FloatArray:
 def shares_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
     """Return what a course takes of each limit at the times DENSE of each piece (m, n, 65)."""
     moved = motion(course.knots, course.duration_s, DENSE)
-    return np.stack([limit.of(moved)[0] for limit in limits]) + 1.0
+    allowed = course.choice.allowed[:, np.newaxis]
+    return np.stack([limit.of(moved, allowed)[0] for limit in limits]) + 1.0
 
 
 def make_plan(
@@ -121,19 +113,17 @@ def make_plan(
     first = course_of(points, closed=closed)
     _require_speeds(first, figures.speed_m_s)
     search = _Search(tuple(points), first, Drones.of(vehicle, drawn, settings), rate, progress)
-    share = 1.0
+    limits = limits_of(figures)
     if points[0].time_s is not None:
-        course = _timed(search, limits_of(figures))
+        course = _timed(search, limits)
         flown = search.fly(course)
     else:
-        course, share, flown = search.quickest(lambda share: limits_of(figures, share))
+        course, flown = search.quickest(limits)
         if rate < 1.0:
             course = course.slower(rate)
             flown = search.fly(course)
     yaw = headings_of(points, course, rate)
-    return Planned(
-        tuple(points), course, limits_of(figures, share), share, flown, yaw, settings.height is not None
-    )
+    return Planned(tuple(points), course, limits, flown, yaw, settings.height is not None)
 
 
 def _require_speeds(course: PlannedCourse, most_m_s: float) -> None:
@@ -158,44 +148,51 @@ class _Search:
     def fly(self, course: PlannedCourse) -> FlownPlan:
         return self.drones.fly(course, self.points, first_heading(self.points, closed=course.choice.closed))
 
-    def quickest(
-        self, limits_at: Callable[[float], list[FlightLimit]]
-    ) -> tuple[PlannedCourse, float, FlownPlan]:
-        """Return the quickest course that all drones fly, its share of the limits, and how it was flown."""
-        least, most = SHARES
+    def quickest(self, limits: Sequence[FlightLimit]) -> tuple[PlannedCourse, FlownPlan]:
+        """Return the quickest course that all drones fly, and how it was flown."""
         reach_m = reach_of(self.points, self.first)
-        found: tuple[PlannedCourse, float, FlownPlan] | None = None
-        missed: tuple[PlannedCourse, FlownPlan] | None = None
-        share, fails = 1.0, np.inf
+        found: tuple[PlannedCourse, FlownPlan] | None = None
+        last, allowance = self.first, Allowance.of(self.first)
         for attempt in range(TRIES):
-            begun = attempt / TRIES
-
-            def report(part: float, begun: float = begun) -> None:
-                self.progress("planning", begun + 0.7 * part / TRIES)
-
-            limits = limits_at(share)
-            course = slowed(solve(first_course(self.first, limits), limits, report), limits)
+            start = last.within(allowance.share)
+            course = self._plan(first_course(start, limits) if found is None else start, limits, attempt)
             if fault := _fault_of(course, limits):
                 if found is None:
                     raise PlanError(fault)
-                fails = share
-            else:
-                self.progress("flying", begun + 0.7 / TRIES)
-                flown = self.fly(course)
-                if flown.misses(SURE * reach_m).any():
-                    fails, missed = share, (course, flown)
-                elif found is None or course.time_s < NO_QUICKER * found[0].time_s:
-                    found = course, share, flown
-                else:
-                    break  # more thrust makes it no quicker
-            flies = 0.0 if found is None else found[1]
-            if fails <= least or flies >= most or fails < FINE * flies:
+                allowance = allowance.between(found[0])
+                continue
+            self.progress("flying", (attempt + 0.7) / TRIES)
+            last, flown = course, self.fly(course)
+            if not flown.misses(SURE * reach_m).any():
+                settled = found is not None and _is_no_quicker(course, found[0])
+                if found is None or course.time_s < found[0].time_s:
+                    found = course, flown
+                if settled:
+                    break
+                allowance = allowance.after(course, flown, reach_m)
+            elif found is not None:
+                allowance = allowance.between(found[0])
+            elif allowance.is_least:
                 break
-            share = _next_share(flies, fails)
+            else:
+                allowance = allowance.lowered()
         if found is None:
-            assert missed is not None
-            raise PlanError(_missed_words(self.points, reach_m, *missed))
+            raise PlanError(_missed_words(self.points, reach_m, course, flown))
         return found
+
+    def _plan(self, start: PlannedCourse, limits: Sequence[FlightLimit], attempt: int) -> PlannedCourse:
+        """Return the quickest course within limits, from a first one."""
+
+        def report(part: float) -> None:
+            self.progress("planning", (attempt + 0.7 * part) / TRIES)
+
+        return slowed(solve(start, limits, report), limits)
+
+
+def _is_no_quicker(course: PlannedCourse, found: PlannedCourse) -> bool:
+    """Return whether a course is no quicker than one all of whose shares are smaller."""
+    larger = (course.choice.allowed >= found.choice.allowed).all()
+    return bool(larger and course.time_s >= NO_QUICKER * found.time_s)
 
 
 def _over(course: PlannedCourse, limits: Sequence[FlightLimit]) -> FloatArray:
@@ -214,16 +211,6 @@ def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
         number = course.choice.point_of(int(passed.argmax()))
         return f"point {number}: is not reached within the limits; a wider tolerance would do"
     return ""
-
-
-def _next_share(flies: float, fails: float) -> float:
-    """Return the share to be tried next, between one that is flown (0: none) and one that is not."""
-    least, most = SHARES
-    if flies == 0.0:
-        return max(fails / STEP**2, least)
-    if np.isinf(fails):
-        return min(flies * STEP, most)
-    return float(np.sqrt(flies * fails))
 
 
 def slowed(course: PlannedCourse, limits: Sequence[FlightLimit]) -> PlannedCourse:

@@ -63,7 +63,8 @@ class _State:
 
 def _state(course: PlannedCourse, limits: Sequence[FlightLimit]) -> _State:
     moved = motion(course.knots, course.duration_s, TAU)
-    passed = np.stack([limit.of(moved)[0] for limit in limits]) + LEEWAY
+    allowed = course.choice.allowed[:, np.newaxis]
+    passed = np.stack([limit.of(moved, allowed)[0] for limit in limits]) + LEEWAY
     return _State(course, moved, passed, passed_at_knots(course))
 
 
@@ -210,7 +211,7 @@ def _rows_of_samples(
     course, choice = state.course, state.course.choice
     knots, durations, _ = choice.index
     piece, sample = np.nonzero(costly)
-    _, gradient = limit.of(state.motion[:, piece, sample])
+    _, gradient = limit.of(state.motion[:, piece, sample], choice.allowed[piece])
     by_motion = limit.weights[:, np.newaxis] * gradient  # (ORDERS, r, 3)
     factor = per_second(course.duration_s)
     at = BASIS[:, sample]

@@ -55,16 +55,18 @@ def test_what_is_commanded_gives_the_acceleration_behind_lag_and_dead_time() -> 
 
 
 def test_gradients_are_those_of_differences() -> None:
-    """Of every limit, by each derivative of the position, at random motions."""
+    """Of every limit, by each derivative of the position, at random motions and shares."""
     random = np.random.default_rng(0)
     motion = random.normal(size=(5, 6, 3)) * np.array([1.0, 2.0, 4.0, 10.0, 30.0])[:, np.newaxis, np.newaxis]
-    for limit in limits_of(FIGURES, 0.8):
-        _, gradient = limit.of(motion)
+    allowed = np.array([0.5, 0.8, 1.0, 1.0, 1.2, 1.5])
+    for limit in limits_of(FIGURES):
+        _, gradient = limit.of(motion, allowed)
         for order in range(5):
             for axis in range(3):
                 change = np.zeros_like(motion)
                 change[order, :, axis] = 1e-6
-                slope = (limit.of(motion + change)[0] - limit.of(motion - change)[0]) / 2e-6
+                after, before = (limit.of(motion + one, allowed)[0] for one in (change, -change))
+                slope = (after - before) / 2e-6
                 np.testing.assert_allclose(slope, limit.weights[order, axis] * gradient[:, axis], atol=1e-6)
 
 

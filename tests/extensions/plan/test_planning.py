@@ -18,6 +18,7 @@ from mambo_extensions.plan.planning import _missed_words, _Search
 from mambo_extensions.plan.plans import Plan
 from mambo_extensions.plan.solver import silent
 from mambo_nmpc import Controller, PlanPoint, Vehicle, fly, plan
+from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError, PlanError, TrajectoryError
 from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS, Piece, PiecesInSpace, read_course
 from tests.support.command import run
@@ -249,19 +250,20 @@ def test_what_is_no_point_is_refused() -> None:
 
 
 def test_a_larger_share_without_a_plan_leaves_the_one_that_flew() -> None:
-    """From a share of 1.2 on a wall stands before the last point: the plan of share 1 remains."""
+    """From a share of 1.05 on a wall stands before the last point: a plan of a smaller share remains."""
     vehicle = Vehicle.from_preset("crazyflie")
     settings = Controller.from_vehicle("crazyflie").settings
     points = tuple(PlanPoint(*place) for place in POINTS[:2])
     search = _Search(points, course_of(points, closed=False), Drones([vehicle], settings), 1.0, silent)
-    figures = figures_of(vehicle.drone, settings, vehicle)
 
-    def limits_at(share: float) -> list[FlightLimit]:
-        walled = replace(figures, walls_m=((0, 1.0, 0.5),))
-        return limits_of(walled if share > 1.2 else figures, share)
+    def wall(place_m: FloatArray, allowed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        stands_m = np.where(allowed > 1.05, 0.5, 5.0)
+        return place_m[..., 0] - stands_m, np.broadcast_to(np.array([1.0, 0.0, 0.0]), place_m.shape)
 
-    course, share, flown = search.quickest(limits_at)
-    assert 1.0 <= share <= 1.2
+    position = np.eye(5, 1) * np.ones(3)
+    walled = FlightLimit("fence", position, np.zeros(3), wall)
+    course, flown = search.quickest([*limits_of(figures_of(vehicle.drone, settings, vehicle)), walled])
+    assert 1.0 <= course.choice.allowed[0] <= 1.05
     assert not flown.misses(np.array([0.1])).any()
     assert course.time_s > 0.5
 
@@ -302,7 +304,7 @@ def test_a_plan_that_begins_and_ends_in_flight_is_flown() -> None:
 @pytest.mark.parametrize("count", [30, 31])
 def test_more_pieces_than_a_crazyflie_holds_with_a_descent_are_told(count: int) -> None:
     """Its script adds the descent to the memory's 31."""
-    piece = PieceSummary(number=1, duration_s=1.0, binding="tilt", share=1.0)
+    piece = PieceSummary(number=1, duration_s=1.0, binding="tilt", share=1.0, allowed=1.0)
     numbers = dict.fromkeys(set(PlanSummary.model_fields) - {"generator", "vehicle", "pieces"}, 1)
     summary = PlanSummary.model_validate(numbers | {"vehicle": "one", "pieces": count * [piece]})
     told = f"{count} pieces: a Crazyflie's commander holds 30 and the descent of fly.py"
