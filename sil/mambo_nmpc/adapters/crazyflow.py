@@ -118,6 +118,7 @@ def attach(
     """Let a controller that commands the thrust fly all drones of a simulation along curves from now on.
 
     trajectory, yaw_rad: as for `CrazyflowPilot`, which is returned: there a heading is changed in flight.
+                         A point of a curve may be asked for a second or more before it is flown.
     measure:             returns what the drones measure of positions, quaternions and velocities, arrays as
                          in `sim.data.states`, at every command; without it they know them.
 

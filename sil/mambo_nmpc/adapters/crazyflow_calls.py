@@ -26,8 +26,11 @@ from mambo_sil.flight.frames import LENGTH_TOLERANCE
 from mambo_sil.flight.states import TargetState
 from mambo_sil.results.shared_library import LibrarySource, built_library
 
+INSTALL: Final = 'pip install ".[crazyflow]"'
 TARGET_ROWS: Final = 100_000
 """Most targets that are sampled at once: 10 MB."""
+SAMPLED_AHEAD: Final = 100
+"""Commands whose targets are sampled at once where fewer are wanted: one costs NumPy as much as they do."""
 _NAME: Final = "mambo_nmpc_crazyflow_command"
 _ADDRESSES: Final = ("step", "reset", "slew_heading", "controllers", "controller_bytes", "hover")
 _PILOT: Final = np.dtype(
@@ -60,10 +63,12 @@ class CrazyflowCalls:
         self, controller: Controller, targets: Callable[[NDArray[Any]], TargetState], ticks: int
     ) -> None:
         self._handles, self._targets, self._ticks = ControllerHandles(controller), targets, ticks
+        self._next_ages, self._next_rows = np.empty(0, np.int64), np.empty(0)
         self._fly, self._pilot = _program(), np.zeros((), _PILOT)
         for name, value in {**self._handles.members, "ticks": ticks}.items():
             self._pilot[name] = value
-        self._address = np.array([self._pilot.ctypes.data], np.uint64).view(np.uint32)
+        address = np.array([self._pilot.ctypes.data], np.uint64).view(np.uint32)
+        self._address = _jax().device_put(address)
 
     def advance(
         self, sim: Any, n_steps: int, ages: NDArray[Any], wanted_rad: FloatArray, mass_kg: FloatArray
@@ -75,7 +80,7 @@ class CrazyflowCalls:
         """
         each, most = min(n_steps, self._ticks), max(TARGET_ROWS // (ages.size * sim.n_drones), 1)
         count = min(max(n_steps // self._ticks, 1), most)
-        targets = target_rows(self._targets(ages + self._ticks * np.arange(count)[:, np.newaxis]))
+        targets = self._rows(ages, count, most)
         numbers = {
             "targets": targets,
             "yaw_rad": self._handles.headings_rad(),
@@ -91,13 +96,24 @@ class CrazyflowCalls:
         require(self._pilot["refused"] == 0, "quaternion", sim.data.states.quat, "have length 1")
         return int(count * each)
 
+    def _rows(self, ages: NDArray[Any], count: int, most: int) -> FloatArray:
+        """Return targets (count, worlds or 1, curves, columns), sampled ahead; at most `most` at once."""
+        if len(self._next_rows) < count or not np.array_equal(ages, self._next_ages):
+            commands = np.arange(min(max(count, SAMPLED_AHEAD), most))[:, np.newaxis]
+            self._next_rows = target_rows(self._targets(ages + self._ticks * commands))
+        targets, self._next_rows = self._next_rows[:count], self._next_rows[count:]
+        self._next_ages = ages + self._ticks * count
+        return targets
+
+
+def _jax() -> Any:
+    return load("jax", INSTALL)
+
 
 @cache
 def _program() -> Any:
     """Return the program of JAX that simulates `count` commands, each held for `each` steps."""
-    jax, functional = (
-        load(name, 'pip install ".[crazyflow]"') for name in ("jax", "crazyflow.sim.functional")
-    )
+    jax, functional = _jax(), load("crazyflow.sim.functional", INSTALL)
     capsule = jax.ffi.pycapsule(_library(jax.ffi.include_dir()).crazyflow_command)
     jax.ffi.register_ffi_target(_NAME, capsule, platform="cpu")
 
