@@ -1,9 +1,9 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
-Not in the list are figures that take longer, and those that need another machine or package. `simulators` and
-`adapters` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants NumPy 1, `motors`
-Drake and MuJoCo, `peers` the solvers of `make bench-peers`. Any value of the environment variables
-SIMULATORS, PYFLYT, MOTORS and PEERS says that they are installed.
+Not in the list are figures that take longer, and those that need another machine or package. `simulators`,
+`adapters` and `downwash` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants
+NumPy 1, `motors` Drake and MuJoCo, `peers` the solvers of `make bench-peers`. Any value of the environment
+variables SIMULATORS, PYFLYT, MOTORS and PEERS says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -422,6 +422,18 @@ ITEMS: Final = (
         paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
         read=read_figures("truth"),
         tables={"truth-summary": summary},
+        variable="SIMULATORS",
+    ),
+    Item(
+        name="downwash",
+        commands=("python -m benchmarks.simulators.downwash",),
+        controllers=("design cf2x-pybullet",),
+        paths=(
+            *("sil/mambo_nmpc/adapters/gym_pybullet_drones.py", "sil/mambo_sil/api"),
+            *(f"benchmarks/simulators/{name}.py" for name in ("downwash", "pybullet_flights")),
+        ),
+        read=read_printed,
+        tables={"downwash": printed},
         variable="SIMULATORS",
     ),
     Item(

@@ -23,14 +23,14 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
-CRAZYFLIE: Final = vehicle_toml.preset("crazyflie")
+DRONE: Final = vehicle_toml.preset("cf2x-pybullet")
 ANGLES_RAD: Final = 3e-4
 
 
 def noise() -> MocapSensors:
-    """Return the motion capture of vehicle `crazyflie` with its angles."""
-    assert isinstance(CRAZYFLIE.sensors, MocapSensors)
-    return CRAZYFLIE.sensors.model_copy(update={"attitude_noise_rad": ANGLES_RAD})
+    """Return the motion capture of the vehicle with its angles."""
+    assert isinstance(DRONE.sensors, MocapSensors)
+    return DRONE.sensors.model_copy(update={"attitude_noise_rad": ANGLES_RAD})
 
 
 class PybulletDrone:
@@ -63,7 +63,7 @@ class PybulletDrone:
         seen, _ = self._env.reset()
         self._state = seen[0]
         if self._factors is None:
-            controller = Designed(CRAZYFLIE).controller(1, noisy=seed is not None)
+            controller = Designed(DRONE).controller(1, noisy=seed is not None)
             self._law = pybullet_control(DroneModel.CF2X, controller)
             return
         law = DSLPIDControl(DroneModel.CF2X)
