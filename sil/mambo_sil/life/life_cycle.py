@@ -424,9 +424,7 @@ class LifeCycle:
             all_of_it = "all that the controller learns (observer.disturbance_limit_m_s2)"
             self.land(f"pushed away: {why}, {all_of_it}", good=False)
         elif self.phase is Phase.FLYING and self.steering.swings.are_there:
-            why = (
-                "the drone swings between its limits of tilt: settings too quick for this link or drone"
-            )
+            why = "the drone swings between its limits of tilt: settings too quick for this link or drone"
             self.land(f"{why}; design --sensors autopilot writes calmer ones", good=False)
         elif self.phase is Phase.FLYING and away_m > self.farthest_m:
             self.hold()
