@@ -24,8 +24,8 @@ STEEP: Final = 8.0
 SURE: Final = 0.85
 """Of a tolerance, what the flown drones must not leave: others fly a little wider."""
 ASTRAY: Final = 1.0
-"""Largest distance from the plan within a piece, over the tolerance of the point at its end, with which its
-share grows."""
+"""Largest distance from the plan within a piece, over the tolerance of the point at the end of its leg, with
+which its share grows."""
 BESIDE: Final = 0.2
 """The same at the point itself, beyond the distance at which the plan passes it."""
 
@@ -58,10 +58,12 @@ class Allowance:
     def after(self, course: PlannedCourse, flown: FlownPlan, tolerance_m: FloatArray) -> "Allowance":
         """Return that of the next plan, after flights of one that all drones fly.
 
-        tolerance_m: (n,) of the points at the ends of the pieces.
+        tolerance_m: (p,) of the points at the ends of the legs.
         """
-        planned_m = np.linalg.norm(course.value[1:, 0], axis=1)
-        astray, beside = _most(flown.error_m / tolerance_m), _most((flown.off_m - planned_m) / tolerance_m)
+        choice = course.choice
+        planned_m = np.linalg.norm(course.value[choice.points[1:], 0], axis=1)
+        astray = _most(flown.error_m / tolerance_m[choice.leg])
+        beside = _most((flown.off_m - planned_m) / tolerance_m)[choice.leg]
         taken = np.maximum(np.maximum(astray / ASTRAY, beside / BESIDE), 1e-3)
         change = np.clip(-np.log(taken) / STEEP, -self.step, self.step)
         return replace(self, share=np.clip(self.share * np.exp(change), *SHARES))

@@ -1,4 +1,6 @@
-"""What a plan may choose: the durations of its pieces, and what is free at the knots, one at each point.
+"""What a plan may choose: the durations of its pieces, and what is free at the knots.
+
+There is a knot at each point, and in a halved course one more between two of them, which is free.
 
 The unknowns are the logarithms of the durations, and at each knot the free derivatives along axes of its own,
 times a power of the time that the pieces beside it take: so other durations leave the path nearly as it is.
@@ -12,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_extensions.plan.hermite import motion
 from mambo_extensions.plan.least_snap import least_snap
 from mambo_extensions.plan.points import PlanPoint
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -27,17 +30,19 @@ START_S_PER_ROOT_M: Final = 1.2
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """What a plan through n + 1 points may choose; the values at knots are along axes of their own.
+    """What a plan of n pieces may choose; the values at knots are along axes of their own.
 
-    place_m: (n + 1, 3) the points.
+    points:  (p + 1,) the knots that are points; a leg leads from one to the next.
+    place_m: (n + 1, 3) the points, and places beside which the other knots are.
     axes:    (n + 1, 4, 3, 3) of each knot and derivative; a column is an axis.
     free:    (n + 1, 4, 3) which values along these axes may change.
-    reach_m: (n + 1,) how far from the point the plan may pass.
+    reach_m: (n + 1,) how far from the point the plan may pass; 0 of a knot that is none.
     normal:  (n + 1, 3) of the gates; 0 of others.
     allowed: (n,) share of tilt and spare thrust that each piece may take.
     closed:  the last knot is the first.
     """
 
+    points: NDArray[np.intp]
     place_m: FloatArray
     axes: FloatArray
     free: NDArray[np.bool_]
@@ -53,7 +58,7 @@ class Choice:
 
     @cached_property
     def distance_m(self) -> FloatArray:
-        """From each point to the next (n,)."""
+        """From each knot's place to the next (n,)."""
         return np.asarray(np.linalg.norm(np.diff(self.place_m, axis=0), axis=1))
 
     @cached_property
@@ -64,9 +69,19 @@ class Choice:
             owner[-1] = 0
         return owner
 
+    @cached_property
+    def leg(self) -> NDArray[np.intp]:
+        """The leg (n,) of each piece, from 0 on."""
+        return np.searchsorted(self.points, np.arange(self.count), side="right") - 1
+
     def point_of(self, knot: int) -> int:
-        """Return the number of a knot's point, from 1 on."""
-        return int(self.owner[knot]) + 1
+        """Return the number of a knot's point, or of the one before it, from 1 on."""
+        return int(np.searchsorted(self.points, self.owner[knot], side="right"))
+
+    def near(self, piece: int) -> tuple[int, int]:
+        """Return the numbers of the points at the ends of a piece's leg."""
+        begins = int(self.leg[piece])
+        return self.point_of(self.points[begins]), self.point_of(self.points[begins + 1])
 
     @cached_property
     def beside(self) -> FloatArray:
@@ -126,6 +141,36 @@ class PlannedCourse:
         """The whole time."""
         return float(self.duration_s.sum())
 
+    @property
+    def leg_s(self) -> FloatArray:
+        """The time from each point to the next (p,)."""
+        return np.add.reduceat(self.duration_s, self.choice.points[:-1])
+
+    @property
+    def halved(self) -> "PlannedCourse":
+        """The same course, of twice as many pieces: with a free knot in the middle of each.
+
+        A lap of one polynomial from point to point takes 4 % more: its acceleration is not large for long.
+        """
+        choice = self.choice
+        middle = motion(self.knots, self.duration_s, np.array([0.5]))[:4, :, 0].swapaxes(0, 1)
+        place_m, value = middle[:, 0].copy(), middle
+        value[:, 0] = 0.0
+        some, every = np.zeros(choice.count), np.arange(1, choice.count + 1)
+        halves = Choice(
+            points=2 * choice.points,
+            place_m=np.insert(choice.place_m, every, place_m, axis=0),
+            axes=np.insert(choice.axes, every, np.eye(3), axis=0),
+            free=np.insert(choice.free, every, values=True, axis=0),
+            reach_m=np.insert(choice.reach_m, every, some),
+            normal=np.insert(choice.normal, every, 0.0, axis=0),
+            allowed=np.repeat(choice.allowed, 2),
+            closed=choice.closed,
+        )
+        return PlannedCourse(
+            halves, np.insert(self.value, every, value, axis=0), np.repeat(self.duration_s / 2.0, 2)
+        )
+
     def stepped(self, step: FloatArray) -> "PlannedCourse":
         """Return the course with other unknowns: `step` is added."""
         choice = self.choice
@@ -184,7 +229,7 @@ def course_of(points: Sequence[PlanPoint], *, closed: bool) -> PlannedCourse:
                 value[knot, 1, 0], free[knot, 1, 0] = point.speed_m_s, False
     reach_m = PLANNED_SHARE * np.array([point.reach_m for point in through])
     reach_m[~free[:, 0].any(axis=1)] = 0.0
-    choice = Choice(place_m, axes, free, reach_m, normal, np.ones(count - 1), closed)
+    choice = Choice(np.arange(count), place_m, axes, free, reach_m, normal, np.ones(count - 1), closed)
     return PlannedCourse(choice, value, START_S_PER_ROOT_M * np.sqrt(choice.distance_m))
 
 

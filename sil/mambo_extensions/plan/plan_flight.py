@@ -154,41 +154,40 @@ class Drones:
         planned = trace.time_s >= judged_s
         tilt_rad = np.arccos(np.cos(trace.euler_rad[planned, :, 0]) * np.cos(trace.euler_rad[planned, :, 1]))
         axes = 2 if self.settings.height is None else 3
-        passed_s = judged_s + np.concatenate([[0.0], np.cumsum(course.duration_s)])
+        at_knots_s = judged_s + np.concatenate([[0.0], np.cumsum(course.duration_s)])
+        passed_s = at_knots_s[course.choice.points]
         path_m = (trace.position_m * [1.0, -1.0, -1.0])[..., :axes]
         return FlownPlan(
             distances_m(trace.time_s, path_m, passed_points(points, course), passed_s),
             detect_crashes(trace, vehicle.drone),
-            _error_m(trace, passed_s, axes),
+            _error_m(trace, at_knots_s, axes),
             tilt_rad.max(axis=0),
             trace.thrust_acceleration_m_s2[planned].max(axis=0),
         )
 
 
-def _error_m(trace: Trace, passed_s: FloatArray, axes: int) -> FloatArray:
+def _error_m(trace: Trace, at_knots_s: FloatArray, axes: int) -> FloatArray:
     """Return the largest distance (m, n) from the plan in each piece, along the first `axes` of x, y, z.
 
-    passed_s: (n + 1,) when the pieces begin, and when the last one ends; the rest after it counts as a part
-              of it.
+    at_knots_s: (n + 1,) when the pieces begin, and when the last one ends; the rest after it counts as a part
+                of it.
     """
     target_m = np.concatenate([trace.target[..., :2], -trace.target_height_m[..., np.newaxis]], axis=-1)
     error_m = np.linalg.norm((trace.position_m - target_m)[..., :axes], axis=-1)
-    begins = np.searchsorted(trace.time_s, passed_s[:-1])
+    begins = np.searchsorted(trace.time_s, at_knots_s[:-1])
     return np.asarray(np.maximum.reduceat(error_m, begins, axis=0).T)
 
 
 def passed_points(points: Sequence[PlanPoint], course: PlannedCourse) -> tuple[PassedPoint, ...]:
-    """Return the points that are judged; a gate at which the drone stops is not crossed."""
+    """Return the points that are judged: all but the first, where the drone begins.
+
+    A gate at which the drone stops is not crossed.
+    """
     found = []
-    for knot in judged_of(course):
+    for knot in course.choice.points[1:]:
         number = course.choice.point_of(knot)
         point = points[number - 1]
         stops = knot == course.choice.count and not course.choice.closed
         normal = None if point.normal is None or stops else point.normal
         found.append(PassedPoint(number, point.position_m, point.reach_m, normal))
     return tuple(found)
-
-
-def judged_of(course: PlannedCourse) -> range:
-    """Return the knots whose points are judged: all but the first, where the drone begins."""
-    return range(1, course.choice.count + 1)

@@ -28,7 +28,7 @@ def draw_plan(planned: Planned, title: str, stem: Path) -> tuple[Path, Path]:
         plan, height = figure.subplots(1, 2)
         lines = _coloured(plan, position_m[..., 1], position_m[..., 0], share)
         _coloured(height, time_s, position_m[..., 2], share)
-        for knot in range(len(since_s)):
+        for knot in course.choice.points:
             number = course.choice.point_of(knot)
             point = planned.points[number - 1]
             _mark(plan, point, number)

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_extensions.plan.plan_flight import judged_of
+from mambo_extensions.plan import COMMANDER_PIECES
 from mambo_extensions.plan.planning import Planned, shares_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.polynomials import COLUMNS, POINT_COLUMNS
@@ -14,16 +14,14 @@ from mambo_sil.results.blocks import Block, CommandResult, ResultTable, Sentence
 from mambo_sil.results.number_format import distance
 from mambo_sil.results.summary import Number, Summary
 
-COMMANDER_PIECES: Final = 30
-"""Pieces of 132 bytes in the 4 KB of the Crazyflie's high-level commander, beside `fly.py`'s descent."""
 BINDS: Final = 0.98
 """A limit of which a piece takes that share at least decides how quick it is."""
 MOST_ROWS: Final = 15
-"""Pieces that the console lists one by one."""
+"""Legs that the console lists one by one."""
 
 
 class PieceSummary(Summary):
-    """One piece, from one point to the next."""
+    """What is flown from one point to the next: a polynomial piece, or two."""
 
     command = "plan-piece"
 
@@ -32,7 +30,7 @@ class PieceSummary(Summary):
     binding: str
     share: Number
     allowed: Number
-    """Share of tilt and of the weakest drone's spare thrust that counts as the whole limit."""
+    """Largest share of tilt and of the weakest drone's spare thrust that counts as the whole limit."""
 
 
 class PlanSummary(Summary):
@@ -135,7 +133,9 @@ class PlanSummary(Summary):
 def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
     """Return the summary of a plan."""
     flown, course = planned.flown, planned.course
-    shares = shares_of(course, planned.limits).max(axis=2)
+    begins = course.choice.points[:-1]
+    shares = np.maximum.reduceat(shares_of(course, planned.limits).max(axis=2), begins, axis=1)
+    allowed = np.maximum.reduceat(course.choice.allowed, begins)
     over_m = flown.off_m.max(axis=0) / planned.reach_m
     worst = int(np.nanargmax(over_m))
     names = [limit.name for limit in planned.limits]
@@ -149,7 +149,7 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
         flown=len(misses),
         passed=int((~misses).sum()),
         largest_miss_m=float(flown.off_m[:, worst].max()),
-        missed_most=course.choice.point_of(judged_of(course)[worst]),
+        missed_most=course.choice.point_of(course.choice.points[1 + worst]),
         allowed_there_m=float(planned.reach_m[worst]),
         height_judged=planned.height_judged,
         headings=bool(planned.yaw.any()),
@@ -158,24 +158,27 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
         largest_thrust_weights=float(weights.max()),
         pieces=[
             PieceSummary(
-                number=piece + 1,
-                duration_s=float(piece_s),
-                binding=names[int(shares[:, piece].argmax())],
-                share=float(shares[:, piece].max()),
-                allowed=float(course.choice.allowed[piece]),
+                number=leg + 1,
+                duration_s=float(leg_s),
+                binding=names[int(shares[:, leg].argmax())],
+                share=float(shares[:, leg].max()),
+                allowed=float(allowed[leg]),
             )
-            for piece, piece_s in enumerate(course.duration_s)
+            for leg, leg_s in enumerate(course.leg_s)
         ],
     )
 
 
 def csv_text(planned: Planned) -> str:
-    """Return the pieces as a CSV file: `COLUMNS`, and `POINT_COLUMNS` of the point at the end of each."""
+    """Return the pieces as a CSV file: `COLUMNS`, and `POINT_COLUMNS` of the point at the end of a leg."""
     lines = [",".join((*COLUMNS, *POINT_COLUMNS))]
     curve = planned.curve
     for piece, yaw, point in zip(curve.pieces, planned.yaw, curve.points, strict=True):
         left = [0.0 - one for one in piece.east]
         polynomials = _row([piece.duration_s, *piece.north, *left, *piece.height, *yaw.tolist()])
+        if point is None:
+            lines.append(polynomials + "," * len(POINT_COLUMNS))
+            continue
         place, normal = _row([*point.place_m, point.reach_m]), _row(point.normal or ()) or ",,"
         lines.append(f"{polynomials},{point.number},{place},{normal}")
     return "\n".join(lines) + "\n"

@@ -13,13 +13,13 @@ import numpy as np
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.model import Settings
-from mambo_extensions.plan import LEAST_RATE
+from mambo_extensions.plan import COMMANDER_PIECES, LEAST_RATE
 from mambo_extensions.plan.allowance import SURE, Allowance
 from mambo_extensions.plan.course import PlannedCourse, course_of
 from mambo_extensions.plan.heading import first_heading, headings_of
 from mambo_extensions.plan.hermite import motion, pieces_of
 from mambo_extensions.plan.limits import FlightLimit, figures_of, limits_of
-from mambo_extensions.plan.plan_flight import Drones, FlownPlan, judged_of, passed_points
+from mambo_extensions.plan.plan_flight import Drones, FlownPlan, passed_points
 from mambo_extensions.plan.points import PlanPoint
 from mambo_extensions.plan.solver import HELD, first_course, passed_at_knots, silent, solve
 from mambo_sil.api.campaigns import draw_vehicles
@@ -58,9 +58,11 @@ class Planned:
 
     @property
     def curve(self) -> PiecesInSpace:
-        """The pieces, and the points at their ends."""
+        """The pieces, and the points at the ends of those that have one."""
         pieces = pieces_of(self.course.knots, self.course.duration_s).pieces
-        return PiecesInSpace(pieces, passed_points(self.points, self.course))
+        passed = passed_points(self.points, self.course)
+        at_knots = dict(zip(self.course.choice.points[1:].tolist(), passed, strict=True))
+        return PiecesInSpace(pieces, tuple(at_knots.get(piece + 1) for piece in range(len(pieces))))
 
     @property
     def reach_m(self) -> FloatArray:
@@ -152,10 +154,10 @@ class _Search:
         """Return the quickest course that all drones fly, and how it was flown."""
         reach_m = reach_of(self.points, self.first)
         found: tuple[PlannedCourse, FlownPlan] | None = None
-        last, allowance = self.first, Allowance.of(self.first)
+        last = self._begin(1.0, limits)
+        allowance = Allowance.of(last)
         for attempt in range(TRIES):
-            start = last.within(allowance.share)
-            course = self._plan(first_course(start, limits) if found is None else start, limits, attempt)
+            course = self._plan(last.within(allowance.share), limits, attempt)
             if fault := _fault_of(course, limits):
                 if found is None:
                     raise PlanError(fault)
@@ -176,9 +178,16 @@ class _Search:
                 break
             else:
                 allowance = allowance.lowered()
+                last = self._begin(float(allowance.share.min()), limits)
         if found is None:
             raise PlanError(_missed_words(self.points, reach_m, course, flown))
         return found
+
+    def _begin(self, share: float, limits: Sequence[FlightLimit]) -> PlannedCourse:
+        """Return a first course all of whose pieces take `share`, two to a leg if a Crazyflie holds them."""
+        legs = self.first.choice.count
+        course = first_course(self.first.within(np.full(legs, share)), limits)
+        return solve(course, limits).halved if 2 * legs <= COMMANDER_PIECES else course
 
     def _plan(self, start: PlannedCourse, limits: Sequence[FlightLimit], attempt: int) -> PlannedCourse:
         """Return the quickest course within limits, from a first one."""
@@ -258,12 +267,12 @@ def _passed_words(course: PlannedCourse, limits: Sequence[FlightLimit], over: Fl
     limit, piece, sample = (int(one) for one in np.unravel_index(over.argmax(), over.shape))
     tau = DENSE[sample]
     time_s = course.duration_s[:piece].sum() + tau * course.duration_s[piece]
-    name, point_of = limits[limit].name, course.choice.point_of
+    name, choice = limits[limit].name, course.choice
     amount = f"{over.max():.2f} m" if name == "fence" else f"{100.0 * over.max():.0f} %"
-    where = f"between points {point_of(piece)} and {point_of(piece + 1)}"
+    where = "between points {} and {}".format(*choice.near(piece))
     for knot, near in ((piece, tau < 0.1), (piece + 1, tau > 0.9)):
-        if near:
-            where = f"at point {point_of(knot)}"
+        if near and knot in choice.points:
+            where = f"at point {choice.point_of(knot)}"
     return f"{where}, {time_s:.2f} s after the start: passes the limit of {name} by {amount}"
 
 
@@ -275,7 +284,7 @@ def _missed_words(
     over_m = (off_m - SURE * reach_m).max(axis=0)
     worst = int(over_m.argmax())
     missed = int(flown.misses(SURE * reach_m).sum())
-    point = course.choice.point_of(judged_of(course)[worst])
+    point = course.choice.point_of(course.choice.points[1 + worst])
     if flown.crashed.any():
         crashed = int(flown.crashed.sum())
         lowest = min(range(len(points)), key=lambda one: points[one].z_m)

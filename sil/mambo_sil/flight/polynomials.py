@@ -57,12 +57,13 @@ class Pieces:
     A jump from one piece to the next has neither velocity nor acceleration. Pieces that end as they begin, in
     flight, are a lap that repeats.
 
-    points: those at the ends of the pieces, which a drone must pass; none where nothing is known of them.
+    points: those at the ends of the pieces, which a drone must pass, None at an end without one; none at all
+            where nothing is known of them.
     Raises `TrajectoryError` unless durations are positive and all numbers are within `LARGEST`.
     """
 
     pieces: tuple[Piece, ...]
-    points: tuple[PassedPoint, ...] = ()
+    points: tuple[PassedPoint | None, ...] = ()
 
     def __post_init__(self) -> None:
         _check([f"piece {number}" for number in range(1, len(self.pieces) + 1)], self.pieces)
@@ -112,8 +113,10 @@ class Pieces:
             return []
         place_m = self._stacked(time_s, *((axis, 0) for axis in AXES)) * (1.0, -1.0, 1.0)
         path_m = place_m[:, : error_m.shape[-1]] + error_m
-        passed_s = np.concatenate([[0.0], self._ends])
-        return passes(self.points, passed_s, np.asarray(time_s), path_m, repeats=self.repeats)
+        passed = [(end_s, point) for end_s, point in zip(self._ends, self.points, strict=True) if point]
+        passed_s = np.array([0.0, *(end_s for end_s, _ in passed)])
+        points = [point for _, point in passed]
+        return passes(points, passed_s, np.asarray(time_s), path_m, repeats=self.repeats)
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -175,15 +178,17 @@ def read_course(path: Path) -> Trajectory:
     return Pieces(pieces.pieces, pieces.points) if level else pieces
 
 
-def _points(text: str) -> tuple[PassedPoint, ...]:
+def _points(text: str) -> tuple[PassedPoint | None, ...]:
     """Return the points at the ends of the pieces of a CSV file; none if it has no such columns."""
     if POINT_COLUMNS[0] not in header_of(text):
         return ()
-    rows = rows_of(text, POINT_COLUMNS, may_be_empty=POINT_COLUMNS[-3:])
+    rows = rows_of(text, POINT_COLUMNS, may_be_empty=POINT_COLUMNS)
     return tuple(_passed_point(line, row) for line, row in rows.items())
 
 
-def _passed_point(line: str, row: tuple[float, ...]) -> PassedPoint:
+def _passed_point(line: str, row: tuple[float, ...]) -> PassedPoint | None:
+    if np.isnan(row).all():
+        return None
     number, x, y, z, reach_m, *normal = row
     empty = np.isnan(normal)
     if not (number == round(abs(number)) and reach_m > 0.0 and np.isfinite([x, y, z, reach_m]).all()):

@@ -79,6 +79,25 @@ def test_a_slower_course_has_the_same_path() -> None:
         np.testing.assert_allclose(after[order], 0.5**order * before[order], atol=1e-9)
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_halved_course_is_the_same_path_with_a_free_knot_in_each_piece(closed: bool) -> None:
+    """Its legs end at the same points at the same times; the knots between have no tolerance and no axes."""
+    course = course_of([PlanPoint(*point) for point in POINTS], closed=closed).smooth(np.ones(3 + closed))
+    halved = course.halved
+    before = motion(course.knots, course.duration_s, np.linspace(0.0, 1.0, 9))
+    after = motion(halved.knots, halved.duration_s, np.linspace(0.0, 1.0, 5))
+    np.testing.assert_allclose(after[:, ::2], before[:, :, :5], atol=1e-9)
+    np.testing.assert_allclose(after[:, 1::2], before[:, :, 4:], atol=1e-9)
+    np.testing.assert_allclose(halved.leg_s, course.duration_s)
+    choice = halved.choice
+    numbers = [course.choice.point_of(knot) for knot in range(4 + closed)]
+    assert [choice.point_of(knot) for knot in choice.points] == numbers
+    assert [choice.near(piece) for piece in (2, 3)] == [(2, 3), (2, 3)]
+    assert choice.free[1::2].all()
+    assert not choice.reach_m[1::2].any()
+    assert (choice.reach_m[::2] == course.choice.reach_m).all()
+
+
 def test_speed_and_direction_of_a_point_stay() -> None:
     """Whatever else changes, the drone passes with the given speed along the given direction."""
     points = [

@@ -71,6 +71,24 @@ def test_the_file_reads_back_to_the_same_course(made: Plan, tmp_path: Path) -> N
     read, times_s = read_course(path), np.linspace(0.0, made.curve.duration_s, 50)
     np.testing.assert_array_equal(read.target(times_s), made.curve.target(times_s))
     np.testing.assert_array_equal(read.acceleration(times_s), made.curve.acceleration(times_s))
+    assert isinstance(read, PiecesInSpace)
+    assert read.points == made.curve.points
+    assert [point and point.number for point in read.points] == [None, 2, None, 3]
+
+
+@pytest.mark.parametrize(("legs", "pieces"), [(15, 30), (16, 16)])
+def test_a_leg_has_two_pieces_if_a_crazyflie_holds_them(
+    legs: int, pieces: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More than 15 legs have one each."""
+    for name in ("first_course", "solve"):
+        monkeypatch.setattr(f"mambo_extensions.plan.planning.{name}", lambda course, *_: course)
+    points = tuple(PlanPoint(0.3 * k, 0.2 * (k % 2), 1.0) for k in range(legs + 1))
+    drones = Drones((), Controller.from_vehicle("crazyflie").settings)
+    search = _Search(points, course_of(points, closed=False), drones, 1.0, silent)
+    begun = search._begin(0.7, [])
+    assert len(begun.duration_s) == pieces
+    assert (begun.choice.allowed == 0.7).all()
 
 
 def test_the_command_writes_pieces_and_a_picture(tmp_path: Path) -> None:
@@ -212,6 +230,21 @@ def test_a_lap_ends_with_the_heading_it_began_with(
     np.testing.assert_allclose(found[:, 0], expected[:-1])
     powers = course.duration_s[:, np.newaxis] ** np.arange(8)
     np.testing.assert_allclose(np.sum(found * powers, axis=1), expected[1:], atol=1e-9)
+
+
+def test_a_turn_goes_on_from_one_half_of_a_leg_to_the_other() -> None:
+    """It is the same polynomial of the time."""
+    points = [
+        PlanPoint(*place, yaw_rad=yaw_rad) for place, yaw_rad in zip(POINTS, (0.3, 1.0, -0.5), strict=True)
+    ]
+    course = course_of(points, closed=False).slower(0.5)
+    whole, halves = headings_of(points, course), headings_of(points, course.halved)
+    for leg, leg_s in enumerate(course.duration_s):
+        for half in range(2):
+            since_s = np.linspace(0.0, leg_s / 2.0, 7)
+            found = np.polynomial.Polynomial(halves[2 * leg + half])(since_s)
+            expected = np.polynomial.Polynomial(whole[leg])(since_s + half * leg_s / 2.0)
+            np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_a_heading_of_an_open_course_begins_at_0() -> None:
