@@ -119,10 +119,13 @@ class Laps:
         racers = [self._race.Racer(self._seen, {}, track) for _ in range(DRONES)]
         for racer in racers:
             racer.curve = curve or racer.curve
-        pieces = racers[0].curve.pieces
-        due_s = sum(piece.duration_s for piece in pieces[:-1])
+        flown_curve = racers[0].curve
+        ends_s = np.cumsum([piece.duration_s for piece in flown_curve.pieces])
+        due_s = [end_s for end_s, point in zip(ends_s, flown_curve.points or ends_s, strict=True) if point][
+            -2
+        ]
         sim = drawn(np.array(self._race.START), random)
-        balls = flown(sim, racers, random, racers[0].curve.duration_s + AFTER_S)
+        balls = flown(sim, racers, random, flown_curve.duration_s + AFTER_S)
         times_s = np.array([passed_s(balls[:, drone], self._gates) for drone in range(DRONES)])
         finished = times_s[np.isfinite(times_s)]
         last = f", the last after {finished.max():.2f} s" if finished.size else ""
