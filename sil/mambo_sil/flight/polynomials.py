@@ -189,6 +189,9 @@ def _points(text: str) -> tuple[PassedPoint | None, ...]:
 def _passed_point(line: str, row: tuple[float, ...]) -> PassedPoint | None:
     if np.isnan(row).all():
         return None
+    for name, value in zip(POINT_COLUMNS[:-3], row, strict=False):
+        if math.isnan(value):
+            raise TrajectoryError(f"{line}: {name} is missing")
     number, x, y, z, reach_m, *normal = row
     empty = np.isnan(normal)
     if not (number == round(abs(number)) and reach_m > 0.0 and np.isfinite([x, y, z, reach_m]).all()):
