@@ -106,3 +106,16 @@ def test_a_file_names_its_points(tmp_path: Path, fields: str, fault: str) -> Non
     course = read_course(path)
     assert isinstance(course, Pieces)
     assert course.points == (PassedPoint(2, (0.0, 0.0, 1.0), 0.1),)
+
+
+def test_a_file_whose_last_piece_ends_at_no_point_has_no_points_at_all(tmp_path: Path) -> None:
+    """Else the time of a lap would not be known."""
+    path, header = tmp_path / "lap.csv", ",".join((*COLUMNS, *POINT_COLUMNS))
+    piece, at_point, empty = f"1,{','.join(['0'] * 32)},", "2,0,0,1,0.1,,,", "," * 7
+    path.write_text(f"{header}\n{piece}{empty}\n{piece}{empty}\n", "utf-8")
+    course = read_course(path)
+    assert isinstance(course, Pieces)
+    assert course.points == ()
+    path.write_text(f"{header}\n{piece}{at_point}\n{piece}{empty}\n", "utf-8")
+    with pytest.raises(TrajectoryError, match=r"lap.csv: line 3: the last piece must end at a point"):
+        read_course(path)

@@ -183,7 +183,12 @@ def _points(text: str) -> tuple[PassedPoint | None, ...]:
     if POINT_COLUMNS[0] not in header_of(text):
         return ()
     rows = rows_of(text, POINT_COLUMNS, may_be_empty=POINT_COLUMNS)
-    return tuple(_passed_point(line, row) for line, row in rows.items())
+    points = tuple(_passed_point(line, row) for line, row in rows.items())
+    if not any(points):
+        return ()
+    if points[-1] is None:
+        raise TrajectoryError(f"{list(rows)[-1]}: the last piece must end at a point, or none may")
+    return points
 
 
 def _passed_point(line: str, row: tuple[float, ...]) -> PassedPoint | None:
