@@ -15,15 +15,15 @@ from mambo_sil.results.number_format import distance
 from mambo_sil.results.summary import Number, Summary
 
 BINDS: Final = 0.98
-"""A limit of which a piece takes that share at least decides how quick it is."""
+"""A limit of which a leg takes that share at least decides how quick it is."""
 MOST_ROWS: Final = 15
 """Legs that the console lists one by one."""
 
 
-class PieceSummary(Summary):
+class LegSummary(Summary):
     """What is flown from one point to the next: a polynomial piece, or two."""
 
-    command = "plan-piece"
+    command = "plan-leg"
 
     number: int
     duration_s: Number
@@ -52,7 +52,7 @@ class PlanSummary(Summary):
     largest_error_m: Number
     largest_tilt_rad: Number
     largest_thrust_weights: Number
-    pieces: list[PieceSummary]
+    legs: list[LegSummary]
 
     @property
     def title(self) -> str:
@@ -91,23 +91,23 @@ class PlanSummary(Summary):
 
     def _binding(self) -> list[Block]:
         """Return which limit binds where."""
-        if len(self.pieces) <= MOST_ROWS:
+        if len(self.legs) <= MOST_ROWS:
             rows = [
                 (
-                    f"{piece.number} to {piece.number % self.points + 1}",
-                    f"{piece.duration_s:.2f}",
-                    piece.binding,
-                    f"{100 * piece.share:.0f} %",
+                    f"{leg.number} to {leg.number % self.points + 1}",
+                    f"{leg.duration_s:.2f}",
+                    leg.binding,
+                    f"{100 * leg.share:.0f} %",
                 )
-                for piece in self.pieces
+                for leg in self.legs
             ]
             return [ResultTable(("points", "s", "most of", "limit"), rows, (0, 2))]
         counted: dict[str, int] = {}
-        for piece in self.pieces:
-            if piece.share >= BINDS:
-                counted[piece.binding] = counted.get(piece.binding, 0) + 1
+        for leg in self.legs:
+            if leg.share >= BINDS:
+                counted[leg.binding] = counted.get(leg.binding, 0) + 1
         words = ", ".join(f"{name} in {count}" for name, count in counted.items()) or "none"
-        return [Sentence(f"limits that bind, of {len(self.pieces)} pieces: {words}")]
+        return [Sentence(f"limits that bind, of {len(self.legs)} legs: {words}")]
 
     def _headings(self) -> list[Block]:
         if not self.headings:
@@ -120,11 +120,11 @@ class PlanSummary(Summary):
         ]
 
     def _memory(self) -> list[Block]:
-        if len(self.pieces) <= COMMANDER_PIECES:
+        if len(self.legs) <= COMMANDER_PIECES:
             return []
         return [
             Sentence(
-                f"{len(self.pieces)} pieces: a Crazyflie's commander holds {COMMANDER_PIECES} and the "
+                f"{len(self.legs)} pieces: a Crazyflie's commander holds {COMMANDER_PIECES} and the "
                 "descent of fly.py; fly it by --stream, or in parts"
             )
         ]
@@ -156,8 +156,8 @@ def summary_of(planned: Planned, drone: VehicleFile) -> PlanSummary:
         largest_error_m=float(flown.error_m.max()),
         largest_tilt_rad=float(flown.tilt_rad.max()),
         largest_thrust_weights=float(weights.max()),
-        pieces=[
-            PieceSummary(
+        legs=[
+            LegSummary(
                 number=leg + 1,
                 duration_s=float(leg_s),
                 binding=names[int(shares[:, leg].argmax())],

@@ -13,7 +13,7 @@ from mambo_extensions.plan.course import course_of
 from mambo_extensions.plan.heading import headings_of
 from mambo_extensions.plan.limits import FlightLimit, figures_of, limits_of
 from mambo_extensions.plan.plan_flight import Drones, FlownPlan, Waiting
-from mambo_extensions.plan.plan_report import PieceSummary, PlanSummary
+from mambo_extensions.plan.plan_report import LegSummary, PlanSummary
 from mambo_extensions.plan.planning import _missed_words, _Search
 from mambo_extensions.plan.plans import Plan
 from mambo_extensions.plan.solver import silent
@@ -337,8 +337,8 @@ def test_a_plan_that_begins_and_ends_in_flight_is_flown() -> None:
 @pytest.mark.parametrize("count", [30, 31])
 def test_more_pieces_than_a_crazyflie_holds_with_a_descent_are_told(count: int) -> None:
     """Its script adds the descent to the memory's 31."""
-    piece = PieceSummary(number=1, duration_s=1.0, binding="tilt", share=1.0, allowed=1.0)
-    numbers = dict.fromkeys(set(PlanSummary.model_fields) - {"generator", "vehicle", "pieces"}, 1)
-    summary = PlanSummary.model_validate(numbers | {"vehicle": "one", "pieces": count * [piece]})
+    leg = LegSummary(number=1, duration_s=1.0, binding="tilt", share=1.0, allowed=1.0)
+    numbers = dict.fromkeys(set(PlanSummary.model_fields) - {"generator", "vehicle", "legs"}, 1)
+    summary = PlanSummary.model_validate(numbers | {"vehicle": "one", "legs": count * [leg]})
     told = f"{count} pieces: a Crazyflie's commander holds 30 and the descent of fly.py"
     assert any(told in str(block) for block in summary.result().blocks) is (count == 31)
