@@ -78,7 +78,7 @@ SEEN: dict[str, tuple[str, ...]] = {
 FOLDERS = all_folders()
 SEEN |= {one.COMMAND: one.SEEN for one in of_extensions()}
 NO_FOLDERS = {
-    *("PassedSummary", "PieceSummary"),
+    *("PassedSummary", "LegSummary"),
     *("PlanSummary", "PlaygroundSummary", "ReportSummary", "UnfinishedCampaign"),
 }
 """Summaries that no command writes into a result folder as its own."""
