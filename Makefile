@@ -20,6 +20,7 @@ SETUP = $(VENV)/.installed
 SETUP_TEST = $(VENV)/.installed-test
 SETUP_BENCH = $(VENV)/.installed-bench
 SETUP_DOCS = $(VENV)/.installed-docs
+SETUP_SIMULATORS = $(VENV)/.installed-simulators
 PEERS = build/peers
 SETUP_PEERS = $(PEERS)/.installed
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
@@ -88,7 +89,7 @@ lowest:
 # All cases of the tests that CI samples too, and all proofs.
 thorough: MARKED = -m "thorough or not thorough"
 thorough: export PROOFS = anew
-thorough: test
+thorough: $(SETUP_SIMULATORS) test
 
 # The record of proofs is written anew, so that it has no line that no test wants.
 proofs: export PROOFS = anew
@@ -159,6 +160,10 @@ $(SETUP_TEST): pyproject.toml constraints.txt
 	$(SET_UP)
 	$(PIP_INSTALL) ".[test]"
 	@touch $@ $(SETUP) $(SETUP_DOCS)
+
+$(SETUP_SIMULATORS): $(SETUP_TEST)
+	$(PIP_INSTALL) ".[crazyflow,drake,mujoco]"
+	@touch $@
 
 $(SETUP_DOCS): pyproject.toml constraints.txt
 	$(SET_UP)

@@ -175,7 +175,8 @@ def _casadi(folder: Path, solver: str, real: str) -> None:
 
     parameters = casadi.MX.sym("parameters", 6)
     moves = casadi.MX.sym("moves", 2 * CONTROL)
-    state, last = parameters[:4], parameters[4:]
+    state: Any = parameters[:4]
+    last = parameters[4:]
     cost: Any = EFFORT * (casadi.sumsqr(moves[:2] - last) + casadi.sumsqr(moves[2:] - moves[:2]))
     for step in range(PREDICTION):
         state = A @ state + B @ moves[move_at(step) : move_at(step) + 2]
