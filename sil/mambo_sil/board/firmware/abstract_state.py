@@ -11,6 +11,7 @@ from mambo_sil.board.firmware.instructions import (
     Assign,
     Clobber,
     Convention,
+    CopySaved,
     Effect,
     JoinHalves,
     Load,
@@ -95,6 +96,10 @@ class AbstractState:
             case JoinHalves(register, first, second):
                 one = self.registers.get(first)
                 value = one if one == self.registers.get(second) else None
+            case CopySaved(register, source):
+                held = self.registers.get(source)
+                is_saved = held and held.offset == 0 and held.register in self.convention.preserved
+                value = held if is_saved else None
             case Clobber(register):
                 value = None
         return replace(self, registers=_with(self.registers, register, value))

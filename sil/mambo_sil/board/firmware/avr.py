@@ -19,6 +19,7 @@ from mambo_sil.board.firmware.instructions import (
     Assign,
     Clobber,
     Convention,
+    CopySaved,
     Effect,
     Flow,
     Instruction,
@@ -190,7 +191,7 @@ def _effects(line: Line, return_bytes: int) -> tuple[Effect, ...] | None:  # noq
             return (Assign(f"r{low}", f"r{base}", 0), Assign(f"r{low + 1}", f"r{base + 1}", 0))
         case "mov", (register, source):
             same_half = _number(register) % 2 == _number(source) % 2
-            return (Assign(register, source, 0) if same_half else Clobber(register),)
+            return (Assign(register, source, 0) if same_half else CopySaved(register, source),)
         case (("adiw" | "sbiw"), (register, value)):
             return _add_to_pair(_number(register), int(value, 0) if mnemonic == "adiw" else -int(value, 0))
         case (("ld" | "ldd"), (register, place)):

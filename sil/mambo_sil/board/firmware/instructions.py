@@ -60,13 +60,24 @@ class JoinHalves:
 
 
 @dataclass(frozen=True)
+class CopySaved:
+    """register = source if `source` holds what a preserved register held at entry; else unknown.
+
+    So a byte may wait in the other half of a pair, where a part of a larger value would mean another one.
+    """
+
+    register: str
+    source: str
+
+
+@dataclass(frozen=True)
 class Clobber:
     """The value of the register becomes unknown."""
 
     register: str
 
 
-Effect = Assign | Add | Load | Store | JoinHalves | Clobber
+Effect = Assign | Add | Load | Store | JoinHalves | CopySaved | Clobber
 Flow = Literal["next", "jump", "call", "stop"]
 """After the effects: continue, jump to `pc`, call `pc` and continue, or stop."""
 
