@@ -1,6 +1,7 @@
 """Fly the generated C in four worlds of crazyflow, from the ground to a circle; needs the extra crazyflow.
 
 $ python crazyflow_flight.py
+...
 on the circle
 """
 
