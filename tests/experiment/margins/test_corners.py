@@ -173,10 +173,10 @@ def drawn(seed: int) -> VehicleFile:
 
 
 def swings(settings: Settings, drone: VehicleFile) -> bool:
-    """Return whether a drone falls, or moves at the end of four minutes at least half as much as before.
+    """Return whether a drone falls, or moves at the end of four minutes nearly as much as before.
 
     It starts a millimetre off; a thrust that is still to be learnt moves it by centimetres at first. Between
-    the times that are compared a swing that falls e-fold in 200 s halves.
+    the times that are compared a swing that falls e-fold in 500 s loses a quarter; one drone takes 249 s.
     """
     flight = Flight(
         Hover(),
@@ -193,7 +193,7 @@ def swings(settings: Settings, drone: VehicleFile) -> bool:
         np.ptp(trace.position_m[(trace.time_s >= begin_s) & (trace.time_s < begin_s + 10.0), 0], axis=0)
         for begin_s in (80.0, 230.0)
     )
-    return bool(((late_m > 0.5 * early_m) & (late_m > 1e-6)).any())
+    return bool(((late_m > 0.75 * early_m) & (late_m > 1e-6)).any())
 
 
 def unstable(settings: Settings, drone: VehicleFile) -> bool:
