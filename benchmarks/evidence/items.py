@@ -38,6 +38,7 @@ from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause,
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
+from benchmarks.evidence.settings_tables import settings_moves, settings_near, settings_parts, settings_study
 from benchmarks.evidence.simulator_pictures import (
     DRAWN,
     FLOWN,
@@ -230,6 +231,30 @@ ITEMS: Final = (
         read=read_printed,
         tables={"limits": printed},
         pictures={f"limits-{name}.png": f"pictures/limits-{name}.png" for name in ("step", "fence")},
+    ),
+    Item(
+        name="settings",
+        commands=(
+            f"mambo-nmpc tune --trials 100 -o {RESULTS}/settings/tuned",
+            f"python -m benchmarks.flights.settings {RESULTS}/settings/tuned {RESULTS}/settings/flown",
+        ),
+        controllers=("mambo",),
+        paths=(
+            *(
+                *_FLIGHT,
+                f"{_EXPERIMENT}/campaign",
+                "sil/mambo_extensions/tune",
+                "benchmarks/flights/settings.py",
+            ),
+            f"{_HERE}/opponents-slow-motors.toml",
+        ),
+        read=read_figures("flown"),
+        tables={
+            "settings-near": settings_near,
+            "settings-parts": settings_parts,
+            "settings-moves": settings_moves,
+            "settings-study": settings_study,
+        },
     ),
     Item(
         name="height",

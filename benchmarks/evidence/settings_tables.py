@@ -1,0 +1,95 @@
+"""Tables of what single settings of preset `mambo` are worth."""
+
+from typing import Final
+
+from benchmarks.evidence.item import Figures
+from benchmarks.evidence.tables import Row, three
+from benchmarks.flights.settings import CASES
+from benchmarks.markdown import table
+from mambo_codegen.settings.presets import preset
+
+_SHIPPED: Final = f"response_time_s {preset('mambo').cost.response_time_s:g}"
+
+
+def _pair(found: Figures, name: str) -> str:
+    values = (found[f"{name}_{end}"] for end in ("median", "most"))
+    return ", ".join(
+        "crash" if value is None else f"{value:.2g}" if value < 1 else three(value) for value in values
+    )
+
+
+def settings_near(figures: Figures) -> str:
+    """Return what drawn drones fly with one setting changed."""
+    rows: list[Row] = []
+    for title, found in figures["near"].items():
+        name, _, size = title.partition(", ")
+        key, _, value = name.partition(" ")
+        shown = f"`{key}`, {size}" if size else f"`{key}` {value}"
+        row = {"": f"**{shown}: preset `mambo`**" if title == _SHIPPED else shown}
+        for campaign, drones in (("default", "of 300"), ("slow", "slow motors, of 300")):
+            one = found[campaign]
+            row[f"crashed, {drones}"] = str(one["crashed"])
+            start = "estimated error" if campaign == "default" else "its estimated error"
+            row[f"{start}, m s: median, 95 %"] = _pair(one, "seen_m_s")
+            row[f"{'variation' if campaign == 'default' else 'its variation'}, rad"] = _pair(
+                one, "variation_rad"
+            )
+        rows.append(row)
+    return table(rows)
+
+
+def settings_parts(figures: Figures) -> str:
+    """Return what preset mambo flies without each of its parts."""
+    rows = []
+    for title, found in figures["parts"].items():
+        row: Row = {"left out": title}
+        row |= {name: three(found["cases"][name]) for name in CASES}
+        row |= {
+            "variation, rad": f"{found['variation_rad']:.2g}",
+            "drawn: IAE, median": three(found["drawn"]["iae_m_s_median"]),
+            "estimated: median, 95 %": _pair(found["drawn"], "seen_m_s"),
+            "its variation: median, 95 %": _pair(found["drawn"], "variation_rad"),
+            "slow motors: crashed, of 300": str(found["slow"]["crashed"]),
+        }
+        rows.append(row)
+    return table(rows)
+
+
+def settings_moves(figures: Figures) -> str:
+    """Return circles and steps with one and with two moves."""
+    titles = {"one": "one move (`ramp_s = 0.0`)", "two": "two moves (`ramp_s = 0.4`)"}
+    rows = []
+    for kind, name, unit in (
+        ("circles", "{} rad/s: IAE, m s", ""),
+        ("steps", "step of {} m: overshoot, cm", "cm"),
+    ):
+        for value in figures["moves"]["one"][kind]:
+            row: Row = {"median (range)": name.format(value)}
+            for move, title in titles.items():
+                middle, least, most = (
+                    (100.0 if unit else 1.0) * one for one in figures["moves"][move][kind][value]
+                )
+                row[title] = f"{three(middle)} ({three(least)}..{three(most)})"
+            rows.append(row)
+    return table(rows)
+
+
+def settings_study(figures: Figures) -> str:
+    """Return base and result of the default study."""
+    rows = []
+    for number, found in figures["study"].items():
+        trial = found["trial"]
+        values = ", ".join(f"`{key.partition('.')[2]}` {value:g}" for key, value in trial["values"].items())
+        middle, least, most = found["known_iae_m_s"]
+        rows.append(
+            {
+                "": "base, preset `mambo`" if number == "0" else f"trial {number}: {values}",
+                "IAE of the study, m s": three(trial["iae_m_s"]),
+                "variation, rad": f"{trial['command_variation_rad']:.2g}",
+                "other draws: median IAE": three(found["drawn"]["iae_m_s_median"]),
+                "their estimated error": three(found["drawn"]["seen_m_s_median"]),
+                "their variation": f"{found['drawn']['variation_rad_median']:.2g}",
+                "true state, 64 headings: IAE": f"{three(middle)} ({three(least)}..{three(most)})",
+            }
+        )
+    return table(rows)
