@@ -38,7 +38,14 @@ from benchmarks.evidence.link_tables import link_curves, link_jumps, link_pause,
 from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.moving_picture import draw_moving_picture, read_space, space_commands, space_table
 from benchmarks.evidence.pictures import draw_envelope
-from benchmarks.evidence.settings_tables import settings_moves, settings_near, settings_parts, settings_study
+from benchmarks.evidence.settings_tables import (
+    derived_campaigns,
+    derived_vehicles,
+    settings_moves,
+    settings_near,
+    settings_parts,
+    settings_study,
+)
 from benchmarks.evidence.simulator_pictures import (
     DRAWN,
     FLOWN,
@@ -72,6 +79,7 @@ from benchmarks.evidence.tables import (
     title,
     vehicles,
 )
+from benchmarks.flights.derived import VEHICLES
 
 _HERE: Final = "benchmarks/evidence"
 _ONE_NORM: Final = f"{_HERE}/one-norm.toml"
@@ -255,6 +263,14 @@ ITEMS: Final = (
             "settings-moves": settings_moves,
             "settings-study": settings_study,
         },
+    ),
+    Item(
+        name="derived",
+        commands=(f"python -m benchmarks.flights.derived {RESULTS}/derived/flown",),
+        controllers=(*(f"design {vehicle}" for vehicle in VEHICLES), "mambo", "crazyflie"),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", "benchmarks/flights/derived.py"),
+        read=read_figures("flown"),
+        tables={"derived-campaigns": derived_campaigns, "derived-vehicles": derived_vehicles},
     ),
     Item(
         name="height",

@@ -1,9 +1,10 @@
-"""Tables of what single settings of preset `mambo` are worth."""
+"""Tables of what single settings of preset `mambo` are worth, and of what settings by `design` fly."""
 
 from typing import Final
 
 from benchmarks.evidence.item import Figures
 from benchmarks.evidence.tables import Row, three
+from benchmarks.flights.derived import CURVES, FLIGHTS
 from benchmarks.flights.settings import CASES
 from benchmarks.markdown import table
 from mambo_codegen.settings.presets import preset
@@ -92,4 +93,52 @@ def settings_study(figures: Figures) -> str:
                 "true state, 64 headings: IAE": f"{three(middle)} ({three(least)}..{three(most)})",
             }
         )
+    return table(rows)
+
+
+_TITLES: Final = {
+    "pd": "PD",
+    "pd-feedforward": "PD with feed-forward",
+    "pid-feedforward": "PID with feed-forward",
+    "mambo": "preset `mambo`",
+    "crazyflie": "preset `crazyflie`",
+    "derived": "derived",
+}
+
+
+def derived_campaigns(figures: Figures) -> str:
+    """Return crashes, median error and median variation on each vehicle by controller."""
+    rows = []
+    for vehicle, found in figures["campaigns"].items():
+        row: Row = {"vehicle": f"`{vehicle}`"}
+        for name, title in _TITLES.items():
+            one = found[name]
+            row[title] = (
+                f"{one['crashed']}, {three(one['iae_m_s'])}, {one['variation_rad']:.2g}"
+                if one["crashed"] < FLIGHTS / 2
+                else f"{one['crashed']} crashes"
+            )
+        rows.append(row)
+    return table(rows)
+
+
+def _errors(found: Figures) -> str:
+    return ", ".join(three(found[curve]) for curve in CURVES)
+
+
+def derived_vehicles(figures: Figures) -> str:
+    """Return errors on curves, and the time of a step, of settings on each vehicle."""
+    rows = []
+    for vehicle, settings in figures["vehicles"].items():
+        for name, found in settings.items():
+            known, seen = (_errors(found[key]) for key in ("known", "seen"))
+            rows.append(
+                {
+                    "vehicle": f"`{vehicle}`",
+                    "settings": _TITLES[name],
+                    "true state: eight, circle, step": f"{known}, {found['step_s']:.2f} s",
+                    "its sensors: eight, circle": seen,
+                    "variation on the eight, rad": f"{found['seen']['variation_rad']:.2g}",
+                }
+            )
     return table(rows)
