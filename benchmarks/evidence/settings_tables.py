@@ -8,6 +8,7 @@ from benchmarks.flights.derived import CURVES, FLIGHTS
 from benchmarks.flights.settings import CASES
 from benchmarks.markdown import table
 from mambo_codegen.settings.presets import preset
+from mambo_sil.flight.controllers.pd import pid_gains
 
 _SHIPPED: Final = f"response_time_s {preset('mambo').cost.response_time_s:g}"
 
@@ -113,6 +114,9 @@ def derived_campaigns(figures: Figures) -> str:
         row: Row = {"vehicle": f"`{vehicle}`"}
         for name, title in _TITLES.items():
             one = found[name]
+            if name == "pid-feedforward" and vehicle not in pid_gains():
+                row[title] = ""
+                continue
             row[title] = (
                 f"{one['crashed']}, {three(one['iae_m_s'])}, {one['variation_rad']:.2g}"
                 if one["crashed"] < FLIGHTS / 2
