@@ -79,18 +79,15 @@ def settings_moves(figures: Figures) -> str:
 def settings_study(figures: Figures) -> str:
     """Return base and result of the default study."""
     rows = []
-    for number, found in figures["study"].items():
-        trial = found["trial"]
-        values = ", ".join(f"`{key.partition('.')[2]}` {value:g}" for key, value in trial["values"].items())
+    for title, found in figures["study"].items():
+        values = ", ".join(f"`{key.partition('.')[2]}` {value:g}" for key, value in found["values"].items())
         middle, least, most = found["known_iae_m_s"]
         rows.append(
             {
-                "": "base, preset `mambo`" if number == "0" else f"trial {number}: {values}",
-                "IAE of the study, m s": three(trial["iae_m_s"]),
-                "variation, rad": f"{trial['command_variation_rad']:.2g}",
-                "other draws: median IAE": three(found["drawn"]["iae_m_s_median"]),
-                "their estimated error": three(found["drawn"]["seen_m_s_median"]),
-                "their variation": f"{found['drawn']['variation_rad_median']:.2g}",
+                "": f"{title}: {values or 'preset `mambo`'}",
+                "100 other draws: median IAE": three(found["drawn"]["iae_m_s_median"]),
+                "estimated error": three(found["drawn"]["seen_m_s_median"]),
+                "variation, rad": f"{found['drawn']['variation_rad_median']:.2g}",
                 "true state, 64 headings: IAE": f"{three(middle)} ({three(least)}..{three(most)})",
             }
         )

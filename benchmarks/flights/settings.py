@@ -159,21 +159,20 @@ def moves(ramp_s: float) -> dict[str, Any]:
 
 
 def studied(tuned: Path, campaign: Campaign) -> dict[str, Any]:
-    """Return what base and result of a study have in it, on other draws, and with the state known."""
-    summary = json.loads((tuned / "summary.json").read_text("utf-8"))
-    base = next(one for one in summary["front"] if one["number"] == 0)
-    found = {}
-    for trial, settings in (
-        (base, preset("mambo")),
-        (summary["chosen"], load(str(tuned / "controller.toml"))),
-    ):
-        cases = [{"yaw_rad": yaw} for yaw in np.linspace(0, 2 * np.pi, HEADINGS_OF_A_STUDY, endpoint=False)]
-        found[str(trial["number"])] = {
-            "trial": {key: trial[key] for key in ("values", "iae_m_s", "command_variation_rad")},
+    """Return what the base and the result of a study have on other draws, and with the state known."""
+    chosen = json.loads((tuned / "summary.json").read_text("utf-8"))["chosen"]
+    yaws_rad = np.linspace(0, 2 * np.pi, HEADINGS_OF_A_STUDY, endpoint=False).tolist()
+    return {
+        title: {
+            "values": values,
             "drawn": drawn(settings, campaign, OTHER_DRAWS),
-            "known_iae_m_s": spread(known(settings, cases)[0]),
+            "known_iae_m_s": spread(known(settings, [{"yaw_rad": yaw} for yaw in yaws_rad])[0]),
         }
-    return found
+        for title, values, settings in (
+            ("base", {}, preset("mambo")),
+            (f"trial {chosen['number']}", chosen["values"], load(str(tuned / "controller.toml"))),
+        )
+    }
 
 
 def main(arguments: list[str]) -> None:

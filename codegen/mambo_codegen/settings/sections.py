@@ -290,7 +290,7 @@ class Observer(SettingsSection):
         ge=0,
         le=2,
         description="Time without a good state, in seconds, over which the controller flies on by its "
-        "prediction; after it the last command holds. At most 250 update periods.",
+        "prediction; after it the controller brakes by its model, then levels. At most 250 update periods.",
     )
     tilt_gain: Literal["given", "learnt"] = Field(
         "given",

@@ -154,7 +154,7 @@ def test_a_lap_may_ask_for_all_that_tilt_and_thrust_give(
 
 def too_quick(scripts: dict[str, ModuleType], drone: Drone) -> Any:
     """Let the drone say after 5 s of its eight that it is too quick; return its pieces (n, 33)."""
-    vars(scripts["radio"])["CHECKS"] += ("nmpc.tooQuick",)
+    vars(scripts["radio"])["APP_CHECKS"] = ("nmpc.tooQuick",)
     drone.logged["nmpc.tooQuick"] = 0
     at_call(drone, "start_trajectory", 5.0, lambda: drone.logged.update({"nmpc.tooQuick": 1}))
     figure = figure_of(scripts, "eight")

@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_codegen.settings.controller_toml import parse
+from mambo_codegen.settings.model import Settings
 from mambo_nmpc import Controller
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.model.derive.derived_settings import controller_text
 from tests.extensions.crazyflie.support.offboard import Flown, Radio, fly_offboard
 from tests.extensions.crazyflie.support.radio import ARMED, CAN_FLY, Clock, Drone, install
 from tests.extensions.crazyflie.support.scripts import SETTINGS, interrupt, modules_of, without
@@ -67,13 +71,25 @@ def test_it_sends_angles_and_height_a_hundred_times_a_second(
     assert {arguments[2] for _, arguments in sent} == {0.0}
 
 
+def derived() -> Settings:
+    """Return settings as by `design`, with the exact tilt."""
+    return parse(controller_text(vehicle_toml.preset("crazyflie"), "x", exact_share=0.7), "controller.toml")
+
+
+@pytest.mark.parametrize("settings", [height_settings, derived])
 def test_with_a_height_in_the_settings_the_stock_firmware_flies_it(
-    drone: Drone, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    settings: Callable[[], Settings],
+    drone: Drone,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """The script sends the same kind of set-points."""
-    imported(write_target("crazyflie", height_settings(), tmp_path), drone, monkeypatch).main()
+    imported(write_target("crazyflie", settings(), tmp_path), drone, monkeypatch).main()
     assert capsys.readouterr().out == "landed\n"
     assert drone.names() == [*PREPARED, "zdistance", *STOPPED]
+    tilts = np.array([arguments[:2] for _, arguments in drone.of("zdistance")])
+    assert 1.0 < np.abs(tilts).max() < 10.0
 
 
 def test_ctrl_c_descends_where_it_is(script: ModuleType, drone: Drone) -> None:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 RADIUS_M, RATE_RAD_S, HEIGHT_M, FLIGHT_S, CLIMB_S = 0.5, 0.8, 0.8, 20.0, 2.0
 OLDEST_S, GIVE_UP_S = 0.1, 2.0
 NAMES = ("x", "y", "z", "vx", "vy", "roll", "pitch", "yaw")
+SMALL_TILT_RAD = 0.35
+"""Largest tilt of settings whose tilt is exact only together with a height."""
 Newest = Callable[[], tuple[Sequence[float], float]]
 """Returns the latest state, NAMES in m, m/s and degrees, and when it came."""
 
@@ -102,17 +104,19 @@ def fly(radio: Radio, controller: "Controller", newest: Newest) -> str:
 def controller_of_folder() -> "Controller":
     """Return the controller of this folder, whose height the stock firmware flies."""
     try:
+        from mambo_codegen.settings.controller_toml import with_option
         from mambo_nmpc import Controller, MamboNmpcError
     except ImportError as error:
         cure = "in the folder of its source, pip install ."
         raise RefusedError(f"mambo-nmpc is missing ({error}): {cure}") from error
     try:
-        controller = Controller.from_file(Path(__file__).parent / "controller.toml")
+        settings = Controller.from_file(Path(__file__).parent / "controller.toml").settings
+        if settings.model.tilt == "exact":
+            settings = with_option(settings, "limits.braking_m_s2", 0.0)
+            settings = with_option(settings, "limits.tilt_rad", min(SMALL_TILT_RAD, settings.limits.tilt_rad))
+        return Controller(settings if settings.height is None else settings.without("height"))
     except MamboNmpcError as error:
         raise RefusedError(str(error)) from error
-    if controller.settings.height is None:
-        return controller
-    return Controller(controller.settings.model_copy(update={"height": None}))
 
 
 def fly_by_radio(uri: str) -> str:

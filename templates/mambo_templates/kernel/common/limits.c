@@ -21,12 +21,9 @@
  * v_d for v_T.
  */
 
-#if WITH_TRACKER
 /* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to
- * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: there the law brakes by itself, so that the command does not jump, and
- * the tracker forgets the deceleration. */
+ * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: nearer the law brakes by itself. */
 
-#endif
 #if WITH_TURNING
 /* Turns: a target that turns at the rate w faster than A_T/|v_T| makes the speed limit at most A_T/w, A_T being a share
  * of what the tilt limit gives. Else the drone could not follow v_d, and would orbit the target. w T_s |v_T|^2 is the

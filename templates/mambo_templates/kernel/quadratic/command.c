@@ -4,7 +4,7 @@
  *
  *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
  *
- * with R the rotation from x and y to right and forward; without drag or without a tracker their terms are 0.
+ * with R the rotation from x and y to right and forward; without drag its term is 0.
  */
 
 /* Set `right` and `forward` to the components of a vector along x and y. */

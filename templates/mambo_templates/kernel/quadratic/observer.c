@@ -34,8 +34,8 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
     }
 }
 
-/* Correct the estimates by a measured state, with the gains number `which`: 1 while no position is measured, else 0.
- * `tilt_m_step2` is the acceleration of the tilt along x and y. */
+/* Correct the estimates by a measured state, with the gains number `which`: 0, or 1 where there are two and
+ * no position is measured. `tilt_m_step2` is the acceleration of the tilt along x and y. */
 NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state, int which,
                                   const nmpc_real_t tilt_m_step2[2])
 {

@@ -81,8 +81,9 @@ def without(patch: pytest.MonkeyPatch, package: str) -> None:
 def ready(scripts: dict[str, ModuleType], patch: pytest.MonkeyPatch) -> Drone:
     """Return a drone that is ready to fly, and put it and its clock under the scripts."""
     clock = Clock()
-    logged: dict[str, float] = {name: 0.0 for block in scripts["radio"].LOGGED for name in block}
-    logged |= dict.fromkeys((*scripts["radio"].PLACE, *scripts["radio"].CHECKS), 0.0)
+    radio = scripts["radio"]
+    logged: dict[str, float] = {name: 0.0 for block in radio.LOGGED for name in block}
+    logged |= dict.fromkeys((*radio.PLACE, *radio.CHECKS, *radio.APP_CHECKS), 0.0)
     logged |= {f"stateEstimate.{name}": value for name, value in zip("xyz", PLACE, strict=True)}
     logged |= dict.fromkeys(("kalman.varPX", "kalman.varPY", "kalman.varPZ", "kalman.varX"), 1e-4)
     logged |= {"stateEstimate.yaw": 30.0, "supervisor.info": ARMED | CAN_FLY, "pm.vbat": 4.0, "pm.state": 0}

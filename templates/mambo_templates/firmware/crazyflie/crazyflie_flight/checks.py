@@ -7,7 +7,7 @@ from .calls import Crazyflie, Drone, Watch
 from .ends import CannotLandError, RefusedError, TroubleError
 from .figures import PAUSE_S
 from .heading import heading_error
-from .radio import CHECKS, DIGEST, FLYING, GROUP, LOGGED, PLACE, Radio
+from .radio import APP_CHECKS, CHECKS, DIGEST, FLYING, GROUP, LOGGED, PLACE, Radio
 
 LEAST_BATTERY_V = 3.7  # at rest
 ARMED, CAN_FLY, TUMBLED, LOCKED, CRASHED = 2, 8, 32, 64, 128  # bits of supervisor.info
@@ -48,7 +48,7 @@ def require_app(cf: Crazyflie) -> None:
     digest = f"{parameter(cf, f'{GROUP}.settings'):08x}"
     if digest != DIGEST[:8]:
         raise RefusedError(f"the firmware has settings {digest}, this folder {DIGEST[:8]}: {FLASH}")
-    ours = (name.partition(".") for block in (*LOGGED, CHECKS) for name in block)
+    ours = (name.partition(".") for block in (*LOGGED, APP_CHECKS) for name in block)
     has = cf.log.toc.toc.get(GROUP, {})
     if missing := [name for group, _, name in ours if group == GROUP and name not in has]:
         raise RefusedError(f"the firmware has an older app, without {GROUP}.{min(missing)}: {FLASH}")
@@ -70,7 +70,7 @@ def choose_app(cf: Crazyflie) -> None:
 
 def require_ready(radio: Radio) -> None:
     """Raise RefusedError, with all reasons, unless estimator, battery and supervisor allow a flight."""
-    names = {name for block in (CHECKS, PLACE, *radio.blocks) for name in block}
+    names = {name for block in (radio.checks, PLACE, *radio.blocks) for name in block}
     if not radio.wait_for(lambda: names <= {*radio.latest}, 5.0):
         raise RefusedError("the drone sends no logs: go nearer to it")
     latest, reasons = radio.latest, []

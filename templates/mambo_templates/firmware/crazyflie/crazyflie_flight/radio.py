@@ -15,11 +15,11 @@ FLYING = 16  # a bit of supervisor.info
 CHECKS: tuple[str, ...] = (
     *("supervisor.info", "pm.vbat", "pm.state"),
     *("kalman.varPX", "kalman.varPY", "kalman.varPZ", "kalman.varX"),
-    *((f"{GROUP}.tooQuick",) if VALUES.says_too_quick else ()),
 )
+APP_CHECKS: tuple[str, ...] = (f"{GROUP}.tooQuick",) if VALUES.says_too_quick else ()
 PLACE = ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimate.yaw")
 COUNTER = 2**24  # ms, after which the time of the logs begins again at 0
-LOG_S, CHECKS_S = 0.01, 0.1  # period of LOGGED, if the radio carries it; period of CHECKS and PLACE
+LOG_S, CHECKS_S = 0.01, 0.1  # period of LOGGED, if the radio carries it; period of checks and PLACE
 
 
 def _logged() -> tuple[tuple[str, ...], ...]:
@@ -76,7 +76,7 @@ def packets_s(uri: str) -> float:
 def log_period_s(blocks: int, uri: str) -> float:
     """Return the shortest period, a multiple of LOG_S, in which a radio carries so many blocks.
 
-    CHECKS and PLACE are carried beside them.
+    Checks and PLACE are carried beside them.
     """
     return LOG_S * math.ceil(blocks / LOG_S / (packets_s(uri) - 2.0 / CHECKS_S))
 
@@ -86,6 +86,7 @@ class Radio:
 
     def __init__(self, cf: Crazyflie, blocks: Sequence[Sequence[str]] = ()) -> None:
         self.cf, self.blocks = cf, blocks
+        self.checks = (*CHECKS, *(APP_CHECKS if blocks else ()))
         self.latest: dict[str, float] = {}
         self.rows: Rows = {}
         self.is_lost, self.is_real = False, True
@@ -118,7 +119,7 @@ class Radio:
         if period_s > LOG_S:
             carried = f"this radio carries {packets_s(uri):.0f} packets a second"
             print(f"The log has a row each {1000 * period_s:.0f} ms: {carried}.")
-        for number, names in enumerate((*self.blocks, CHECKS, PLACE)):
+        for number, names in enumerate((*self.blocks, self.checks, PLACE)):
             is_check = number >= len(self.blocks)
             period_ms = round(1000 * (CHECKS_S if is_check else period_s))
             block = LogConfig(name=f"fly{number}", period_in_ms=period_ms)
