@@ -277,11 +277,13 @@ def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) 
     assert generated("mambo") != generated("mambo --scalar fixed")
 
 
-def test_a_command_that_refuses_is_an_error() -> None:
-    """Exit 1 is a finding, such as a board over its budget."""
-    assert run("python -c 'print(1); raise SystemExit(1)'") == "1\n"
+def test_a_command_that_refuses_is_an_error(tmp_path: Path) -> None:
+    """Exit 1 of mambo-nmpc is a finding, such as a bundle that is not there; of Python it is a traceback."""
+    assert "missing" in run(f"mambo-nmpc generate table1 --check -o {tmp_path}")
     with pytest.raises(EvidenceError, match="exit 2"):
-        run("python -c 'raise SystemExit(2)'")
+        run("mambo-nmpc generate table3")
+    with pytest.raises(EvidenceError, match="exit 1"):
+        run("python -c 'import table3'")
 
 
 @pytest.mark.long
