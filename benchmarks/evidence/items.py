@@ -429,8 +429,8 @@ ITEMS: Final = (
         ),
         controllers=(
             "crazyflie",
-            *(f"design crazyflie{kind}" for kind in ("", "-l250", "-brushless")),
-            *("design hummingbird", "design x500"),
+            *(f"design crazyflie{kind}" for kind in ("-l250", "-brushless")),
+            *("design cf2x-pybullet", "design hummingbird", "design x500"),
         ),
         paths=(
             *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
