@@ -1,9 +1,7 @@
 """The list of what is evidence: tables and pictures of the manual, and the commands that make them.
 
-Not in the list are figures that take longer, and those that need another machine or package. `simulators`,
-`adapters` and `downwash` need crazyflow, RotorPy and gym-pybullet-drones, `pyflyt` PyFlyt, which wants
-NumPy 1, `motors` Drake and MuJoCo, `peers` the solvers of `make bench-peers`. Any value of the environment
-variables SIMULATORS, PYFLYT, MOTORS and PEERS says that they are installed.
+Not in the list are figures that take longer, and those that need another machine or package. `peers` needs
+the solvers of `make bench-peers`: any value of the environment variable PEERS says that they are installed.
 """
 
 from collections.abc import Callable, Mapping
@@ -46,21 +44,8 @@ from benchmarks.evidence.settings_tables import (
     settings_parts,
     settings_study,
 )
-from benchmarks.evidence.simulator_pictures import (
-    DRAWN,
-    FLOWN,
-    draw_adapters,
-    draw_motors,
-    draw_simulators,
-    read_adapters,
-)
-from benchmarks.evidence.simulator_tables import (
-    SIMULATORS,
-    every_controller,
-    one_flight,
-    quick,
-    summary,
-)
+from benchmarks.evidence.simulator_items import OF_SIMULATORS
+from benchmarks.evidence.sources import FLIGHT, HERE, STYLE
 from benchmarks.evidence.tables import (
     CONTROLLERS,
     conditions,
@@ -81,21 +66,18 @@ from benchmarks.evidence.tables import (
 )
 from benchmarks.flights.derived import VEHICLES
 
-_HERE: Final = "benchmarks/evidence"
-_ONE_NORM: Final = f"{_HERE}/one-norm.toml"
-_FLIGHT: Final = ("sil/mambo_sil/drone", "sil/mambo_sil/flight")
+_ONE_NORM: Final = f"{HERE}/one-norm.toml"
 _EXPERIMENT: Final = "sil/mambo_sil/experiment"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
 _MEASURES: Final = (
-    *_FLIGHT,
+    *FLIGHT,
     "sil/mambo_sil/board/footprint",
     "codegen/mambo_codegen/data/boards",
     "codegen/mambo_codegen/bundle/flags.py",
 )
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
-_STYLE: Final = "sil/mambo_sil/results/style.py"
-_FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
+_FIXED: Final = f"{HERE}/mambo-1norm-fixed.toml"
 
 
 def _regress(item: str, suite: str, *sources: str) -> tuple[str, ...]:
@@ -111,9 +93,9 @@ def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], 
     drawn = name == "campaign"
     return Item(
         name=name,
-        commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
+        commands=(f"mambo-nmpc campaign {HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
         controllers=_FLOWN,
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/{name}.toml", *((_STYLE,) if drawn else ())),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/campaign", f"{HERE}/{name}.toml", *((STYLE,) if drawn else ())),
         read=read_campaign if drawn else read_quantiles,
         tables=tables,
         pictures={f"{name}.png": "campaign/campaign.png"} if drawn else {},
@@ -125,7 +107,7 @@ ITEMS: Final = (
         name="table2",
         commands=(f"mambo-nmpc table2 -o {RESULTS}/table2/table2",),
         controllers=(*_FLOWN, "table1-printed"),
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/table2", _STYLE),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/table2", STYLE),
         read=read_table2,
         tables={"table2": table2, "table2-quarter": table2_quarter},
         pictures={"figure3.png": "table2/figure3.png"},
@@ -134,7 +116,7 @@ ITEMS: Final = (
         name="space",
         commands=space_commands(f"{RESULTS}/space"),
         controllers=("crazyflie", "design crazyflie"),
-        paths=(*_FLIGHT, _STYLE, f"{_HERE}/moving_picture.py"),
+        paths=(*FLIGHT, STYLE, f"{HERE}/moving_picture.py"),
         read=read_space,
         tables={"space": space_table},
         pictures={"space.gif": "space.gif"},
@@ -144,15 +126,15 @@ ITEMS: Final = (
         name="sensors",
         commands=(f"mambo-nmpc table2 --sensors -o {RESULTS}/sensors/sensors",),
         controllers=("mambo", "table1"),
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/table2"),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/table2"),
         read=read_sensors,
         tables={"sensors": sensors},
     ),
     Item(
         name="conditions",
-        commands=_regress("conditions", f"{_HERE}/conditions.toml", *CONTROLLERS, _ONE_NORM, _FIXED),
+        commands=_regress("conditions", f"{HERE}/conditions.toml", *CONTROLLERS, _ONE_NORM, _FIXED),
         controllers=(*_FLOWN, _ONE_NORM, _FIXED),
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/conditions.toml"),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/regress", f"{HERE}/conditions.toml"),
         read=read_suite((*CONTROLLERS, "one-norm", "mambo-1norm-fixed")),
         tables={
             "conditions": conditions({name: title(name) for name in CONTROLLERS}),
@@ -167,9 +149,9 @@ ITEMS: Final = (
     ),
     Item(
         name="vehicles",
-        commands=_regress("vehicles", f"{_HERE}/vehicles.toml", *_ON_EACH),
+        commands=_regress("vehicles", f"{HERE}/vehicles.toml", *_ON_EACH),
         controllers=_ON_EACH[2:],
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/vehicles.toml"),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/regress", f"{HERE}/vehicles.toml"),
         read=read_suite(_ON_EACH),
         tables={"vehicles": vehicles},
     ),
@@ -177,7 +159,7 @@ ITEMS: Final = (
         name="margins",
         commands=margin_commands(),
         controllers=PRESETS,
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/margins", f"{_HERE}/margin_tables.py"),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/margins", f"{HERE}/margin_tables.py"),
         read=read_margins,
         tables={"margins": presets_on_drones},
     ),
@@ -185,7 +167,7 @@ ITEMS: Final = (
         name="spread",
         commands=("python -m benchmarks.flights.spread",),
         controllers=_FLOWN,
-        paths=(*_FLIGHT, "benchmarks/flights/spread.py"),
+        paths=(*FLIGHT, "benchmarks/flights/spread.py"),
         read=read_printed,
         tables={"spread": spread},
     ),
@@ -193,7 +175,7 @@ ITEMS: Final = (
         name="envelope",
         commands=_regress("envelope", "envelope", *CONTROLLERS),
         controllers=_FLOWN,
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/pictures.py", _STYLE),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/regress", f"{HERE}/pictures.py", STYLE),
         read=read_envelope,
         tables={"envelope": envelope},
         pictures={"envelope.png": "envelope.png"},
@@ -207,17 +189,17 @@ ITEMS: Final = (
     Item(
         name="opponents",
         commands=(
-            f"mambo-nmpc campaign {_HERE}/opponents.toml -o {RESULTS}/opponents/drawn",
+            f"mambo-nmpc campaign {HERE}/opponents.toml -o {RESULTS}/opponents/drawn",
             *(
-                f"mambo-nmpc campaign {_HERE}/opponents-{name}.toml --flights 300 "
+                f"mambo-nmpc campaign {HERE}/opponents-{name}.toml --flights 300 "
                 f"-o {RESULTS}/opponents/{name}"
                 for name in SLOW_MOTORS
             ),
         ),
         controllers=_FLOWN,
         paths=(
-            *(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/opponents.toml"),
-            *(f"{_HERE}/opponents-{name}.toml" for name in SLOW_MOTORS),
+            *(*FLIGHT, f"{_EXPERIMENT}/campaign", f"{HERE}/opponents.toml"),
+            *(f"{HERE}/opponents-{name}.toml" for name in SLOW_MOTORS),
         ),
         read=read_opponents,
         tables={
@@ -235,7 +217,7 @@ ITEMS: Final = (
         name="limits",
         commands=(f"python -m benchmarks.flights.limits {RESULTS}/limits/pictures",),
         controllers=("mambo", "crazyflie", "mambo-1norm", "table1"),
-        paths=(*_FLIGHT, "benchmarks/flights/limits.py", _STYLE),
+        paths=(*FLIGHT, "benchmarks/flights/limits.py", STYLE),
         read=read_printed,
         tables={"limits": printed},
         pictures={f"limits-{name}.png": f"pictures/limits-{name}.png" for name in ("step", "fence")},
@@ -249,12 +231,12 @@ ITEMS: Final = (
         controllers=("mambo",),
         paths=(
             *(
-                *_FLIGHT,
+                *FLIGHT,
                 f"{_EXPERIMENT}/campaign",
                 "sil/mambo_extensions/tune",
                 "benchmarks/flights/settings.py",
             ),
-            f"{_HERE}/opponents-slow-motors.toml",
+            f"{HERE}/opponents-slow-motors.toml",
         ),
         read=read_figures("flown"),
         tables={
@@ -268,7 +250,7 @@ ITEMS: Final = (
         name="derived",
         commands=(f"python -m benchmarks.flights.derived {RESULTS}/derived/flown",),
         controllers=(*(f"design {vehicle}" for vehicle in VEHICLES), "mambo", "crazyflie"),
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", "benchmarks/flights/derived.py"),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/campaign", "benchmarks/flights/derived.py"),
         read=read_figures("flown"),
         tables={"derived-campaigns": derived_campaigns, "derived-vehicles": derived_vehicles},
     ),
@@ -276,7 +258,7 @@ ITEMS: Final = (
         name="height",
         commands=(f"python -m benchmarks.flights.height {RESULTS}/height/pictures",),
         controllers=("design crazyflie",),
-        paths=(*_FLIGHT, "benchmarks/flights/height.py", _STYLE),
+        paths=(*FLIGHT, "benchmarks/flights/height.py", STYLE),
         read=read_printed,
         tables={"height": printed},
         pictures={"height-helix.png": "pictures/height-helix.png"},
@@ -285,7 +267,7 @@ ITEMS: Final = (
         name="fast",
         commands=(f"python -m benchmarks.flights.fast {RESULTS}/fast/pictures",),
         controllers=("design crazyflie",),
-        paths=(*_FLIGHT, "benchmarks/flights/fast.py", _STYLE),
+        paths=(*FLIGHT, "benchmarks/flights/fast.py", STYLE),
         read=read_printed,
         tables={"fast": printed},
         pictures={"fast-eight.png": "pictures/fast-eight.png"},
@@ -294,7 +276,7 @@ ITEMS: Final = (
         name="bound",
         commands=("python -m benchmarks.flights.bound",),
         controllers=("design crazyflie",),
-        paths=(*_FLIGHT, "benchmarks/flights/bound.py", "benchmarks/flights/fast.py"),
+        paths=(*FLIGHT, "benchmarks/flights/bound.py", "benchmarks/flights/fast.py"),
         read=read_printed,
         tables={"bound": printed},
         variable="BOUND",
@@ -303,12 +285,12 @@ ITEMS: Final = (
         name="laps",
         commands=(
             "python -m benchmarks.flights.laps",
-            f"mambo-nmpc plan {_HERE}/points.csv --vehicle crazyflie -o {RESULTS}/laps/lap.csv",
+            f"mambo-nmpc plan {HERE}/points.csv --vehicle crazyflie -o {RESULTS}/laps/lap.csv",
         ),
         controllers=("design crazyflie-brushless", "design crazyflie"),
         paths=(
-            *(*_FLIGHT, "sil/mambo_extensions/plan", _STYLE),
-            *("benchmarks/flights/laps.py", f"{_HERE}/points.csv"),
+            *(*FLIGHT, "sil/mambo_extensions/plan", STYLE),
+            *("benchmarks/flights/laps.py", f"{HERE}/points.csv"),
         ),
         read=read_printed,
         tables={"laps": printed},
@@ -383,7 +365,7 @@ ITEMS: Final = (
             f"mambo-nmpc faults {_ONE_NORM} -o {RESULTS}/faults/one-norm",
         ),
         controllers=("mambo", "mambo-1norm", _ONE_NORM),
-        paths=(*_FLIGHT, f"{_EXPERIMENT}/faults", _STYLE),
+        paths=(*FLIGHT, f"{_EXPERIMENT}/faults", STYLE),
         read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
         tables={
             "faults": faults("mambo"),
@@ -394,10 +376,10 @@ ITEMS: Final = (
     Item(
         name="link",
         commands=(f"python -m benchmarks.flights.link {RESULTS}/link/link",),
-        controllers=(f"design {_HERE}/link-drone.toml",),
+        controllers=(f"design {HERE}/link-drone.toml",),
         paths=(
             *("sil/mambo_sil/api", "sil/mambo_sil/drone", "sil/mambo_sil/life", "sil/mambo_sil/model/derive"),
-            *("sil/mambo_extensions/mavlink", f"{_HERE}/link-drone.toml"),
+            *("sil/mambo_extensions/mavlink", f"{HERE}/link-drone.toml"),
             *("benchmarks/flights/link.py", "benchmarks/flights/wire.py"),
         ),
         read=read_figures("link"),
@@ -407,75 +389,6 @@ ITEMS: Final = (
             "link-pause": link_pause,
             "link-jumps": link_jumps,
         },
-    ),
-    Item(
-        name="adapters",
-        commands=(f"python -m benchmarks.simulators.adapters {RESULTS}/adapters/flights",),
-        controllers=("design crazyflie --sensors true", "design crazyflie-l250 --sensors true"),
-        paths=(
-            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
-            *("benchmarks/simulators/adapters.py", f"{_HERE}/simulator_pictures.py", _STYLE),
-        ),
-        read=read_adapters,
-        tables={},
-        pictures={f"adapters-{name}.png": f"adapters-{name}.png" for name in FLOWN},
-        draw=draw_adapters,
-        variable="SIMULATORS",
-    ),
-    Item(
-        name="simulators",
-        commands=tuple(
-            f"python -m benchmarks.simulators {name} {RESULTS}/simulators/{name}" for name in SIMULATORS
-        ),
-        controllers=(
-            "crazyflie",
-            *(f"design crazyflie{kind}" for kind in ("-l250", "-brushless")),
-            *("design cf2x-pybullet", "design hummingbird", "design x500"),
-        ),
-        paths=(
-            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/flight/altitude_loops.py"),
-            *("sil/mambo_sil/drone/sensors", "sil/mambo_sil/model"),
-            *("benchmarks/simulators", f"{_HERE}/simulator_pictures.py", _STYLE),
-        ),
-        read=read_figures(*SIMULATORS),
-        tables={"simulators-summary": summary, "simulators-all": every_controller},
-        pictures={f"simulators-{name}.png": f"simulators-{name}.png" for name in DRAWN},
-        draw=draw_simulators,
-        variable="SIMULATORS",
-    ),
-    Item(
-        name="quick",
-        commands=(f"python -m benchmarks.simulators quick {RESULTS}/quick/quick",),
-        controllers=tuple(
-            f"design {drone}" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500", "hummingbird")
-        ),
-        paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
-        read=read_figures("quick"),
-        tables={"quick": quick},
-        variable="SIMULATORS",
-    ),
-    Item(
-        name="truth",
-        commands=(f"python -m benchmarks.simulators truth {RESULTS}/truth/truth",),
-        controllers=tuple(
-            f"design {drone} --sensors true" for drone in ("crazyflie-l250", "crazyflie-brushless", "x500")
-        ),
-        paths=("sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
-        read=read_figures("truth"),
-        tables={"truth-summary": summary},
-        variable="SIMULATORS",
-    ),
-    Item(
-        name="downwash",
-        commands=("python -m benchmarks.simulators.downwash",),
-        controllers=("design cf2x-pybullet",),
-        paths=(
-            *("sil/mambo_nmpc/adapters/gym_pybullet_drones.py", "sil/mambo_sil/api"),
-            *(f"benchmarks/simulators/{name}.py" for name in ("downwash", "pybullet_flights")),
-        ),
-        read=read_printed,
-        tables={"downwash": printed},
-        variable="SIMULATORS",
     ),
     Item(
         name="speed",
@@ -489,27 +402,5 @@ ITEMS: Final = (
         tables={"speed": printed},
         variable="SIMULATORS",
     ),
-    Item(
-        name="motors",
-        commands=(f"python -m benchmarks.simulators motors {RESULTS}/motors/motors",),
-        controllers=tuple(f"design examples/{name}.toml --sensors true" for name in ("drake", "quad")),
-        paths=(
-            *("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "sil/mambo_sil/model", "benchmarks/simulators"),
-            *("examples/drake.toml", "examples/quad.toml", f"{_HERE}/simulator_pictures.py", _STYLE),
-        ),
-        read=read_figures("motors"),
-        tables={"motors-all": one_flight},
-        pictures={"simulators-drake.png": "simulators-drake.png"},
-        draw=draw_motors,
-        variable="MOTORS",
-    ),
-    Item(
-        name="pyflyt",
-        commands=(f"python -m benchmarks.simulators pyflyt {RESULTS}/pyflyt/pyflyt",),
-        controllers=("design cf2x-pyflyt --sensors true",),
-        paths=("sil/mambo_nmpc/adapters", "sil/mambo_sil/api", "benchmarks/simulators"),
-        read=read_figures("pyflyt"),
-        tables={"pyflyt-summary": summary, "pyflyt-all": every_controller},
-        variable="PYFLYT",
-    ),
+    *OF_SIMULATORS,
 )

@@ -18,6 +18,10 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.model.derive.derived_flight import chosen_text
 
 ROOT: Final = Path(__file__).parents[2]
+HERE: Final = "benchmarks/evidence"
+FLIGHT: Final = ("sil/mambo_sil/drone", "sil/mambo_sil/flight")
+STYLE: Final = "sil/mambo_sil/results/style.py"
+"""Paths on which many figures depend."""
 
 _C_TOKEN: Final = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
 _NAMES_OF_A_BUNDLE: Final = re.compile(

@@ -60,3 +60,10 @@ def test_what_is_learnt_has_the_limit_of_its_unit() -> None:
         fault = f'old.toml: height.{limit} = 0.3 has no effect with height.learnt = "{learnt}"; leave it out'
         assert faults_of(f'{head}learnt = "{learnt}"\n{limit} = 0.3\n') == [fault]
         assert faults_of(f'{head}learnt = "none"\n{limit} = 0.3\n') == [fault.replace(learnt + '"', 'none"')]
+
+
+def test_a_key_that_is_gone_says_why() -> None:
+    """It has no successor."""
+    assert faults_of("[guard]\ntarget_noise_m_s2 = 0.1\n") == [
+        "old.toml: guard.target_noise_m_s2 is gone, leave it out: each target says what it knows"
+    ]

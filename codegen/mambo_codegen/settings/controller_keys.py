@@ -7,7 +7,7 @@ from pydantic.fields import FieldInfo
 from mambo_codegen.settings.fields import SettingsSection, type_of
 from mambo_codegen.settings.key import Form, Key, key_of
 from mambo_codegen.settings.model import Settings
-from mambo_codegen.settings.renamed_keys import RENAMED
+from mambo_codegen.settings.renamed_keys import OF_BEFORE
 
 SECTIONS: dict[str, str] = {}
 """The description of each section, in the order of the file."""
@@ -36,5 +36,5 @@ def _collect(path: str, section: FieldInfo) -> None:
 for _name, _field in Settings.model_fields.items():
     _collect(_name, _field)
 
-SETTINGS: Final = Form(SECTIONS, KEYS, renamed=RENAMED)
+SETTINGS: Final = Form(SECTIONS, KEYS, renamed=OF_BEFORE)
 """What messages on a controller.toml need."""

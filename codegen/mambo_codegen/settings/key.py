@@ -43,7 +43,7 @@ class Form:
     """A kind of file with sections: descriptions of sections, and keys, both by dotted path.
 
     `kinds` are the sections whose key `kind` decides which others they have; `renamed` are keys of before,
-    with what follows "is now" in a message.
+    with what a message says of each.
     """
 
     sections: Mapping[str, str]

@@ -89,7 +89,7 @@ def degrees_hint(degrees: float) -> str:
 def _unknown(names: list[str], dotted: str, form: Form) -> str:
     """Say that a section or key does not exist, and name the most similar one."""
     if dotted in form.renamed:
-        return f"{dotted} is now {form.renamed[dotted]}"
+        return f"{dotted} {form.renamed[dotted]}"
     parent = ".".join(names[:-1])
     if parent not in form.sections:
         return f"{dotted} is not a section{_suggestion(names[0], _children('', form.sections), form)}"

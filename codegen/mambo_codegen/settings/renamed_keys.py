@@ -14,4 +14,12 @@ RENAMED: Final = {
     "guard.thrust_m_s2": "guard.thrust_budget_m_s2",
     "guard.thrust_m_s3": "guard.thrust_budget_m_s3",
 }
-"""What follows "is now" in a message, by the dotted path of before."""
+"""The name of today by the dotted path of before."""
+
+GONE: Final = {"guard.target_noise_m_s2": "each target says what it knows"}
+"""Why a key has no successor."""
+
+OF_BEFORE: Final = {key: f"is now {name}" for key, name in RENAMED.items()} | {
+    key: f"is gone, leave it out: {why}" for key, why in GONE.items()
+}
+"""What a message says of a key of before."""

@@ -214,7 +214,7 @@ def _fault_of(course: PlannedCourse, limits: Sequence[FlightLimit]) -> str:
     """Return which limit a course does not keep, where and by how much; nothing if it keeps all."""
     over = _over(course, limits)
     if over.max() > 3.0 * HELD:
-        return _passed_words(course, limits, over)
+        return f"{_passed_words(course, limits, over)}; move points, or change what limits it"
     passed = passed_at_knots(course).max(axis=0)
     if passed.max() > 3.0 * HELD:
         number = course.choice.point_of(int(passed.argmax()))

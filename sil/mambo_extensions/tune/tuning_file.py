@@ -12,7 +12,7 @@ from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.model import Settings
-from mambo_codegen.settings.renamed_keys import RENAMED
+from mambo_codegen.settings.renamed_keys import OF_BEFORE
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import (
     Draws,
@@ -179,8 +179,8 @@ def _search(
 
 def _range(path: str, value: Any, base: Settings) -> Distribution:
     """Return the range of one key; raises ValueError, "must ..." or "is now ..."."""
-    if path in RENAMED:
-        raise ValueError(f"is now {RENAMED[path]}")
+    if path in OF_BEFORE:
+        raise ValueError(OF_BEFORE[path])
     key = KEYS.get(path)
     free = [one for one in KEYS if KEYS[one].low is not None and one not in _FIXED and base.uses(one)]
     if key is None or key.low is None or key.high is None or path not in free:

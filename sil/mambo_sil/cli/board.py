@@ -182,12 +182,12 @@ def _axes(vary: list[str], settings: "Settings") -> "list[Axis]":
 def _axis(text: str, settings: "Settings") -> "Axis":
     """Read KEY=FIRST:LAST:COUNT; whole numbers stay whole. Raises InvalidSettingsError."""
     from mambo_codegen.settings.controller_keys import KEYS
-    from mambo_codegen.settings.renamed_keys import RENAMED
+    from mambo_codegen.settings.renamed_keys import OF_BEFORE
     from mambo_sil.board.footprint.sweep import Axis
 
     key, _, span = text.partition("=")
-    if key in RENAMED:
-        raise InvalidSettingsError((f"--vary {echo(text)}: {key} is now {RENAMED[key]}",))
+    if key in OF_BEFORE:
+        raise InvalidSettingsError((f"--vary {echo(text)}: {key} {OF_BEFORE[key]}",))
     free = [path for path, one in KEYS.items() if one.low is not None and settings.uses(path)]
     if key not in free:
         near = [path for path in free if path.endswith(f".{key}")]

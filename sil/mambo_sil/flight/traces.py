@@ -188,7 +188,7 @@ def read_npz(path: Path) -> Trace:
             kind = SensedTrace if "seen_position_m" in arrays else Trace
             trace = kind(**{field.name: arrays[field.name] for field in fields(kind)})
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise TraceError(f"{path}: is no trace: {error}") from error
+        raise TraceError(f"{path}: is no trace: {error}; run its command again") from error
     steps = trace.status.shape
     if len(steps) != 2 or 0 in steps or trace.time_s.shape != steps[:1]:
         raise TraceError(f"{path}: is no trace: time_s {trace.time_s.shape} and status {steps} disagree")

@@ -115,6 +115,8 @@ def _read(path: Path, *kinds: type[ReportedSummary]) -> ReportedSummary:
     kind = next((kind for kind in kinds if kind.command == command), None)
     if kind is None:
         commands = ", ".join(kind.command for kind in kinds)
+        if command is None:
+            raise ResultsError(f"{name}: is the result of no command; run one of {commands}")
         raise ResultsError(f"{name}: command = {echo(str(command))} must be one of {commands}")
     try:
         return kind.model_validate({"generator": None} | document)

@@ -58,6 +58,8 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
                 else:
                     (folder / name).unlink(missing_ok=True)
             shutil.rmtree(fresh)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise UnwritableError(f"{echo(str(folder))}: is a file, or inside one; name a folder") from error
     except OSError as error:
         raise UnwritableError(f"{echo(str(folder))}: cannot be written: {error.strerror or error}") from error
 

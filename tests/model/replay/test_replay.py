@@ -261,7 +261,7 @@ def test_a_log_of_another_rate_is_interpolated() -> None:
             "short.csv: has no column for target_x_m (target_x_m, nmpc.targetX, ctrltarget.x); name it",
         ),
         (["flight.ulg"], "flight.ulg: is no ULog"),
-        (["flight.bin"], "flight.bin: is a DataFlash log, which lacks the inputs of the controller's steps"),
+        (["flight.bin"], "flight.bin: a DataFlash log (.bin) lacks the inputs of the controller's steps"),
         (["flight.dat"], "line 1: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg"),
         (["short.csv", "--columns", "targt_x_m=x"], "must begin with target_x_m"),
     ],

@@ -267,7 +267,7 @@ def _read(
     if path.suffix.lower() == _DATAFLASH:
         raise LogError(
             (
-                f"{echo(str(path))}: is a DataFlash log, which lacks the inputs of the controller's steps; "
+                f"{echo(str(path))}: a DataFlash log (.bin) lacks the inputs of the controller's steps; "
                 "replay the flight.csv of pilot",
             )
         )
