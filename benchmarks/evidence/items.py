@@ -65,6 +65,8 @@ from benchmarks.evidence.tables import (
     vehicles,
 )
 from benchmarks.flights.derived import VEHICLES
+from benchmarks.margins.front import front_table
+from benchmarks.margins.front import read as read_front
 
 _ONE_NORM: Final = f"{HERE}/one-norm.toml"
 _EXPERIMENT: Final = "sil/mambo_sil/experiment"
@@ -245,6 +247,18 @@ ITEMS: Final = (
             "settings-moves": settings_moves,
             "settings-study": settings_study,
         },
+    ),
+    Item(
+        name="margin-front",
+        commands=(f"python -m benchmarks.margins.front {RESULTS}/margin-front/front",),
+        controllers=("mambo",),
+        paths=(
+            *(*FLIGHT, f"{_EXPERIMENT}/campaign", f"{_EXPERIMENT}/margins", "benchmarks/margins"),
+            *(f"{HERE}/opponents-slow-motors.toml", STYLE),
+        ),
+        read=lambda results: {"rows": read_front(results / "front")},
+        tables={"margin-front": front_table},
+        pictures={"margin-front.png": "front/margin-front.png"},
     ),
     Item(
         name="derived",

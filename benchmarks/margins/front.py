@@ -1,13 +1,14 @@
 """Settings around preset mambo: what they fly, and what they stand.
 
-    python -m benchmarks.margins.front measure     flights and margins, into build/margins; 20 min on a core
-    python -m benchmarks.margins.front evidence    print the table, draw the picture of the manual
+    python -m benchmarks.margins.front FOLDER
 
-Seeds are of no other campaign. It continues where it was stopped.
+writes flights and margins into the folder, with the picture of the manual; 20 min on a core. Seeds are of no
+other campaign. It continues where it was stopped.
 """
 
 import json
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,8 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from benchmarks.evidence.item import PICTURES
-from benchmarks.margins.flights import BATCH, FOLDER, FREQUENCIES, campaigns, settings_of
+from benchmarks.margins.flights import BATCH, FREQUENCIES, campaigns, settings_of
 from benchmarks.margins.report import RINGING_RAD
 from benchmarks.markdown import table
 from mambo_codegen.settings.model import Settings
@@ -31,7 +31,7 @@ from mambo_sil.flight.scenario import flight_of
 from mambo_sil.results.pictures import save
 from mambo_sil.results.style import BLUE, PAGE_INCHES, SMALL, VERMILION, style
 
-FILE: Final = FOLDER / "front.jsonl"
+FILE: Final = "front.jsonl"
 SEEDS: Final = {"default": 70_001, "slow": 70_002}
 FLIGHTS: Final = {"default": 150, "slow": 100}
 MEASURED: Final = {"default": 30, "slow": 30}
@@ -66,10 +66,10 @@ def own_campaigns() -> dict[str, Campaign]:
     }
 
 
-def measure() -> None:
-    """Fly and measure the settings that are not in the file yet."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    done = [row["change"] for row in read()]
+def measure(folder: Path) -> None:
+    """Fly and measure the settings that are not in the folder's file yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    done = [row["change"] for row in read(folder)]
     drawn = own_campaigns()
     for change in (one for one in CHANGES if one not in done):
         row = {"change": change} | {
@@ -78,14 +78,15 @@ def measure() -> None:
         }
         nominal = axes_on(MarginSubject("", settings_of(change), drawn["default"].drone))
         row["nominal"] = [axis.model_dump(mode="json") for axis in nominal or ()]
-        with FILE.open("a", encoding="utf-8") as file:
+        with (folder / FILE).open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
         print(change, row["default"], row["slow"], flush=True)
 
 
-def read() -> list[dict[str, Any]]:
+def read(folder: Path) -> list[dict[str, Any]]:
     """Return what was flown and measured."""
-    lines = FILE.read_text("utf-8").splitlines() if FILE.exists() else []
+    file = folder / FILE
+    lines = file.read_text("utf-8").splitlines() if file.exists() else []
     return [json.loads(line) for line in lines]
 
 
@@ -130,10 +131,10 @@ def name_of(change: dict[str, float]) -> str:
     )
 
 
-def front_table(rows: list[dict[str, Any]]) -> str:
+def front_table(figures: Mapping[str, Any]) -> str:
     """Return a row for each of the settings."""
     found = []
-    for number, row in enumerate(rows):
+    for number, row in enumerate(figures["rows"]):
         default, slow, (roll, pitch) = row["default"], row["slow"], row["nominal"]
         found.append(
             {
@@ -183,22 +184,14 @@ def draw(rows: list[dict[str, Any]], stem: Path) -> None:
                 axes.set_xscale("log")
                 axes.set_xticks([0.003, 0.01, 0.03], ["0.003", "0.01", "0.03"])
                 axes.xaxis.set_minor_locator(NullLocator())
-        for picture in save(figure, stem)[1:]:
-            picture.unlink()  # the manual shows the PNG
+        save(figure, stem)
 
 
-def write() -> None:
-    """Print the table of docs/evidence/margins.md, and draw its picture."""
-    rows = read()
-    print(front_table(rows))
-    draw(rows, PICTURES / "margin-front.png")
+def main(folder: Path) -> None:
+    """Fly, measure, and draw."""
+    measure(folder)
+    draw(read(folder), folder / "margin-front")
 
 
 if __name__ == "__main__":
-    match sys.argv[1:]:
-        case ["measure"]:
-            measure()
-        case ["evidence"]:
-            write()
-        case _:
-            raise SystemExit(__doc__)
+    main(Path(sys.argv[1]))
