@@ -175,6 +175,13 @@ def test_the_version_stands_alike_everywhere() -> None:
         assert heading == f"[{__version__}] - {citation['date-released']}"
 
 
+def test_the_changelog_names_the_version_of_the_interface() -> None:
+    """The newest one that it names is that of the C."""
+    named = re.findall(r"`NMPC_INTERFACE_VERSION`(?: is|,) (\d+)", (ROOT / "CHANGELOG.md").read_text("utf-8"))
+    header = (ROOT / "generated" / "mambo" / "nmpc.h").read_text("utf-8")
+    assert re.search(r"#define NMPC_INTERFACE_VERSION (\d+)", header)[1] == max(named, key=int)  # type: ignore[index]
+
+
 def test_the_classifiers_are_known_and_let_it_be_uploaded() -> None:
     """An index refuses others."""
     assert set(PROJECT["classifiers"]) <= set(trove_classifiers.classifiers)

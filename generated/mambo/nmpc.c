@@ -550,8 +550,8 @@ NMPC_INLINE void observer_start(nmpc_observer_t *observer, const nmpc_state_t *s
     }
 }
 
-/* Correct the estimates by a measured state, with the gains number `which`: 1 while no position is measured, else 0.
- * `tilt_m_step2` is the acceleration of the tilt along x and y. */
+/* Correct the estimates by a measured state, with the gains number `which`: 0, or 1 where there are two and
+ * no position is measured. `tilt_m_step2` is the acceleration of the tilt along x and y. */
 NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t *state, int which,
                                   const nmpc_real_t tilt_m_step2[2])
 {
@@ -671,7 +671,7 @@ static void observer_clear(nmpc_observer_t *observer)
 #define NMPC_MEMORY_SLOW 42.0f /* n_1 */
 #define NMPC_MEMORY_PER_NOISE 3200.0f /* c_0 */
 #define NMPC_MEMORY_PER_NOISE_SLOW 800.0f /* c_1 */
-#define NMPC_MEMORY_FALL 3.0f /* of n in a step */
+#define NMPC_MEMORY_FALL 3.0f /* of n + 1 in a step */
 #define NMPC_KNOWN_LEAST 8.0f /* n_0 with known accelerations */
 #define NMPC_KNOWN_MOST 20.0f /* and n_2 */
 #define NMPC_KNOWN_PER_NOISE 10000.0f /* and c_0 */
@@ -1311,6 +1311,9 @@ static nmpc_real_t braking_speed(nmpc_square_t square)
  * v_d for v_T.
  */
 
+/* A target that is slower than A/(2 k), and inside the fence, is approached with f(d + (1 - n) A/k^2), down to
+ * d = n A/k^2, n = NMPC_NEAR_S2/NMPC_KNEE_S2: nearer the law brakes by itself. */
+
 #define NMPC_APPROACH_1_S 1.6060356f /* k */
 #define NMPC_KNEE_S2 0.19384725f /* 1/(2 k^2): the knee over 2 A */
 #define NMPC_NEAR_S2 0.13569309f /* 0.7 times that: where braking ends */
@@ -1486,7 +1489,7 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
  * What the law of the limits needs of them, and their functions of nmpc.h.
  */
 
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
+#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis, and 0.05 % for its spelling */
 #define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
 
 /* What follows from the limits of the settings: what limits_set() derives from nmpc_default_limits(). */
@@ -1820,7 +1823,7 @@ NMPC_INLINE void step_aim(nmpc_t *self, nmpc_step_t *step)
  *
  *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
  *
- * with R the rotation from x and y to right and forward; without drag or without a tracker their terms are 0.
+ * with R the rotation from x and y to right and forward; without drag its term is 0.
  */
 
 /* Set `right` and `forward` to the components of a vector along x and y. */

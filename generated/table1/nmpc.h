@@ -74,7 +74,7 @@ typedef float nmpc_real_t;
 typedef float nmpc_sum_t;
 
 /* Raised when a program that compiles with an earlier nmpc.h may not compile, or not do the same, with this one. */
-#define NMPC_INTERFACE_VERSION 2
+#define NMPC_INTERFACE_VERSION 3
 
 #define NMPC_VERSION "mambo-nmpc 0.4.0.dev0"
 #define NMPC_SETTINGS_DIGEST "1dd9ed1872eb3266"

@@ -305,7 +305,10 @@ def test_a_lost_flight_is_shown_as_far_as_it_went() -> None:
         (lambda folder: folder.rename("flight"), "fly: is not a folder; name a result folder of fly"),
         (lambda folder: (folder / SUMMARY).unlink(), "fly: has no summary.json; name a result folder"),
         (lambda folder: (folder / SUMMARY).write_text("{"), "summary.json: cannot be read as JSON"),
-        (lambda folder: (folder / SUMMARY).write_text("[]"), "summary.json: is the result of no command; run one of fly, "),
+        (
+            lambda folder: (folder / SUMMARY).write_text("[]"),
+            "summary.json: is the result of no command; run one of fly, ",
+        ),
         (
             lambda folder: (folder / SUMMARY).write_text('{"command": "dance"}'),
             "command = dance must be one of fly, fly --repeat, table2, ",
