@@ -159,9 +159,10 @@ def is_stopped_while_arming(one: LossyFlight) -> None:
 
 
 def motors_stop(one: LossyFlight) -> None:
-    """Stop the motors in flight, as an autopilot does that has turned over."""
+    """Stop the motors in flight, as an autopilot does that has turned over, until the pilot hears of it."""
     flying(one)
     one.autopilot.armed = False
+    one.pass_until(lambda: one.life.phase is Phase.ENDED)
 
 
 ENDS: Final[dict[Callable[[LossyFlight], None], str]] = {

