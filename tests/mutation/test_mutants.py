@@ -75,30 +75,30 @@ QUADRATIC_FAULTS = {
     "a turn of the model after an outage": ("            self->attitude.sine = sine;\n            self->attitude.cosine = cosine;\n", "            attitude_turn(&self->attitude, sine, cosine, step->target != NULL);\n"),
     "a held command turns": ("sine, cosine, step->target != NULL)", "sine, cosine, 1)"),
     "a new command does not turn": ("sine, cosine, step->target != NULL)", "sine, cosine, 0)"),
-    "a held command has rate feedback": ("    const int is_fed = (self->steps_blind == 0U);", "    const int is_fed = 0;"),
+    "a held command has rate feedback": ("    const int is_fed = (step->steps_blind < NMPC_NO_ESTIMATE) && (self->steps_blind == 0U);", "    const int is_fed = 0;"),
     "measured attitude": ("state[axis][4] = attitude->tilt_m_step2[axis];", "state[axis][4] = step->tilt_m_step2[axis];"),
     "no prediction in an outage": ("    observer_predict(&step->observer, step->world_m_step2);\n", "    if (step->state != NULL) { observer_predict(&step->observer, step->world_m_step2); }\n"),
     "a bad thrust allows a command": (
         "status = NMPC_BAD_THRUST;\n            good_target = NULL;",
         "status = NMPC_BAD_THRUST;",
     ),
-    "a command of others leaves the model": ("    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);\n", ""),
-    "a command of others has no rate feedback": ("    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);\n", "    attitude_set_command(&self->attitude, roll_rad, pitch_rad);\n"),
+    "a command of others leaves the model": ("    replace_command(self, self->command_rad, given_rad);\n", ""),
+    "a command of others has no rate feedback": ("    replace_command(self, self->command_rad, given_rad);\n", "    attitude_set_command(&self->attitude, given_rad[0], given_rad[1]);\n"),
     "a change of pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_change_rad)", "(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_change_rad)"),
-    "a reset keeps the estimate": ("    self->steps_blind = NMPC_NO_ESTIMATE;\n", ""),
+    "a reset keeps the estimate": ("    self->steps_blind = NMPC_AT_REST;\n", ""),
     "a reset keeps the target": ("    observer_clear(&self->observer);\n    tracker_clear(self);\n", "    observer_clear(&self->observer);\n"),
     "no clamp of feedback": ("    step->command_rad[1] = limited_angle(self, step->command_rad[1]);\n", ""),
-    "saturated to the right only": ("self->command_rad[0] <= attitude_roll(-right_m_step2)", "0"),
+    "saturated to the right only": ("self->command_rad[0] <= angle_of_move(self, NMPC_RIGHT, -right_m_step2)", "0"),
     "saturated to the left only": ("self->command_rad[0] >= angle_of_move(self, NMPC_RIGHT, right_m_step2)", "0"),
-    "saturated forward only": ("self->command_rad[1] >= attitude_pitch(-forward_m_step2)", "0"),
-    "saturated backward only": ("self->command_rad[1] <= attitude_pitch(forward_m_step2)", "0"),
-    "a command within the limit saturates": ("right_m_step2 = NMPC_RIGHT_LIMIT_M_STEP2;", "right_m_step2 = NMPC_HALF * NMPC_RIGHT_LIMIT_M_STEP2;"),
+    "saturated forward only": ("self->command_rad[1] >= angle_of_move(self, NMPC_FORWARD, -forward_m_step2)", "0"),
+    "saturated backward only": ("self->command_rad[1] <= angle_of_move(self, NMPC_FORWARD, forward_m_step2)", "0"),
+    "a command within the limit saturates": ("right_m_step2 = self->bounds.command_m_step2[NMPC_RIGHT];", "right_m_step2 = (nmpc_real_t)0.5 * self->bounds.command_m_step2[NMPC_RIGHT];"),
     "a move has no limit": ("return clamp(move_m_step2, limit_m_step2);", "return move_m_step2;"),
     "drag the other way": ("[axis] - (NMPC_DRAG_1_STEP", "[axis] + (NMPC_DRAG_1_STEP"),
     "no age of the velocity": ("+ (NMPC_AGE_STEPS * acceleration_m_step2)", "+ (nmpc_real_t)0"),
     "a start forgets the disturbance": ("NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n    }", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n        observer->disturbance_m_step2[axis] = (nmpc_real_t)0;\n    }"),
     "no limit of the disturbance": ("clamp(disturbance_m_step2, NMPC_DISTURBANCE_LIMIT_M_STEP2)", "clamp(disturbance_m_step2, (nmpc_real_t)1000)"),
-    "pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
+    "pitch the same way as roll": ("attitude->command_m_step2[NMPC_FORWARD] = -forward_m_step2;", "attitude->command_m_step2[NMPC_FORWARD] = forward_m_step2;"),
     "no trim of roll": ("state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
     "rows of the other axis": ("next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),
     "the tilt stays": ("    turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
@@ -111,7 +111,7 @@ QUADRATIC_FAULTS = {
     "the lag of the other axis": ("(lagged_rows[axis][1]", "(lagged_rows[1 - axis][1]"),
     "the jerk of x alone": ("self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1]", "self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[0]"),
     "the model answers nothing": ("    attitude_advance(&self->attitude);\n", ""),
-    "the model does not know its command": ("        attitude->command_m_step2[axis] = move_m_step2;\n", ""),
+    "the model does not know its command": ("    attitude->command_m_step2[1] = move_m_step2[1];\n", ""),
     "a command without feedback": ("    step->command_rad[1] = step->command_rad[1] + step->feedback_rad[1];\n", ""),
     "an outage is not counted": ("        step->steps_blind = (unsigned int)self->steps_blind + 1U;\n", "        step->steps_blind = self->steps_blind;\n"),
     "an outage has an aim": ("(step->steps_blind < NMPC_NO_ESTIMATE) ? step->target : NULL", "step->target"),
@@ -134,6 +134,17 @@ class Bench:
         library = load_library(self.files | changed, toolchain("gcc", "-O0"))
         found: Run = run(CompiledController(self._settings, self._n, library), self._inputs, seed=0)
         return differences(self._expected, found)
+
+
+@pytest.mark.parametrize(
+    ("settings", "faults"),
+    [(BACKTRACKING, ONE_NORM_FAULTS), (EVERYTHING, QUADRATIC_FAULTS)],
+    ids=["one_norm", "quadratic"],
+)
+def test_every_fault_has_its_place(settings: Settings, faults: dict[str, tuple[str, str]]) -> None:
+    """The line that it changes is in the C, once: also of faults that are tried rarely."""
+    text = render(settings, with_digest=False)[CONTROLLER]
+    assert [fault for fault, (right, _) in faults.items() if text.count(right) != 1] == []
 
 
 @pytest.fixture(scope="module")
