@@ -331,3 +331,23 @@ def test_an_outage_ends_in_level_attitude() -> None:
     assert np.max(np.abs(commands[60].command_rad)) > 0.05, "it brakes"
     assert np.all(commands[-1].command_rad == 0)
     assert np.all(controller.memory.steps_blind == 52)
+
+
+def test_braking_ends_nearer_where_the_acceleration_of_the_target_is_estimated() -> None:
+    """By the tracker of the 1-norm or the target observer; without them at the knee."""
+    shares = {
+        name: method_of(settings).limiting.near_share  # type: ignore[union-attr]
+        for name, settings in {
+            "quadratic": limited(),
+            "tracked": with_option(limited("mambo-1norm"), "target.acceleration", "tracked"),
+            "none": with_option(limited("mambo-1norm"), "target.acceleration", "none"),
+        }.items()
+    }
+    assert shares == {"quadratic": NEAR_SHARE, "tracked": NEAR_SHARE, "none": 1.0}
+
+
+@pytest.mark.parametrize("period_s", [0.005, 0.01, 0.02])
+def test_a_1_norm_with_limits_levels_after_half_a_second(period_s: float) -> None:
+    """Without a good state."""
+    settings = with_option(limited("mambo-1norm"), "horizon.update_period_s", period_s)
+    assert (method_of(settings).outage_steps or 0) * period_s == pytest.approx(0.5)
