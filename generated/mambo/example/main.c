@@ -8,7 +8,7 @@
 #include "nmpc.h"
 #include "nmpc_self_test.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xFE3FBE2AUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x65406E0BUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
