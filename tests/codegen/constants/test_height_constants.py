@@ -17,6 +17,7 @@ from mambo_codegen.methods.quadratic.height_constants import (
     LEAST_WEIGHT,
     STEEPEST_RAD,
     HeightConstants,
+    jump_m_s2,
 )
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.reciprocal import Reciprocal
@@ -343,3 +344,14 @@ def test_the_cosine_is_close_where_it_counts() -> None:
     assert np.max(np.abs(found - np.cos(x))[counts]) < 9e-4
     assert np.all(found[~counts] < LEAST_COSINE + 9e-4)
     assert np.cos(STEEPEST_RAD) < LEAST_COSINE
+
+
+@pytest.mark.parametrize(("least", "most", "jump"), [(2.0, 12.0, 11.715), (8.0, 16.0, 9.285)])
+def test_a_target_jumps_with_half_more_than_what_the_thrust_gives(
+    least: float, most: float, jump: float
+) -> None:
+    """Down from the largest thrust or up from the least one, whichever is more."""
+    height = settings_of(EXACT).height
+    assert height is not None
+    bounds = {"thrust_min_m_s2": least, "thrust_max_m_s2": most}
+    assert jump_m_s2(height.model_copy(update=bounds)) == pytest.approx(jump)
