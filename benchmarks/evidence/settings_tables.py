@@ -27,7 +27,7 @@ def settings_near(figures: Figures) -> str:
         name, _, size = title.partition(", ")
         key, _, value = name.partition(" ")
         shown = f"`{key}`, {size}" if size else f"`{key}` {value}"
-        row = {"": f"**{shown}: preset `mambo`**" if title == _SHIPPED else shown}
+        row = {"settings": f"**{shown}: preset `mambo`**" if title == _SHIPPED else shown}
         for campaign, drones in (("default", "of 300"), ("slow", "slow motors, of 300")):
             one = found[campaign]
             row[f"crashed, {drones}"] = str(one["crashed"])
@@ -84,7 +84,7 @@ def settings_study(figures: Figures) -> str:
         middle, least, most = found["known_iae_m_s"]
         rows.append(
             {
-                "": f"{title}: {values or 'preset `mambo`'}",
+                "settings": f"{title}: {values or 'preset `mambo`'}",
                 "100 other draws: median IAE": three(found["drawn"]["iae_m_s_median"]),
                 "estimated error": three(found["drawn"]["seen_m_s_median"]),
                 "variation, rad": f"{found['drawn']['variation_rad_median']:.2g}",
