@@ -15,6 +15,7 @@ from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
 from mambo_codegen.settings.model import Settings
+from tests.support.height_settings import height_settings
 from tests.support.strategies import (
     LAGS,
     NUMBERS,
@@ -333,3 +334,18 @@ def test_echo_is_short_and_printable(text: str) -> None:
     assert len(echo(text)) <= LONGEST_ECHO
     if text.isprintable() and len(text) <= LONGEST_ECHO:
         assert echo(text) == text
+
+
+def test_without_a_section_what_it_alone_makes_useful_has_its_default() -> None:
+    """Here the exact tilt, the thrust's budget and the floor of a controller without a height."""
+    settings = height_settings()
+    for path, value in {
+        "limits.fence.ceiling_m": 2.0,
+        "limits.fence.floor_m": 0.2,
+        "model.tilt": "exact",
+    }.items():
+        settings = controller_toml.with_option(settings, path, value)
+    bare = controller_toml.without(settings, "height")
+    assert bare.height is None
+    assert (bare.model.tilt, bare.limits.fence) == ("small-angle", Settings().limits.fence)
+    assert bare.cost == settings.cost

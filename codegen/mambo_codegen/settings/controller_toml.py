@@ -11,6 +11,7 @@ from mambo_codegen.errors import InvalidSettingsError, UnreadableFileError, echo
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.messages import faults
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.sections import DEFAULTS
 from mambo_codegen.settings.toml_file import parse_document, read_text
 
 COLUMNS = 88
@@ -80,6 +81,19 @@ def with_option(settings: Settings, path: str, value: object, source: str = "set
     `source` begins the message, such as the option of the command line. Raises InvalidSettingsError.
     """
     return validate(with_value(settings.model_dump(), path, value), source)
+
+
+def without(settings: Settings, section: str, source: str = "settings") -> Settings:
+    """Return `settings` without an optional section; what has no effect without it has its default.
+
+    Raises InvalidSettingsError if that breaks another rule; `source` begins its message.
+    """
+    bare = settings.model_copy(update={section: None})
+    document = bare.model_dump()
+    for path in (f"{name}.{key}" for name, values in bare.values.items() for key in values):
+        if bare.unmet(path):
+            document = with_value(document, path, DEFAULTS.value(path))
+    return validate(document, source)
 
 
 def with_value(document: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:

@@ -49,23 +49,6 @@ class Settings(Sections):
                 if unmet and value != DEFAULTS.value(path):
                     yield Refusal(section, name, f"has no effect {unmet}; leave it out")
 
-    def without(self, section: str) -> Self:
-        """Return the settings without an optional section; what has no effect without it has its default.
-
-        Raises ValidationError if that breaks another rule.
-        """
-        bare = self.model_copy(update={section: None})
-        document = bare.model_dump()
-        for name, values in bare.values.items():
-            for key in values:
-                if bare.unmet(path := f"{name}.{key}"):
-                    *parents, last = path.split(".")
-                    place = document
-                    for parent in parents:
-                        place = place[parent]
-                    place[last] = DEFAULTS.value(path)
-        return type(self).model_validate(document)
-
     @property
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the C depends on, by section.

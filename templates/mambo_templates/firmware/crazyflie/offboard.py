@@ -104,7 +104,7 @@ def fly(radio: Radio, controller: "Controller", newest: Newest) -> str:
 def controller_of_folder() -> "Controller":
     """Return the controller of this folder, whose height the stock firmware flies."""
     try:
-        from mambo_codegen.settings.controller_toml import with_option
+        from mambo_codegen.settings.controller_toml import with_option, without
         from mambo_nmpc import Controller, MamboNmpcError
     except ImportError as error:
         cure = "in the folder of its source, pip install ."
@@ -114,7 +114,7 @@ def controller_of_folder() -> "Controller":
         if settings.model.tilt == "exact":
             settings = with_option(settings, "limits.braking_m_s2", 0.0)
             settings = with_option(settings, "limits.tilt_rad", min(SMALL_TILT_RAD, settings.limits.tilt_rad))
-        return Controller(settings if settings.height is None else settings.without("height"))
+        return Controller(settings if settings.height is None else without(settings, "height"))
     except MamboNmpcError as error:
         raise RefusedError(str(error)) from error
 
