@@ -1749,7 +1749,7 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
  * What the law of the limits needs of them, and their functions of nmpc.h.
  */
 
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis, and 0.05 % for its spelling */
+#define NMPC_BRAKING_PER_TILT_M_S2_RAD 1317334250 /* what a tilt gives along the slower axis */
 /* Bits by which products are shifted to the format of their result. */
 #define NMPC_TILT_SHIFT 27
 #define NMPC_LEAST_SHIFT 26

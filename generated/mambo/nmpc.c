@@ -1489,7 +1489,7 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
  * What the law of the limits needs of them, and their functions of nmpc.h.
  */
 
-#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis, and 0.05 % for its spelling */
+#define NMPC_BRAKING_PER_TILT_M_S2_RAD 9.814905f /* what a tilt gives along the slower axis */
 #define NMPC_TWICE_APPROACH_1_S 3.2120712f /* 2 k */
 
 /* What follows from the limits of the settings: what limits_set() derives from nmpc_default_limits(). */

@@ -145,7 +145,7 @@ def test_polynomial_pieces_fly(tmp_path: Path) -> None:
             "odd.toml: horizon.update_period_s = 0.012 must be a whole multiple of 0.005; the inner",
         ),
         (["-o", "taken"], "taken: holds files that are not results of mambo-nmpc"),
-        (["-o", "a-file"], "a-file: cannot be written"),
+        (["-o", "a-file"], "a-file: is a file, or inside one"),
     ],
 )
 def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str, tmp_path: Path) -> None:
