@@ -237,6 +237,7 @@ ITEMS: Final = (
                 f"{_EXPERIMENT}/campaign",
                 "sil/mambo_extensions/tune",
                 "benchmarks/flights/settings.py",
+                "benchmarks/margins/flights.py",
             ),
             f"{HERE}/opponents-slow-motors.toml",
         ),

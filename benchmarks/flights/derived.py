@@ -1,4 +1,4 @@
-"""What settings by `design` fly beside presets and laws without a model, on four vehicles and their sensors.
+"""What settings by `design` fly beside presets and laws without a model, on six vehicles and their sensors.
 
 python -m benchmarks.flights.derived FOLDER     writes figures.json into the folder; takes five minutes
 """

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.flights.limits import overshoot_m
-from mambo_codegen.settings.controller_toml import with_option
+from benchmarks.margins.flights import SLOW_MOTORS, settings_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import load, preset
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -32,7 +32,6 @@ from mambo_sil.results.folders import finite
 
 Change = dict[str, float | str]
 
-SLOW_MOTORS: Final = Path("benchmarks/evidence/opponents-slow-motors.toml")
 DRAWN, BATCH = 300, 20
 RESPONSE: Final = "cost.response_time_s"
 TIMES_S: Final = (0.12, 0.15, 0.18, 0.215, 0.25, 0.3, 0.4)
@@ -56,14 +55,6 @@ MOVES: Final = {"one": 0.0, "two": 0.4}
 """Seconds of the ramp to a second move."""
 CIRCLES_RAD_S, STEPS_M = (1.8, 2.0, 2.2), (2.0, 3.0, 5.0)
 HEADINGS, HEADINGS_OF_A_STUDY, OTHER_DRAWS = 33, 64, 100
-
-
-def changed(change: Change) -> Settings:
-    """Return preset mambo with other values."""
-    settings = preset("mambo")
-    for key, value in change.items():
-        settings = with_option(settings, key, value)
-    return settings
 
 
 def near() -> dict[str, Change]:
@@ -132,7 +123,7 @@ def spread(values: FloatArray) -> list[float]:
 
 def part(change: Change, campaigns: dict[str, Campaign]) -> dict[str, Any]:
     """Return what preset mambo flies without a part."""
-    settings = changed(change)
+    settings = settings_of(change)
     iae, variation = known(settings, list(CASES.values()))
     return {
         "cases": dict(zip(CASES, iae.tolist(), strict=True)),
@@ -144,7 +135,7 @@ def part(change: Change, campaigns: dict[str, Campaign]) -> dict[str, Any]:
 
 def moves(ramp_s: float) -> dict[str, Any]:
     """Return IAE on circles and overshoots of steps, each at all headings."""
-    settings = changed({"horizon.ramp_s": ramp_s})
+    settings = settings_of({"horizon.ramp_s": ramp_s})
     circles = {
         f"{rate:g}": measure(at_headings(settings, Circle(1.0, rate), 100.0)).iae_m_s
         for rate in CIRCLES_RAD_S
@@ -182,7 +173,7 @@ def main(arguments: list[str]) -> None:
     campaigns = {"default": campaign_file.default(), "slow": campaign_file.read(SLOW_MOTORS)}
     figures = {
         "near": {
-            title: {name: drawn(changed(change), one, DRAWN) for name, one in campaigns.items()}
+            title: {name: drawn(settings_of(change), one, DRAWN) for name, one in campaigns.items()}
             for title, change in near().items()
         },
         "parts": {title: part(change, campaigns) for title, change in PARTS.items()},

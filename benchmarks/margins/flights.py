@@ -8,7 +8,7 @@ It continues where it was stopped.
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -32,7 +32,7 @@ FREQUENCIES: Final = 120
 RESULTS: Final = ("crashed", "iae_m_s", "seen_iae_m_s", "seen_rms_error_m", "command_variation_rad")
 
 
-def settings_of(change: dict[str, float]) -> Settings:
+def settings_of(change: Mapping[str, float | str]) -> Settings:
     """Return preset mambo with some other values."""
     settings = preset("mambo")
     for key, value in change.items():

@@ -337,7 +337,7 @@ def test_echo_is_short_and_printable(text: str) -> None:
 
 
 def test_without_a_section_what_it_alone_makes_useful_has_its_default() -> None:
-    """Here the exact tilt, the thrust's budget and the floor of a controller without a height."""
+    """Here the exact tilt, floor and ceiling of a controller without a height."""
     settings = height_settings()
     for path, value in {
         "limits.fence.ceiling_m": 2.0,
